@@ -48,10 +48,10 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.predictor import Predictor as Predictor
     from shipid.predictor import fit as fit
     from shipid.simulation.measured import measure_standard as measure_standard
-    from shipid.simulation.perform import perform as perform
-    from shipid.simulation.standard import standard as standard
+    from shipid.simulation.perform import perform_manoeuvres as perform_manoeuvres
+    from shipid.simulation.standard import define_standard as define_standard
     from shipid.simulation.truth import Truth as Truth
-    from shipid.simulation.truth import simulate as simulate
+    from shipid.simulation.truth import simulate_truth as simulate_truth
     from shipid.study.plan import Plan as Plan
     from shipid.study.plan import read_plan as read_plan
     from shipid.study.results import Results as Results
@@ -64,8 +64,8 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.vessel.perturb import Family as Family
     from shipid.vessel.perturb import Perturbation as Perturbation
     from shipid.vessel.perturb import Variant as Variant
-    from shipid.vessel.perturb import draw as draw
-    from shipid.vessel.perturb import members as members
+    from shipid.vessel.perturb import draw_members as draw_members
+    from shipid.vessel.perturb import draw_variant as draw_variant
 
 
 _PUBLIC = {
@@ -96,7 +96,7 @@ _PUBLIC = {
     "compare": "shipid.answer.compare",
     "compare_methods": "shipid.answer.methods",
     "cut_windows": "shipid.data.windows",
-    "draw": "shipid.vessel.perturb",
+    "draw_variant": "shipid.vessel.perturb",
     "events": "shipid.answer.start",
     "figures": "shipid",
     "fit": "shipid.predictor",
@@ -105,8 +105,8 @@ _PUBLIC = {
     "import_log": "shipid.logs.importing",
     "load_vessel": "shipid.vessel.load",
     "measure_standard": "shipid.simulation.measured",
-    "members": "shipid.vessel.perturb",
-    "perform": "shipid.simulation.perform",
+    "draw_members": "shipid.vessel.perturb",
+    "perform_manoeuvres": "shipid.simulation.perform",
     "position_error": "shipid.metrics",
     "read_cells": "shipid.study.results",
     "read_dataset": "shipid.data.dataset",
@@ -118,8 +118,8 @@ _PUBLIC = {
     "run_identification": "shipid.identification.outcome",
     "run_study": "shipid.study.run",
     "screen": "shipid.study.screen",
-    "simulate": "shipid.simulation.truth",
-    "standard": "shipid.simulation.standard",
+    "simulate_truth": "shipid.simulation.truth",
+    "define_standard": "shipid.simulation.standard",
     "write_dataset": "shipid.data.dataset",
     "write_pages": "shipid.answer.pages",
 }

@@ -21,7 +21,7 @@ def open_streams() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")  # as standard error has it
 
 
-def run() -> None:
+def run_command_line() -> None:
     """Run the command line; Ctrl-C while it is being imported ends it as quietly as later."""
     try:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
@@ -40,4 +40,4 @@ def run() -> None:
 
 
 if __name__ == "__main__":
-    run()
+    run_command_line()

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shipid.errors import ShipidError, choices
+from shipid.errors import ShipidError, suggest_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,7 +19,7 @@ Kind = type[ShipidError]
 MULTIPLE = 1e-6  # of a step: by so much less or more a time is still a multiple
 
 
-def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
+def check_whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
     """Return a whole number, also one that NumPy holds or that is written as 10.0; raise `error` for anything else."""
     import numpy as np
 
@@ -32,7 +32,7 @@ def whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidErro
     return number
 
 
-def number(name: str, value: Any, error: Kind = ShipidError) -> float:
+def check_number(name: str, value: Any, error: Kind = ShipidError) -> float:
     """Return a number as a float, whatever type of number it was; raise `error` for anything else."""
     import numpy as np
 
@@ -41,7 +41,7 @@ def number(name: str, value: Any, error: Kind = ShipidError) -> float:
     return float(value)
 
 
-def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
+def check_positive(name: str, value: Any, error: Kind = ShipidError) -> float:
     """Return a number above 0 as a float, whatever type of number it was; raise `error` for anything else."""
     import numpy as np
 
@@ -51,34 +51,34 @@ def positive(name: str, value: Any, error: Kind = ShipidError) -> float:
     return number
 
 
-def steps_in(time: float, step: float) -> int:
+def whole_steps(time: float, step: float) -> int:
     """Number of steps [s] that a time [s] consists of; 0 where it is no multiple of the step."""
     ratio = time / step
     count = round(ratio) if math.isfinite(ratio) else 0
     return count if abs(ratio - count) <= MULTIPLE * count else 0
 
 
-def one_of(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidError) -> None:
+def check_choice(name: str, value: Any, valid: Iterable[str], error: Kind = ShipidError) -> None:
     """Raise `error` for a value that is none of the valid names."""
     names = list(valid)
     if not isinstance(value, str) or value not in names:
-        raise error(f"{name} {value!r} is not known: {choices(value, names)}")
+        raise error(f"{name} {value!r} is not known: {suggest_name(value, names)}")
 
 
-def names_of(name: str, value: Any, error: Kind = ShipidError) -> tuple[str, ...]:
+def as_names(name: str, value: Any, error: Kind = ShipidError) -> tuple[str, ...]:
     """Return one name or several as a tuple of texts; raise `error` for what is neither."""
     if isinstance(value, bytes) or not isinstance(value, Iterable):
         raise error(f"{name} must be a name, or several names, not {value!r}")
     return (value,) if isinstance(value, str) else tuple(str(one) for one in value)
 
 
-def function_or_none(name: str, value: Any) -> None:
+def check_function_or_none(name: str, value: Any) -> None:
     """Raise ShipidError for a value that is neither a function nor None."""
     if value is not None and not callable(value):
         raise ShipidError(f"{name} must be a function, or None, not {value!r}")
 
 
-def of_class(name: str, value: Any, kind: type, remedy: str, error: Kind = ShipidError) -> None:
+def check_class(name: str, value: Any, kind: type, remedy: str, error: Kind = ShipidError) -> None:
     """Raise `error` for a value of another class; the remedy says where such a value comes from."""
     if not isinstance(value, kind):
         shown = repr(value) if isinstance(value, str) else type(value).__name__
@@ -88,20 +88,20 @@ def of_class(name: str, value: Any, kind: type, remedy: str, error: Kind = Shipi
         raise error(f"{name} must be {article} {kind.__name__}, {remedy}, not {shown}")
 
 
-def by_name(name: str, value: Any, what: str, error: Kind = ShipidError) -> None:
+def check_mapping(name: str, value: Any, what: str, error: Kind = ShipidError) -> None:
     """Raise `error` for a value that is no mapping; `what` says of what to what, such as `a name to an array`."""
     if not isinstance(value, Mapping) and not hasattr(value, "keys"):  # a table has keys, too
         raise error(f"{name} must be a dict, of {what}, not {type(value).__name__}")
 
 
-def path_of(name: str, value: Any, error: Kind = ShipidError) -> Path:
+def as_path(name: str, value: Any, error: Kind = ShipidError) -> Path:
     """Return the path of a file or folder, given as a text or a Path; raise `error` for anything else."""
     if not isinstance(value, str | os.PathLike):
         raise error(f"{name} must be a path, a text or a Path, not {value!r}")
     return Path(value)
 
 
-def numbers(name: str, values: Any, error: Kind = ShipidError) -> NDArray[np.float64]:
+def as_float_array(name: str, values: Any, error: Kind = ShipidError) -> NDArray[np.float64]:
     """Return an array of floats, of a list, a series, a tensor or an array of any real type; masked values are NaN.
 
     An array of floats is not copied. Raises `error` for text, complex numbers and whatever else holds no real numbers.

@@ -12,7 +12,7 @@ GIB = 2**30
 _GROUP = Path("/sys/fs/cgroup")  # limits of a container
 
 
-def processor() -> str:
+def processor_name() -> str:
     """Name of the processor; its family where the system gives no name."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
@@ -22,14 +22,14 @@ def processor() -> str:
     return next(names, platform.processor() or platform.machine())
 
 
-def cores() -> int:
+def usable_cores() -> int:
     """Number of cores that this process may use, by its affinity and by its container."""
     count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(count, _quota(_GROUP) or count)
+    return min(count, _container_cores(_GROUP) or count)
 
 
 @cache
-def _quota(group: Path) -> int | None:
+def _container_cores(group: Path) -> int | None:
     """Number of cores that a container may use, None without a limit; read once, for each rollout asks for it."""
     try:
         quota, period = map(int, (group / "cpu.max").read_text().split())
@@ -38,7 +38,7 @@ def _quota(group: Path) -> int | None:
     return max(math.ceil(quota / period), 1) if quota > 0 < period else None
 
 
-def memory() -> int:
+def usable_memory() -> int:
     """Bytes of memory that this process may have in all, by the machine and by its container."""
     limits = []
     if hasattr(os, "sysconf"):
@@ -51,7 +51,7 @@ def memory() -> int:
     return min(limits, default=2**62)
 
 
-def too_much(numbers: float) -> str | None:
+def excess_memory_words(numbers: float) -> str | None:
     """Words for an amount of numbers of 8 bytes that cannot be had, such as `take 224 GiB ...`; None if it fits."""
-    needed, most = 8.0 * numbers, memory()
+    needed, most = 8.0 * numbers, usable_memory()
     return f"take {needed / GIB:.3g} GiB of memory, and there are {most / GIB:.3g}" if needed > most else None

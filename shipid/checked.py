@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import BaseModel, ValidationError
 
-from shipid.document import check_numbers, parse
+from shipid.document import check_numbers, parse_model
 from shipid.errors import DocumentError
 
 if TYPE_CHECKING:
@@ -32,15 +32,15 @@ else:
             else:
                 check_numbers(given, made, None, cls.__name__)
                 return made
-            parse(cls, given, None, cls.__name__)
+            parse_model(cls, given, None, cls.__name__)
             raise refused  # what a constructor alone refuses
 
 
-class Checked(BaseModel, metaclass=OneLine):
+class CheckedModel(BaseModel, metaclass=OneLine):
     """A pydantic model of which constructor and `model_validate` raise DocumentError, as for a file."""
 
     @classmethod
     def model_validate(cls, obj: Any, **_: Any) -> Self:
         """Return a checked model of plain data; DocumentError with dotted path, value and remedy."""
-        result: Self = parse(cls, obj, None, cls.__name__.lower())
+        result: Self = parse_model(cls, obj, None, cls.__name__.lower())
         return result

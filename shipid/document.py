@@ -13,9 +13,9 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.files import open_file
-from shipid.units import plural
+from shipid.units import plural_word
 
 Document = dict[str, Any]
 
@@ -66,19 +66,21 @@ REQUIRED = {
 LEAST_NUMBER = 1e-100  # but for 0: a quotient of two numbers of a document stays finite
 
 
-def bundled_folder(kind: str) -> Path:
+def bundled_documents_folder(kind: str) -> Path:
     """Folder of the documents that come with shipid: `models`, `studies` or `studies/mappings`."""
     package = Path(__file__).parent
     installed = package / "_bundled" / kind
     return installed if installed.is_dir() else package.parent / kind
 
 
-def bundled(kind: str) -> dict[str, Path]:
+def bundled_documents(kind: str) -> dict[str, Path]:
     """Name -> file of every bundled document of a kind, sorted by name."""
-    return {file.stem: file for file in sorted(bundled_folder(kind).glob("*.toml"), key=lambda file: file.stem)}
+    return {
+        file.stem: file for file in sorted(bundled_documents_folder(kind).glob("*.toml"), key=lambda file: file.stem)
+    }
 
 
-def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
+def find_document(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
     """File of a document: a bundled name, or a path if it contains a slash, ends in `.toml` or is a `Path`.
 
     A relative path is tried from the folder of the document that names it, then from the working folder.
@@ -98,16 +100,16 @@ def find(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
         except StopIteration:
             fault = "is a folder: name a document in it" if any(map(Path.is_dir, places)) else "no such file"
             raise DocumentError(fault, file=name) from None
-    available = bundled(kind)
+    available = bundled_documents(kind)
     if name not in available:
         label, draft = DRAFTS[kind]
-        words = f"no {label} of this name comes with shipid: {choices(name, available)}"
+        words = f"no {label} of this name comes with shipid: {suggest_name(name, available)}"
         remedy = f"a path to another file needs a slash or the ending .toml; `shipid {draft}` writes a first one"
         raise DocumentError(f"{words}; {remedy}", path=name)
     return available[name]
 
 
-def read(file: Path | str) -> Document:
+def read_document(file: Path | str) -> Document:
     """Read a TOML document; DocumentError for invalid syntax, a wrong encoding, and what `check_values` refuses."""
     try:
         with open_file(file) as stream:
@@ -119,12 +121,12 @@ def read(file: Path | str) -> Document:
         raise DocumentError(f"cannot be read ({error.strerror})", file=file) from None
     if len(content) > LARGEST:
         raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
-    document = loads(text, file)
+    document = parse_toml(text, file)
     check_values(document, file)
     return document
 
 
-def _wrong_line(text: str, message: str) -> str:
+def _line_of_mistake(text: str, message: str) -> str:
     """The line of a mistake, and what would be right where that is known; empty where the parser names no line."""
     place, lines = re.search(r"at line (\d+)", message), text.split("\n")
     if place is None or int(place[1]) > len(lines):
@@ -134,14 +136,14 @@ def _wrong_line(text: str, message: str) -> str:
     return f": {line!r}{remedy}"
 
 
-def loads(text: str, file: Path | str | None = None) -> Document:
+def parse_toml(text: str, file: Path | str | None = None) -> Document:
     """Parse TOML text; DocumentError for invalid syntax, and for what the parser cannot hold."""
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise DocumentError(f"is nested deeper than {DEEPEST} tables or lists", file=file) from None
     except tomllib.TOMLDecodeError as error:
-        raise DocumentError(f"not valid TOML: {error}{_wrong_line(text, str(error))}", file=file) from None
+        raise DocumentError(f"not valid TOML: {error}{_line_of_mistake(text, str(error))}", file=file) from None
     except ValueError:  # of an integer with thousands of digits
         raise DocumentError(
             f"has an integer larger than {MOST_INTEGER:.0e}: write a smaller number", file=file
@@ -186,13 +188,13 @@ def _has_control(text: str) -> bool:
     return any(unicodedata.category(sign) == "Cc" for sign in text)
 
 
-def digest(document: Any) -> str:
+def digest_document(document: Any) -> str:
     """SHA-256 (first 16 hex digits) of the canonical JSON form: the same for any order of keys."""
     canonical = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=True)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
 
-def merge(under: Document, over: Document) -> Document:
+def merge_documents(under: Document, over: Document) -> Document:
     """A new document: tables of both are merged; any other value in `over` replaces that in `under`.
 
     So does a table of another `kind`: the keys of one kind are not those of another.
@@ -201,12 +203,12 @@ def merge(under: Document, over: Document) -> Document:
     for key, value in over.items():
         below = result.get(key)
         if isinstance(below, dict) and isinstance(value, dict) and value.get("kind") in (None, below.get("kind")):
-            value = merge(below, value)
+            value = merge_documents(below, value)
         result[key] = value
     return result
 
 
-def leaves(document: Any, prefix: str = "", *, lists: bool = True) -> Iterator[tuple[str, Any]]:
+def document_leaves(document: Any, prefix: str = "", *, lists: bool = True) -> Iterator[tuple[str, Any]]:
     """Dotted path and value of every leaf, in document order.
 
     lists : entries of a list are leaves, addressed by index; else a list is one leaf.
@@ -220,10 +222,10 @@ def leaves(document: Any, prefix: str = "", *, lists: bool = True) -> Iterator[t
         yield prefix, document
         return
     for key, value in items:
-        yield from leaves(value, f"{prefix}.{key}" if prefix else str(key), lists=lists)
+        yield from document_leaves(value, f"{prefix}.{key}" if prefix else str(key), lists=lists)
 
 
-def parts(path: str) -> list[str]:
+def split_path(path: str) -> list[str]:
     """Keys of a dotted path; one in double quotes may hold dots: `truth.sensors."port.n".noise`."""
     if '"' not in path:
         return path.split(".")
@@ -240,28 +242,28 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
     return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
 
 
-def place_of(entries: list[Any], part: str) -> int:
+def entry_place(entries: list[Any], part: str) -> int:
     """Place of an entry of a list, by its number or by its name; ValueError where none has the name."""
     if part.isdecimal():
         return int(part)
-    return [_name_of(entry) for entry in entries].index(part)
+    return [_entry_name(entry) for entry in entries].index(part)
 
 
-def _name_of(entry: Any) -> str | None:
+def _entry_name(entry: Any) -> str | None:
     """The name of an entry of a list; None where it has none that can stand in a path."""
     name = entry.get("name") if isinstance(entry, Mapping) else None
     return name if isinstance(name, str) and name and '"' not in name and not name.isdecimal() else None
 
 
-def by_name(document: Any, path: str) -> str:
+def path_with_names(document: Any, path: str) -> str:
     """The path with the names of entries of lists in place of their numbers, where one entry alone has the name.
 
     `family.1.perturb.0` of a study whose second family is called wrong is `family.wrong.perturb.0`.
     """
     shown, value = [], document
-    for part in parts(path):
+    for part in split_path(path):
         if isinstance(value, list):
-            names = [_name_of(entry) for entry in value]
+            names = [_entry_name(entry) for entry in value]
             number = int(part) if part.isdecimal() and int(part) < len(value) else None
             name = None if number is None else names[number]
             shown.append(name if name is not None and names.count(name) == 1 else part)
@@ -272,10 +274,10 @@ def by_name(document: Any, path: str) -> str:
     return ".".join(f'"{part}"' if "." in part else part for part in shown)
 
 
-def get(document: Any, path: str) -> Any:
+def value_at_path(document: Any, path: str) -> Any:
     """Value at a dotted path; KeyError names the part that is missing."""
     value = document
-    for part in parts(path):
+    for part in split_path(path):
         if isinstance(value, list) and part.isdecimal() and int(part) < len(value):
             value = value[int(part)]
         elif isinstance(value, Mapping) and part in value:
@@ -285,7 +287,7 @@ def get(document: Any, path: str) -> Any:
     return value
 
 
-def replace(document: Any, changes: Mapping[str, Any], file: Path | str | None = None) -> Any:
+def replace_values(document: Any, changes: Mapping[str, Any], file: Path | str | None = None) -> Any:
     """A new document with the values at the given dotted paths replaced or added; other parts are shared.
 
     Entries of a list are addressed by number or by name. Raises DocumentError for a path that reaches nothing.
@@ -293,20 +295,20 @@ def replace(document: Any, changes: Mapping[str, Any], file: Path | str | None =
     result = copy.copy(document)
     copied = {id(result)}
     for path, value in changes.items():
-        *parents, last = parts(path)
+        *parents, last = split_path(path)
         node = result
         for place, part in enumerate(parents):
-            key = _key(node, part, parents[:place], path, file)
+            key = _key_in_node(node, part, parents[:place], path, file)
             below = node[key] if isinstance(node, list) else node.setdefault(key, {})
             if id(below) not in copied:
                 node[key] = below = copy.copy(below)
                 copied.add(id(below))
             node = below
-        node[_key(node, last, parents, path, file)] = value
+        node[_key_in_node(node, last, parents, path, file)] = value
     return result
 
 
-def _key(node: Any, part: str, above: Sequence[str], path: str, file: Path | str | None) -> Any:
+def _key_in_node(node: Any, part: str, above: Sequence[str], path: str, file: Path | str | None) -> Any:
     """Key of a part of a path in the node that the parts above it lead to; DocumentError if it can have none."""
     name = ".".join(above)
     if isinstance(node, Mapping):
@@ -314,29 +316,29 @@ def _key(node: Any, part: str, above: Sequence[str], path: str, file: Path | str
     if not isinstance(node, list):
         raise DocumentError(f"{name} is no table: nothing can be below it", file=file, path=path)
     try:
-        place = place_of(node, part)
+        place = entry_place(node, part)
     except ValueError:
-        hint = choices(part, filter(None, map(_name_of, node)))
+        hint = suggest_name(part, filter(None, map(_entry_name, node)))
         raise DocumentError(f"there is no {name}.{part}: {hint}", file=file, path=path) from None
     if place >= len(node):
         last = f", {name}.0 to {name}.{len(node) - 1}" if len(node) > 1 else f", {name}.0" if node else ""
-        held = f"{len(node)} {plural(len(node), 'entry', 'entries')}"
+        held = f"{len(node)} {plural_word(len(node), 'entry', 'entries')}"
         raise DocumentError(f"there is no {name}.{part}: {name} has {held}{last}", file=file, path=path)
     return place
 
 
-def plain(value: Any) -> Any:
+def plain_values(value: Any) -> Any:
     """A value as a TOML document holds it: NumPy numbers and arrays become numbers and lists, in tables too."""
     if type(value) is float:  # the usual case, first for speed
         return value
     if isinstance(value, Mapping):
-        return {key: plain(inner) for key, inner in value.items()}
+        return {key: plain_values(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(inner) for inner in value]
+        return [plain_values(inner) for inner in value]
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
+def match_paths(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     """Paths that match a pattern; `*` matches any characters, also dots."""
     first, *rest = (re.escape(piece) for piece in pattern.split("*"))
     inner = "".join(f"(?>.*?{piece})" for piece in rest[:-1] if piece)  # never tried again: many stars take no longer
@@ -344,7 +346,7 @@ def match(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     return [path for path in paths if expression.fullmatch(path)]
 
 
-def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
+def parse_model(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
     """Validate data by a pydantic model; DocumentError with path, value and remedy for the first problem.
 
     An unknown key is reported before a missing one, because it is usually the missing key, mistyped.
@@ -358,21 +360,23 @@ def parse(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> A
     except ValidationError as error:
         problems = error.errors(include_url=False)
         first = next((entry for entry in problems if entry["type"] == "extra_forbidden"), problems[0])
-        places = [".".join(filter(None, (prefix, *_place(data, entry)))) for entry in problems]
+        places = [".".join(filter(None, (prefix, *_location_in_data(data, entry)))) for entry in problems]
         path = places[problems.index(first)]
         if first["type"] == "extra_forbidden":
-            message = f"unknown key: {choices(first['loc'][-1], _fields(model, first['loc'][:-1]))}"
+            message = f"unknown key: {suggest_name(first['loc'][-1], _field_names(model, first['loc'][:-1]))}"
         elif first["type"] == "missing":
-            message = "missing" + _note(model, first["loc"])
+            message = "missing" + _field_note(model, first["loc"])
         elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
-            path, message = _of_no_kind(path, first)
+            path, message = _unknown_kind(path, first)
         else:
             shown = "" if isinstance(first["input"], dict | list) else f"{first['input']!r}: "
-            message = shown + required(*(entry for entry, place in zip(problems, places, strict=True) if place == path))
+            message = shown + requirement_words(
+                *(entry for entry, place in zip(problems, places, strict=True) if place == path)
+            )
         raise DocumentError(message, file=file, path=path) from None
 
 
-def suits(model: Any, data: Any) -> bool:
+def is_valid_for(model: Any, data: Any) -> bool:
     """Whether a pydantic model takes data that have a number, not true or "5", wherever the model asks for one."""
     from pydantic import ValidationError
 
@@ -408,17 +412,17 @@ def taken_for_numbers(data: Any, parsed: Any, path: str = "") -> Iterator[tuple[
                 yield from taken_for_numbers(value, values[key], f"{path}.{key}".removeprefix("."))
 
 
-def _of_no_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
+def _unknown_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
     """Path of the key that chooses between kinds of a block, and what is wrong with it."""
     key = problem["ctx"]["discriminator"].strip("'")
     if problem["type"] == "union_tag_not_found":
         return f"{path}.{key}", "missing"
     tag = problem["ctx"]["tag"]
     valid = [name.strip("' ") for name in problem["ctx"]["expected_tags"].split(",")]
-    return f"{path}.{key}", f"{tag!r} is no {key}: {choices(tag, valid)}"
+    return f"{path}.{key}", f"{tag!r} is no {key}: {suggest_name(tag, valid)}"
 
 
-def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
+def requirement_words(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
     """What pydantic's problem with a value says would be right; more problems are of other members of a union."""
     sentences = []
     for one in (first, *others):
@@ -434,30 +438,32 @@ def required(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
     return MUST + " or ".join(parts)
 
 
-def _place(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
+def _location_in_data(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
     """The parts of a pydantic location that are in the data, such as keys, without the names of union members."""
     location = problem["loc"]
     for position, part in enumerate(location):
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
         if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
-        elif isinstance(part, str) and part in dict(leaves(data, lists=False)):  # nested tables, taken by their paths
-            data = get(data, part)
+        elif isinstance(part, str) and part in dict(
+            document_leaves(data, lists=False)
+        ):  # nested tables, taken by their paths
+            data = value_at_path(data, part)
         elif problem["type"] != "missing" or position < len(location) - 1:
             continue
         yield str(part)
 
 
-def _note(model: Any, location: tuple[int | str, ...]) -> str:
+def _field_note(model: Any, location: tuple[int | str, ...]) -> str:
     """What a key is, in parentheses, as its declaration says; empty where it says nothing."""
-    fields = (kind.model_fields.get(str(location[-1])) for kind in _models(model, location[:-1]))
+    fields = (kind.model_fields.get(str(location[-1])) for kind in _models_at(model, location[:-1]))
     notes = (field.description for field in fields if field is not None)
     return next((f" ({note})" for note in notes if note and note != "-"), "")
 
 
-def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
+def _field_names(model: Any, location: tuple[int | str, ...]) -> list[str]:
     """Keys that a pydantic model allows at a place inside it, over all members of a union."""
-    models = _models(model, location)
+    models = _models_at(model, location)
     return [
         name
         for kind in models
@@ -465,7 +471,7 @@ def _fields(model: Any, location: tuple[int | str, ...]) -> list[str]:
     ]
 
 
-def _models(model: Any, location: tuple[int | str, ...]) -> list[Any]:
+def _models_at(model: Any, location: tuple[int | str, ...]) -> list[Any]:
     """The pydantic models at a place inside a model, over all members of a union."""
     kinds = [model]
     for part in location:
@@ -473,23 +479,23 @@ def _models(model: Any, location: tuple[int | str, ...]) -> list[Any]:
         for kind in kinds:
             if hasattr(kind, "model_fields"):
                 field = kind.model_fields.get(str(part))
-                inner += _alternatives(field.annotation) if field else []
+                inner += _union_members(field.annotation) if field else []
             elif get_args(kind):
-                inner += _alternatives([one for one in get_args(kind) if one is not ...][-1])
-        kinds = inner or _of_kind(kinds, part) or kinds  # the name of a union member is no key
+                inner += _union_members([one for one in get_args(kind) if one is not ...][-1])
+        kinds = inner or _models_of_kind(kinds, part) or kinds  # the name of a union member is no key
     return [kind for kind in kinds if hasattr(kind, "model_fields")]
 
 
-def _of_kind(models: list[Any], tag: int | str) -> list[Any]:
+def _models_of_kind(models: list[Any], tag: int | str) -> list[Any]:
     """The models whose key `kind` is the tag."""
     fields = [(model, getattr(model, "model_fields", {}).get("kind")) for model in models]
     return [model for model, field in fields if field is not None and get_args(field.annotation) == (tag,)]
 
 
-def _alternatives(annotation: Any) -> list[Any]:
+def _union_members(annotation: Any) -> list[Any]:
     """Member types of a union, also inside Annotated; None is one of them if optional."""
     if get_origin(annotation) is Annotated:
-        return _alternatives(get_args(annotation)[0])
+        return _union_members(get_args(annotation)[0])
     if get_origin(annotation) in (Union, UnionType):
-        return [leaf for member in get_args(annotation) for leaf in _alternatives(member)]
+        return [leaf for member in get_args(annotation) for leaf in _union_members(member)]
     return [annotation]

@@ -36,18 +36,18 @@ class ShipidError(Exception):
 
     def __str__(self) -> str:
         parts = [part for part in (self.file, self.path, self.message) if part]
-        line = ": ".join(legible(part) for part in parts)
+        line = ": ".join(shorten_line(part) for part in parts)
         return "\n".join([line, *map(str, self.others)])
 
     def __reduce__(self) -> tuple[object, ...]:  # errors of worker processes are pickled
-        return (_rebuild, (type(self), self.message, self.file, self.path, self.others))
+        return (_rebuild_error, (type(self), self.message, self.file, self.path, self.others))
 
 
 class DocumentError(ShipidError):
     """A TOML document (vessel, study, mapping, patch) that is invalid."""
 
 
-class Diverges(DocumentError):
+class DivergenceError(DocumentError):
     """A model of a study whose prediction diverges; another integrator, a smaller step or a milder family may not."""
 
 
@@ -59,7 +59,7 @@ class ResultError(ShipidError):
     """A results folder or a saved predictor that is missing, foreign or damaged."""
 
 
-def _rebuild(
+def _rebuild_error(
     cls: type[ShipidError], message: str, file: str | None, path: str | None, others: tuple[ShipidError, ...]
 ) -> ShipidError:
     return cls(message, file=file, path=path, others=others)
@@ -70,7 +70,7 @@ def is_utf_8(text: str) -> bool:
     return not any("\ud800" <= sign <= "\udfff" for sign in text)
 
 
-def visible(text: str) -> str:
+def escape_unprintable(text: str) -> str:
     """The text with every character that is not printable written out: contents of a file must not control a terminal.
 
     Ends of lines stay as they are.
@@ -80,13 +80,13 @@ def visible(text: str) -> str:
     )
 
 
-def legible(text: str) -> str:
+def shorten_line(text: str) -> str:
     """The text as one line of printable characters, shortened: contents of a file must not flood a terminal."""
-    shown = visible(" ".join(text.split()))
+    shown = escape_unprintable(" ".join(text.split()))
     return shown if len(shown) <= LONGEST else f"{shown[: LONGEST // 2]} ... {shown[-LONGEST // 2 :]}"
 
 
-def choices(value: object, valid: Iterable[str], limit: int = 12) -> str:
+def suggest_name(value: object, valid: Iterable[str], limit: int = 12) -> str:
     """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names.
 
     The same name in other capitals is the closest.

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, stdtr, stdtrit
 
-from shipid.metrics import shares_by_run
+from shipid.metrics import coverage_by_run
 
 Array = NDArray[np.float64]
 SIGNIFICANT = 0.025  # of one side: an interval of 95 % is free of 0
@@ -120,7 +120,7 @@ def share_interval(held: NDArray[Any], run: NDArray[Any]) -> tuple[float, float]
     ----------
     held : (S,) whether each window lies in its band. run : its run, (S,).
     """
-    shares, windows = shares_by_run(held, run), len(held)
+    shares, windows = coverage_by_run(held, run), len(held)
     runs, share = len(shares), float(shares.mean())
     count = float(runs)
     if runs > 1 and 0 < share < 1:

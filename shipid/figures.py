@@ -19,8 +19,8 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.arguments import number, of_class
-from shipid.errors import ShipidError, choices
+from shipid.arguments import check_class, check_number
+from shipid.errors import ShipidError, suggest_name
 from shipid.report import bands, checks, errors_over, identification, logs, manoeuvre, paths, physics_and_data
 from shipid.report import factors as models
 from shipid.report import search as trials
@@ -33,7 +33,7 @@ from shipid.report.manoeuvre import ManoeuvreContent
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identified
-    from shipid.simulation.measured import Measured
+    from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
     Source = Results | ReportContent | pd.DataFrame | Mapping[str, pd.DataFrame]
@@ -121,7 +121,7 @@ def prediction(
     t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
     N_D : manoeuvres the models were trained on; default: the most.
     """
-    if t is not None and not np.isfinite(number("t", t)):
+    if t is not None and not np.isfinite(check_number("t", t)):
         raise ShipidError(f"t must be a time in seconds, not {t}", path="prediction")
     content = content_of(source)
     window, size = paths.find_window(content, run, t, N_D)
@@ -187,17 +187,17 @@ def profiles(source: Identified | IdentificationContent, *, dark: bool = False) 
     return _draw(identification.profiles(_identification(source)), dark=dark)
 
 
-def track(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
+def track(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Track of a standard manoeuvre, north up, ship to scale."""
     return _draw(manoeuvre.track(_manoeuvre(source)), dark=dark)
 
 
-def histories(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
+def histories(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Heading, helm, speeds and yaw rate of a standard manoeuvre over time."""
     return _draw(manoeuvre.histories(_manoeuvre(source)), dark=dark)
 
 
-def spiral(source: Measured | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
+def spiral(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Steady yaw rate over helm angle, of a spiral."""
     return _draw(manoeuvre.spiral(_manoeuvre(source)), dark=dark)
 
@@ -228,7 +228,7 @@ def content_of(source: Source) -> ReportContent:
     from shipid.answer.pages import report_content
     from shipid.study.results import Results
 
-    of_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")
+    check_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")
     return report_content(source)
 
 
@@ -236,7 +236,7 @@ def _from_frames(frames: dict[str, Any]) -> ReportContent:
     known = {field.name for field in fields(ReportContent)}
     for name in frames:
         if name not in known:
-            raise ShipidError(f"a report shows no {name!r}; {choices(name, known)}", path="figures")
+            raise ShipidError(f"a report shows no {name!r}; {suggest_name(name, known)}", path="figures")
     cells = _completed(frames.pop("cells", pd.DataFrame({"model": np.array([], dtype=str), "N_D": [], "H": []})))
     models = frames.pop("models", None)
     if models is None:
@@ -275,16 +275,16 @@ def _identification(source: Identified | IdentificationContent) -> Identificatio
     from shipid.identification.contents import identification_content
     from shipid.identification.outcome import Identified
 
-    of_class("source", source, Identified, "as of `run_identification`")
+    check_class("source", source, Identified, "as of `run_identification`")
     return identification_content(source, "")
 
 
-def _manoeuvre(source: Measured | ManoeuvreContent) -> ManoeuvreContent:
+def _manoeuvre(source: MeasuredManoeuvre | ManoeuvreContent) -> ManoeuvreContent:
     if isinstance(source, ManoeuvreContent):
         return source
-    from shipid.simulation.measured import Measured, manoeuvre_content
+    from shipid.simulation.measured import MeasuredManoeuvre, manoeuvre_content
 
-    of_class("source", source, Measured, "as of `measure_standard`")
+    check_class("source", source, MeasuredManoeuvre, "as of `measure_standard`")
     return manoeuvre_content(source)
 
 

@@ -37,7 +37,7 @@ _SWEPT: set[Path] = set()  # folders that this process has looked through: one o
 
 
 @contextmanager
-def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
+def replace_whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path with the target's name: after the block it replaces the target; on an error it is removed.
 
     The path is alone in its folder, which is removed with all that the block makes there, and lies in that of the
@@ -59,12 +59,12 @@ def whole(target: str | os.PathLike[str]) -> Iterator[Path]:
         with temporary_folder(target.parent) as folder:
             temporary = folder / name
             yield temporary
-            sync(temporary)
+            sync_to_disk(temporary)
             if mode is not None:
                 with suppress(OSError):  # a file system without permissions
                     temporary.chmod(mode)
             os.replace(temporary, target)
-        sync(target.parent)
+        sync_to_disk(target.parent)
     except OSError as error:
         if error.errno is not None and TEMPORARY in str(error.filename or TEMPORARY):
             error.filename = str(target)  # a write that fails, as on a full disk, names no file, or the temporary one
@@ -76,10 +76,10 @@ def make_folder(folder: Path) -> None:
     if not folder.is_dir():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
-        sync(folder.parent)
+        sync_to_disk(folder.parent)
 
 
-def sync(place: Path) -> None:
+def sync_to_disk(place: Path) -> None:
     """Wait until a file, or the entries of a folder, are on the disk; folders only where the system can."""
     if place.is_dir() and os.name != "posix":
         return
@@ -106,12 +106,12 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
     """
     if parent not in _SWEPT:
         _SWEPT.add(parent)
-        sweep(parent)
+        sweep_temporary(parent)
     with tempfile.TemporaryDirectory(dir=parent, prefix=f"{TEMPORARY}{socket.gethostname()}-{os.getpid()}-") as folder:
         yield Path(folder)
 
 
-def sweep(folder: Path) -> None:
+def sweep_temporary(folder: Path) -> None:
     """Remove the temporary folders in a folder whose process is gone, or that are older than a day."""
     for place in folder.glob(f"{TEMPORARY}*"):
         words = place.name.removeprefix(TEMPORARY).rsplit("-", 2)
@@ -133,7 +133,7 @@ def is_alive(process: int) -> bool:
     return True
 
 
-def as_argument(file: str | os.PathLike[str]) -> str:
+def quote_argument(file: str | os.PathLike[str]) -> str:
     """The path as one types it in a command: quoted where a shell needs it, and never taken for an option."""
     path = str(file)
     return shlex.quote(f"./{path}" if path.startswith("-") else path)
@@ -141,7 +141,7 @@ def as_argument(file: str | os.PathLike[str]) -> str:
 
 def write_text(file: Path, text: str) -> None:
     """Write a UTF-8 text file; bytes of a name of a file that are not UTF-8 are written out, as escapes."""
-    with whole(file) as temporary:
+    with replace_whole(file) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
@@ -163,24 +163,24 @@ def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
     return file
 
 
-def write_together(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Path]:
+def write_set(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Path]:
     """Write text files of one folder that belong together, whole; `former` are files of an earlier set that go.
 
     An error before all are on the disk leaves what was there. A process that is killed leaves the old set, the new one
-    or a set with files missing, never files of both. Raises OSError, as `whole`.
+    or a set with files missing, never files of both. Raises OSError, as `replace_whole`.
     """
     folder = next(iter(texts)).parent
     absent = [one for one in (folder, *folder.parents) if not one.exists()]
     try:
         with ExitStack() as replaced:
             for file, text in texts.items():
-                temporary = replaced.enter_context(whole(file))
+                temporary = replaced.enter_context(replace_whole(file))
                 temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-                sync(temporary)
+                sync_to_disk(temporary)
             gone = [file for file in former if file not in texts]
             for file in (*gone, *(Path(os.path.realpath(file)) for file in texts)):
                 file.unlink(missing_ok=True)
-            sync(folder)
+            sync_to_disk(folder)
     except BaseException:
         for one in absent:
             with suppress(OSError):  # not one with a file in it
@@ -206,7 +206,7 @@ def write_json(file: Path, content: Any) -> None:
 
 def json_text(content: Any) -> str:
     """Write plain data, NumPy's numbers and paths among them, as the text of JSON; what is not finite is null."""
-    return json.dumps(_plain(content), indent=1)
+    return json.dumps(_json_values(content), indent=1)
 
 
 def read_json(file: Path) -> Any:
@@ -230,7 +230,7 @@ def check_table(file: Path) -> None:
 def write_table(file: Path, frame: DataFrame) -> None:
     """Write a frame as Parquet or CSV, by the ending of the file."""
     check_table(file)
-    with whole(file) as temporary:
+    with replace_whole(file) as temporary:
         if file.suffix == ".csv":
             frame.to_csv(temporary, index=False)
         else:
@@ -261,7 +261,7 @@ def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bo
     """Write arrays by name as one `.npz` without pickles."""
     import numpy as np
 
-    with whole(file) as temporary, temporary.open("wb") as stream:
+    with replace_whole(file) as temporary, temporary.open("wb") as stream:
         (np.savez_compressed if compressed else np.savez)(stream, allow_pickle=False, **arrays)
 
 
@@ -286,12 +286,12 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
         raise ValueError(f"{file} is not a whole .npz") from error
 
 
-def part_of(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
+def arrays_with_prefix(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
     """Arrays whose names begin with a prefix, by their names without it."""
     return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
 
 
-def entries_of(header: Mapping[str, Any], name: str) -> list[Any]:
+def header_entries(header: Mapping[str, Any], name: str) -> list[Any]:
     """A list in the header of a saved method; ResultError where it is none or empty."""
     entries = header[name]
     if not isinstance(entries, list) or not entries:
@@ -299,14 +299,14 @@ def entries_of(header: Mapping[str, Any], name: str) -> list[Any]:
     return entries
 
 
-def _plain(value: Any) -> Any:
+def _json_values(value: Any) -> Any:
     """Content of JSON: mappings, lists and scalars of Python."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
+        return {str(key): _json_values(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [_json_values(entry) for entry in value]
     if hasattr(value, "tolist"):  # of NumPy
-        return _plain(value.tolist())
+        return _json_values(value.tolist())
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, float) and not math.isfinite(value):

@@ -17,7 +17,7 @@ _holding: list[list[int]] = []  # the outermost call that holds interrupts back,
 
 
 @contextmanager
-def uninterrupted() -> Iterator[list[int]]:
+def hold_interrupts() -> Iterator[list[int]]:
     """Hold back Ctrl-C until the block ends: inside CasADi it would become an error about arguments.
 
     Gives the list of signals held back so far, so that a long call can look and stop. In nested blocks the outermost
@@ -45,7 +45,7 @@ def uninterrupted() -> Iterator[list[int]]:
 
 
 @contextmanager
-def recognised() -> Iterator[None]:
+def raise_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt for any error of the block after Ctrl-C was pressed: compiled code makes others of it.
 
     A second press within a second is passed over: it would break off how the block ends, with a traceback.

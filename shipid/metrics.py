@@ -10,13 +10,13 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.arguments import numbers
+from shipid.arguments import as_float_array
 from shipid.errors import ShipidError
 
 Array = NDArray[np.float64]
 
 
-class Summary(TypedDict):
+class ErrorSummary(TypedDict):
     """Position error over all predicted points: A or H (mean), H_90 (p90) and the root mean square, all in metres.
 
     `status` is `ok`, or `diverged` with NaN for the numbers if any point is not finite; `failed_share` is the share of
@@ -30,7 +30,7 @@ class Summary(TypedDict):
     failed_share: float
 
 
-def lengths(vectors: Array) -> Array:
+def vector_lengths(vectors: Array) -> Array:
     """Return the length (...) of vectors (..., 2), as `numpy.hypot` to 4 units in the last place, ten times as fast.
 
     Raises ValueError for another shape.
@@ -47,33 +47,33 @@ def position_error(predicted: Array, true: Array) -> Array:
     Arrays of integers are taken as floats, so that no difference wraps around. Raises ShipidError for another
     shape, and for what holds no numbers.
     """
-    predicted, true = numbers("predicted", predicted), numbers("true", true)
+    predicted, true = as_float_array("predicted", predicted), as_float_array("true", true)
     if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
         raise ShipidError(f"paths must both be (T, S, 2), got {predicted.shape} and {true.shape}")
     # order C: a sum over errors must not depend on the memory layout of the paths
-    return lengths(np.subtract(predicted, true, order="C"))
+    return vector_lengths(np.subtract(predicted, true, order="C"))
 
 
-def shares_by_run(held: NDArray[Any], run: NDArray[Any]) -> Array:
+def coverage_by_run(held: NDArray[Any], run: NDArray[Any]) -> Array:
     """Share of the windows (S,) of each run that lie in their bands, runs by name."""
     _, place = np.unique(run, return_inverse=True)
     shares: Array = np.bincount(place, held) / np.bincount(place)
     return shares
 
 
-def share_of(held: NDArray[Any], run: NDArray[Any]) -> float:
+def coverage_share(held: NDArray[Any], run: NDArray[Any]) -> float:
     """Coverage: share of windows (S,) in the mean over their runs, so a long run counts as much as a short one."""
-    return float(shares_by_run(held, run).mean())
+    return float(coverage_by_run(held, run).mean())
 
 
-def summary(error: Array) -> Summary:
+def summarise_errors(error: Array) -> ErrorSummary:
     """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points of all windows."""
     if error.size == 0:
         raise ValueError("there is no window to summarise")
     failed = ~np.isfinite(error).all(axis=0)
     if failed.any():
-        return Summary(mean=np.nan, p90=np.nan, rms=np.nan, status="diverged", failed_share=float(failed.mean()))
-    return Summary(
+        return ErrorSummary(mean=np.nan, p90=np.nan, rms=np.nan, status="diverged", failed_share=float(failed.mean()))
+    return ErrorSummary(
         mean=float(error.mean()),
         p90=float(np.quantile(error, 0.9)),
         rms=float(np.sqrt(np.square(error).mean())),
@@ -89,7 +89,7 @@ SHIFT = 52 - 9  # a double without its last bits is the number of its bin
 FIRST = (1023 + OCTAVES[0]) * BINS_AN_OCTAVE  # number of the bin that begins at LEAST
 
 
-def tally(error: Array) -> NDArray[np.uint32]:
+def tally_errors(error: Array) -> NDArray[np.uint32]:
     """Histogram (BINS,) of errors [m] of any shape on a geometric scale; values beyond it count in the end bins."""
     kept = np.where(error > LEAST, np.minimum(error, MOST), LEAST)
     bins = (np.ascontiguousarray(kept).view(np.int64) >> SHIFT) - FIRST
@@ -97,19 +97,19 @@ def tally(error: Array) -> NDArray[np.uint32]:
 
 
 def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
-    """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally`; accurate to a bin, 0.2 %."""
+    """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally_errors`; accurate to a bin, 0.2 %."""
     octaves = counts.reshape(*counts.shape[:-1], BINS // BINS_AN_OCTAVE, BINS_AN_OCTAVE)
     place = share * (counts.sum(axis=-1, keepdims=True, dtype=float) - 1)
-    octave, running, here = _passing(octaves.sum(axis=-1), place)
+    octave, running, here = _first_beyond(octaves.sum(axis=-1), place)
     within = np.take_along_axis(octaves, octave[..., None], axis=-2)[..., 0, :]
-    step, running, here = _passing(within, place, running - here)
+    step, running, here = _first_beyond(within, place, running - here)
     inside = (place - running + here + 0.5) / here
     octave, step = np.divmod(octave * BINS_AN_OCTAVE + step + np.clip(inside, 0, 1), BINS_AN_OCTAVE)
     quantile: Array = (2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE))[..., 0]
     return quantile
 
 
-def _passing(
+def _first_beyond(
     counts: NDArray[Any], place: Array, before: Array | float = 0.0
 ) -> tuple[NDArray[np.intp], Array, NDArray[Any]]:
     """First entry with which a running sum of counts (..., K), begun at `before`, passes a place (..., 1).
@@ -121,7 +121,7 @@ def _passing(
     return index, np.take_along_axis(running, index, axis=-1), np.take_along_axis(counts, index, axis=-1)
 
 
-def over_horizon(error: Array) -> dict[str, Array]:
+def error_of_steps(error: Array) -> dict[str, Array]:
     """Return mean and 90th percentile (T,) [m] of errors (T, S) at each step of the horizon (Fig. 14)."""
     return {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1)}
 
@@ -143,20 +143,20 @@ def course_over_horizon(predicted: Array, true: Array, step: float) -> Array:
     """
     going, truly = (np.diff(path, axis=0, prepend=np.zeros_like(path[:1])) for path in (predicted, true))
     cross = truly[..., 0] * going[..., 1] - truly[..., 1] * going[..., 0]
-    moves = lengths(truly) >= SLOW * step
+    moves = vector_lengths(truly) >= SLOW * step
     angle = np.abs(np.arctan2(cross, (truly * going).sum(axis=-1)))
     count = moves.sum(axis=1)
     mean: Array = np.where(count > 0, (angle * moves).sum(axis=1) / np.maximum(count, 1), np.nan)
     return mean
 
 
-def over_time(error: Array) -> Array:
+def error_of_windows(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
     mean: Array = error.mean(axis=0)
     return mean
 
 
-def roughness(paths: Array) -> float:
+def path_roughness(paths: Array) -> float:
     """Return the mean length [m] of the second difference over the horizon of paths (T, S, 2) [m], T at least 3.
 
     Steady motion has (U^2 / R) h^2 at speed U, radius R and step h: compare with true paths, not with zero.
@@ -164,7 +164,7 @@ def roughness(paths: Array) -> float:
     if len(paths) < 3 or paths.shape[-1:] != (2,):
         raise ValueError(f"a second difference needs paths (T, S, 2) of 3 steps or more, got {paths.shape}")
     second = np.diff(paths, n=2, axis=0)
-    return float(lengths(second).mean())
+    return float(vector_lengths(second).mean())
 
 
 def error_by_axis(predicted: Array, true: Array) -> tuple[float, float]:

@@ -33,16 +33,16 @@ from casadi import SX
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from shipid.arguments import of_class
-from shipid.checked import Checked
+from shipid.arguments import check_class
+from shipid.checked import CheckedModel
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, after_pauses, clock_slack, stretches
 from shipid.data.windows import PathSource, Windows
 from shipid.engine.casadi import summed_rates
-from shipid.engine.samples import on_samples
-from shipid.errors import DataError, DocumentError, ShipidError, choices
+from shipid.engine.samples import map_over_samples
+from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.metrics import position_error
 from shipid.units import GRAVITY
-from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
@@ -72,7 +72,7 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 
-class Observer(Checked, BaseModel):
+class Observer(CheckedModel, BaseModel):
     """The `[observer]` block of a study. Without a unit: by the ship's size, in units of L, g, sqrt(g L), sqrt(L / g).
 
     With L = 28.9 m these are 28.9 m, 9.81 m/s^2, 16.8 m/s, 1.72 s; for yaw g / L = 0.339 rad/s^2, sqrt(g / L) = 0.583
@@ -150,7 +150,7 @@ class Bank:
     @cached_property
     def model(self) -> Dynamics:
         """Equations of the vessel."""
-        return dynamics(self.vessel)
+        return vessel_dynamics(self.vessel)
 
     @property
     def num_filters(self) -> int:
@@ -164,10 +164,10 @@ class Bank:
 
 def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     """Filters for a vessel of three degrees of freedom; DocumentError for another, or for what is none."""
-    of_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
+    check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     if settings is not None:
-        of_class("settings", settings, Observer, "such as Observer(), or None", DocumentError)
-    settings, model = settings or Observer(), dynamics(vessel)
+        check_class("settings", settings, Observer, "such as Observer(), or None", DocumentError)
+    settings, model = settings or Observer(), vessel_dynamics(vessel)
     if model.num_dof != 3 or model.hidden:
         message = (
             f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends"
@@ -175,7 +175,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         raise DocumentError(message, file=vessel.file, path="dof")
     unknown = next((name for name in settings.noise if name not in MEASURED), None)
     if unknown is not None:
-        raise DocumentError(f"no measured column: {choices(unknown, MEASURED)}", path=f"observer.noise.{unknown}")
+        raise DocumentError(f"no measured column: {suggest_name(unknown, MEASURED)}", path=f"observer.noise.{unknown}")
     length = vessel.length or 0.0
     if not length:
         message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
@@ -432,12 +432,12 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     compile. Raises DocumentError for a vessel that is not of three degrees of freedom, ShipidError for a command that
     the dataset lacks, DataError for rows hours apart.
     """
-    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     filters, frame = bank(vessel, settings), dataset.frame
     model = filters.model
     missing = next((name for name in model.commands if name not in frame), None)
     if missing is not None:
-        raise ShipidError(f"{vessel.name} takes {missing!r}: {choices(missing, dataset.commands)}")
+        raise ShipidError(f"{vessel.name} takes {missing!r}: {suggest_name(missing, dataset.commands)}")
     table = {name: frame[name].to_numpy(dtype=float) for name in map(str, frame) if name not in ("run", "flags")}
     places = [
         part
@@ -464,7 +464,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     states = np.concatenate([begin(filters, measured[row], commands[row]) for row in starts], axis=1)
     estimate[starts, :6] = np.where(np.isnan(measured[starts]), 0.0, measured[starts])
     values = np.array(list(vessel.parameters.values()))
-    step = on_samples(filter_function(model), calls * len(frame) * count, shared=["parameters"])
+    step = map_over_samples(filter_function(model), calls * len(frame) * count, shared=["parameters"])
     order = sorted(range(len(places)), key=lambda i: -len(places[i]))  # those that end first last
     states = np.concatenate([states[:, i * count : (i + 1) * count] for i in order], axis=1)
     places = [places[i] for i in order]

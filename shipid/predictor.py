@@ -13,11 +13,20 @@ from typing import Annotated, Any, NamedTuple, Self, get_args, overload
 import numpy as np
 from pydantic import BaseModel, Field
 
-from shipid.arguments import by_name, names_of, number, numbers, of_class, one_of, path_of, whole_number
+from shipid.arguments import (
+    as_float_array,
+    as_names,
+    as_path,
+    check_choice,
+    check_class,
+    check_mapping,
+    check_number,
+    check_whole_number,
+)
 from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, locked, run_folds
-from shipid.document import plain
+from shipid.document import plain_values
 from shipid.engine.integrate import Method as Integrator
-from shipid.errors import DataError, ResultError, ShipidError, choices
+from shipid.errors import DataError, ResultError, ShipidError, suggest_name
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrated
@@ -25,14 +34,14 @@ from shipid.hybrid.contract import fault_of_corrector, named
 from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widened
 from shipid.hybrid.methods import METHODS, kind_of, listed
 from shipid.hybrid.physics import Physics, check_columns, check_instants
-from shipid.metrics import lengths
+from shipid.metrics import vector_lengths
 from shipid.observer import AGE, Observer
-from shipid.physics.signals import SIGNALS, measurable
-from shipid.simulation.log import column_of
-from shipid.units import percent
-from shipid.users import place_of, placed
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel
+from shipid.physics.signals import SIGNALS, measurable_signals
+from shipid.simulation.log import state_column
+from shipid.units import percent_text
+from shipid.users import error_location, locate_errors
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document
 
 Array = np.ndarray
 FORMAT = 5
@@ -147,12 +156,12 @@ class Predictor:
         instants = self._known(instants)
         alone = locked(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
         home = type(self.corrector)
-        with placed(f"{home.__name__}.predict", home):
+        with locate_errors(f"{home.__name__}.predict", home):
             try:
                 predicted, lost = self.corrector.predict(self.physics, instants, alone), self._lost(instants)
             except (KeyError, ValueError, TypeError, IndexError) as error:
                 name = str(*error.args[:1]) if isinstance(error, KeyError) else ""
-                lacks, place = name in self.limits and name not in instants.columns, place_of(error, home)
+                lacks, place = name in self.limits and name not in instants.columns, error_location(error, home)
                 if place and not lacks:  # a mistake in the code of a user
                     raise
                 if name:
@@ -198,9 +207,9 @@ class Predictor:
         """
         taken, before = set(self.limits), {"x", "y", "psi", *self.limits}
         if self.vessel is not None:
-            model = dynamics(self.vessel)
+            model = vessel_dynamics(self.vessel)
             taken |= {*model.commands, *model.environment}
-            before |= {*map(column_of, model.state), *taken}
+            before |= {*map(state_column, model.state), *taken}
         given = [values[None] for name, values in instants.columns.items() if name in taken]
         given += [values[-self.past :] for name, values in instants.past.items() if name in before and self.past]
         given += [values for name, values in (instants.planned or {}).items() if name in taken]
@@ -211,7 +220,7 @@ class Predictor:
 
     def _paths(self, paths: Array, instants: Instants, what: str = "paths") -> Array:
         """The paths as numbers; DataError unless they are (T, S, 2), of this horizon and these instants."""
-        paths, shape = numbers(what, paths, DataError), (self.physics.horizon, len(instants), 2)
+        paths, shape = as_float_array(what, paths, DataError), (self.physics.horizon, len(instants), 2)
         if paths.shape != shape:
             raise DataError(f"{what} must be {shape}, not {paths.shape}")
         return paths
@@ -222,12 +231,12 @@ class Predictor:
         parts = {name: getattr(instants, name) for name in ("past", "planned", "hidden", "estimates")}
         for part, given in parts.items():
             if part not in ("planned", "hidden") or given is not None:
-                by_name(f"{part} of the instants", given, "a name to an array", DataError)
+                check_mapping(f"{part} of the instants", given, "a name to an array", DataError)
         missing = next((name for name in ("u", "v", "r") if name not in instants.columns), None)
         if missing is not None:
             raise DataError("the instants lack this column", path=missing)
         step = self.physics.step
-        if instants.step is not None and abs(number("step", instants.step, DataError) - step) > 1e-9 * step:
+        if instants.step is not None and abs(check_number("step", instants.step, DataError) - step) > 1e-9 * step:
             message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
             raise DataError(f"{message}: cut windows with its step")
         return _as_numbers(instants)
@@ -243,7 +252,7 @@ class Predictor:
         for name, values in instants.planned.items():
             if values.shape != wanted:
                 raise DataError(f"a planned command must be {wanted}, not {values.shape}", path=name)
-        needed = () if self.vessel is None else dynamics(self.vessel).commands
+        needed = () if self.vessel is None else vessel_dynamics(self.vessel).commands
         missing = next((name for name in needed if name not in instants.planned), None)
         if missing is not None:
             raise DataError("this command of the vessel is not among those planned", path=missing)
@@ -256,7 +265,7 @@ class Predictor:
             and where it is missing nobody knows that the observer has settled. Columns without limits, and limits
             without a column, are passed over.
         """
-        by_name("columns", columns, "a name to an array", DataError)
+        check_mapping("columns", columns, "a name to an array", DataError)
         shapes = {name: np.shape(columns[name]) for name in columns}
         count = next((shape[0] for shape in shapes.values() if len(shape) == 1), 0)
         odd = next((name for name, shape in shapes.items() if shape != (count,)), None)
@@ -265,10 +274,10 @@ class Predictor:
         outside = np.full(count, not self.limits)
         for name, ends in self.limits.items():
             if name in columns:
-                (low, high), values = widened(*ends), numbers(name, columns[name], DataError)
+                (low, high), values = widened(*ends), as_float_array(name, columns[name], DataError)
                 outside |= ~((values >= low) & (values <= high))
         if self.run_up > 0:
-            age = numbers(AGE, columns.get(AGE, np.zeros(len(outside))), DataError)
+            age = as_float_array(AGE, columns.get(AGE, np.zeros(len(outside))), DataError)
             outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)
         return outside
 
@@ -280,7 +289,7 @@ class Predictor:
         ResultError : the file cannot be written.
         DataError : the method gives what could not be read back, such as an array with NaN.
         """
-        target = path_of("file", file, ResultError)
+        target = as_path("file", file, ResultError)
         corrector, arrays = self._corrector_parts()
         header = {
             "format": FORMAT,
@@ -294,7 +303,7 @@ class Predictor:
             "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "run_up": self.run_up,
-            "provenance": plain(self.provenance),
+            "provenance": plain_values(self.provenance),
             "method": self.method,
             "corrector": corrector,
             "bands": None if self.bands is None else self.bands.header(),
@@ -310,9 +319,9 @@ class Predictor:
     def _corrector_parts(self) -> tuple[dict[str, Any], dict[str, Array]]:
         """Header and arrays of the method; DataError for what would not be read back as it is."""
         home, what = type(self.corrector), f"of the method {self.method!r}"
-        with placed(f"{home.__name__}.header", home):
-            header = plain(self.corrector.header())
-        with placed(f"{home.__name__}.arrays", home):
+        with locate_errors(f"{home.__name__}.header", home):
+            header = plain_values(self.corrector.header())
+        with locate_errors(f"{home.__name__}.arrays", home):
             given = self.corrector.arrays()
         wrong = f"the header {what} must be a table of texts, numbers and lists of them"
         if not isinstance(header, dict):
@@ -344,14 +353,14 @@ class Predictor:
         if home.__module__.startswith("shipid."):  # the tests of shipid say so
             return
         header, arrays = self._corrector_parts()
-        with placed(f"{kind.__name__}.from_arrays", kind):
+        with locate_errors(f"{kind.__name__}.from_arrays", kind):
             corrector = kind.from_arrays(json.loads(json.dumps(header)), arrays)
         if fault := fault_of_corrector(corrector):
             raise ShipidError(f"`from_arrays` of {named(kind)} must return a corrector: {fault}")
         one, first = instants.select(np.arange(1)), paths[:, :1]
         kept, restored = (replace(self, corrector=each).predict(one, first) for each in (self.corrector, corrector))
         if not np.allclose(kept, restored, rtol=1e-6, atol=1e-6, equal_nan=True):
-            away = float(np.nanmax(lengths(kept - restored)))
+            away = float(np.nanmax(vector_lengths(kept - restored)))
             raise ShipidError(
                 f"the method {self.method!r}, saved and read back, predicts places {away:.2g} m away: `header`, "
                 "`arrays` and `from_arrays` must keep all that `predict` uses, and `predict` may draw nothing at random"
@@ -397,7 +406,7 @@ class Predictor:
             bands = _read_bands(header.get("bands"), arrays)
             loaded = cls(
                 physics=Physics(
-                    None if vessel is None else check_vessel(vessel["document"], vessel["file"]),
+                    None if vessel is None else check_document(vessel["document"], vessel["file"]),
                     known.horizon,
                     known.step,
                     known.integrator,
@@ -429,12 +438,12 @@ def _as_numbers(instants: Instants) -> Instants:
         raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
     columns = {}
     for name in (str(name) for name in instants.columns if name != "run"):  # the name of the run, as of a table
-        columns[name] = locked(numbers(f"column {name!r}", instants.columns[name], DataError))
+        columns[name] = locked(as_float_array(f"column {name!r}", instants.columns[name], DataError))
         if columns[name].shape != count:
             raise DataError(f"must be {count} as 'u', not {columns[name].shape}", path=name)
 
     def floats(what: str, given: Mapping[str, Array], leading: int | None = None) -> dict[str, Array]:
-        arrays = {name: locked(numbers(f"{what} {name!r}", values, DataError)) for name, values in given.items()}
+        arrays = {name: locked(as_float_array(f"{what} {name!r}", values, DataError)) for name, values in given.items()}
         for name, array in arrays.items():
             if leading is not None and (array.ndim != leading + 1 or array.shape[leading:] != count):
                 wanted = f"({'P, ' * leading}{count[0]}{'' if leading else ','})"
@@ -523,21 +532,21 @@ def fit(
         horizon or step; the windows hold too short a past, lack a command of the vessel or are too few to be split; the
         physics has an observer; the physics or the training diverges.
     """
-    of_class("method", method, Method, "such as PathDrawn()", DataError)
+    check_class("method", method, Method, "such as PathDrawn()", DataError)
     kind = kind_of(method)
-    of_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
-    of_class("windows", windows, Windows, "as of `cut_windows`", DataError)
-    one_of("commands", commands, get_args(Commands), DataError)
+    check_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
+    check_class("windows", windows, Windows, "as of `cut_windows`", DataError)
+    check_choice("commands", commands, get_args(Commands), DataError)
     kinds = {} if kinds is None else kinds
-    by_name("kinds", kinds, "the name of a run to a kind of manoeuvre", DataError)
-    seed, refits = whole_number("seed", seed, 0, DataError), whole_number("refits", refits, 0, DataError)
+    check_mapping("kinds", kinds, "the name of a run to a kind of manoeuvre", DataError)
+    seed, refits = check_whole_number("seed", seed, 0, DataError), check_whole_number("refits", refits, 0, DataError)
     _check_fit(method, kind, physics, windows)
     name = "physics" if physics.vessel is not None else "none"
     paths = physics.paths(windows.instants(known=commands == "known"))
     diverged = ~np.isfinite(paths).all(axis=(0, 2))
     if diverged.any():
         raise DataError(
-            f"the physics diverges on {percent(diverged.mean(), 1)} of the windows: take a smaller step, or rk4"
+            f"the physics diverges on {percent_text(diverged.mean(), 1)} of the windows: take a smaller step, or rk4"
         )
     task = Task(
         cases={name: Case(physics, paths)},
@@ -639,7 +648,13 @@ def refit_folds(windows: Windows, refits: int, seed: int) -> list[tuple[Index, I
 
 def limits_of(windows: Windows, commands: Iterable[str]) -> dict[str, tuple[float, float]]:
     """Least and greatest value of u, v, r, the commands, wind speed and other environment over windows, by column."""
-    names = ["u", "v", "r", *commands, *(name for name in measurable(windows.columns) if not SIGNALS[name].angle)]
+    names = [
+        "u",
+        "v",
+        "r",
+        *commands,
+        *(name for name in measurable_signals(windows.columns) if not SIGNALS[name].angle),
+    ]
     return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 
@@ -649,10 +664,10 @@ def _folds(
     """(Training, validation) indices of windows, split by run: as the method wants, or with the named runs."""
     if validation_runs is None:
         return run_folds(windows, method.validation, seed)
-    names = names_of("validation_runs", validation_runs, DataError)
+    names = as_names("validation_runs", validation_runs, DataError)
     runs = list(windows.spans)
     unknown = next((run for run in names if run not in runs), None)
     if unknown is not None:
-        raise DataError(f"no run with windows: {choices(unknown, runs)}", path="validation_runs")
+        raise DataError(f"no run with windows: {suggest_name(unknown, runs)}", path="validation_runs")
     training, judged = fold_masks(windows, names)
     return [(np.flatnonzero(training), np.flatnonzero(judged))]

@@ -28,19 +28,19 @@ def unit_fault(unit: str) -> str:
 
     Powers may have decimals. All behind a `/` divides, up to the next one: `m/s^2`, `kg/m/s`. There may be brackets.
     """
-    symbols = listed([one for one in SYMBOLS if one not in ("-", "prime")])
+    symbols = join_names([one for one in SYMBOLS if one not in ("-", "prime")])
     remedy = f"write a product of powers of {symbols}, such as 'kg m^-1' or 'N s^1.5/m', or '-' for a pure number"
-    return "" if _is_unit(unit) else remedy
+    return "" if _is_unit_product(unit) else remedy
 
 
-def _is_unit(unit: str) -> bool:
+def _is_unit_product(unit: str) -> bool:
     """Whether a text is a quotient of products; what is in brackets counts as one unit, from the inside on."""
     while (flat := re.sub(rf"\({_QUOTIENT}\)", "m", unit)) != unit:
         unit = flat
     return re.fullmatch(_QUOTIENT, unit) is not None
 
 
-def decimals_of(length: float) -> int:
+def length_decimals(length: float) -> int:
     """Number of decimals that a length [m] is written with: two, or more where it has two digits only so, up to six.
 
     So errors of a model ship are no zeros. What is below 0.0000005 m counts as 0.
@@ -51,16 +51,16 @@ def decimals_of(length: float) -> int:
 
 
 def length_text(length: float) -> str:
-    """A length [m] as text, with the decimals of `decimals_of`."""
-    return f"{length:.{decimals_of(length)}f}"
+    """A length [m] as text, with the decimals of `length_decimals`."""
+    return f"{length:.{length_decimals(length)}f}"
 
 
-def decimals_for(value: float, digits: int) -> int:
+def digit_decimals(value: float, digits: int) -> int:
     """Number of decimals that gives a number so many digits, none at least; that of 1 for 0."""
     return max(digits - 1 - math.floor(math.log10(abs(value))), 0) if value else digits - 1
 
 
-def digits(value: float, most: int = 3, sign: str = "") -> str:
+def significant_digits(value: float, most: int = 3, sign: str = "") -> str:
     """Format with so many significant digits, but never round digits before the decimal point."""
     return f"{value:{sign}.0f}" if abs(value) >= 10**most - 0.5 else f"{value:{sign}.{most}g}"
 
@@ -68,11 +68,11 @@ def digits(value: float, most: int = 3, sign: str = "") -> str:
 def interval_text(low: float, high: float, between: str = " ... ") -> str:
     """Both ends of an interval with the same decimals: those that give half its width two digits, six at most."""
     half = (high - low) / 2
-    places = min(decimals_for(half, 2), 6) if math.isfinite(half) else 0
+    places = min(digit_decimals(half, 2), 6) if math.isfinite(half) else 0
     return f"{low:z.{places}f}{between}{high:z.{places}f}"
 
 
-def percent(share: float, decimals: int = 0, *, signed: bool = False) -> str:
+def percent_text(share: float, decimals: int = 0, *, signed: bool = False) -> str:
     """A share as text, with a space before the sign as after any number (ISO 80000-1): 0.284 is 28 %."""
     return f"{100 * share:{'+' if signed else ''}.{decimals}f} %"
 
@@ -82,11 +82,11 @@ def level_text(level: float) -> str:
     return f"{100 * level:.10g} %"
 
 
-def plural(count: int, one: str, many: str | None = None) -> str:
+def plural_word(count: int, one: str, many: str | None = None) -> str:
     """Return the word for so many: `one` for 1, else `many`, which by default is `one` with an s."""
     return one if count == 1 else f"{one}s" if many is None else many
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

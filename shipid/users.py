@@ -13,25 +13,25 @@ from shipid.errors import ShipidError
 READ_ONLY = ": what a method is given cannot be written to, make a new array: `paths + shift`, not `paths += shift`"
 
 
-def of_users(kind: Callable[..., Any]) -> bool:
+def is_user_code(kind: Callable[..., Any]) -> bool:
     """Whether a class or a function is none of shipid's: somebody wrote it."""
-    module = _module(kind)
+    module = _module_name(kind)
     return bool(module) and module.partition(".")[0] != "shipid"
 
 
-def _module(kind: Callable[..., Any]) -> str:
+def _module_name(kind: Callable[..., Any]) -> str:
     """Name of the module of a class or function; empty for what has none, such as `str.upper`."""
-    return getattr(written(kind), "__module__", None) or ""
+    return getattr(unwrap_callable(kind), "__module__", None) or ""
 
 
-def written(kind: Callable[..., Any]) -> Callable[..., Any]:
+def unwrap_callable(kind: Callable[..., Any]) -> Callable[..., Any]:
     """The class or function as it stands in a file: that of a `partial`, or the class of an object that is called."""
     kind = getattr(kind, "func", kind)
     return kind if hasattr(kind, "__qualname__") else type(kind)
 
 
 @contextmanager
-def placed(where: str, kind: Callable[..., Any], what: str = "method") -> Iterator[None]:
+def locate_errors(where: str, kind: Callable[..., Any], what: str = "method") -> Iterator[None]:
     """Raise ShipidError, one line with its place, for a mistake in a user's class or function, or a call of `sys.exit`.
 
     Errors that arise elsewhere pass as they are.
@@ -41,13 +41,13 @@ def placed(where: str, kind: Callable[..., Any], what: str = "method") -> Iterat
     try:
         yield
     except SystemExit as error:
-        words = (f" ({error.code})" if isinstance(error.code, str) else "") + place_of(error, kind)
+        words = (f" ({error.code})" if isinstance(error.code, str) else "") + error_location(error, kind)
         remedy = f"a {what} may not end the process, raise DataError instead"
         raise ShipidError(f"{where} calls sys.exit{words}: {remedy}") from None
     except (ShipidError, MemoryError):
         raise
     except Exception as error:
-        place = place_of(error, kind)
+        place = error_location(error, kind)
         if not place:
             raise
         said = f": {error}" if str(error) else ""
@@ -55,31 +55,31 @@ def placed(where: str, kind: Callable[..., Any], what: str = "method") -> Iterat
         raise ShipidError(f"{where}: {type(error).__name__}{said}{place}{remedy}") from error
 
 
-def place_of(error: BaseException, kind: Callable[..., Any]) -> str:
+def error_location(error: BaseException, kind: Callable[..., Any]) -> str:
     """Where in the file of a user's class or function an error arose, ` in FILE, line N`; empty if it did not there."""
     file, trace, line = _file_and_line(kind)[0], error.__traceback__, 0
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == file:
             line = trace.tb_lineno
         trace = trace.tb_next
-    return f" in {file}, line {line}" if line and of_users(kind) else ""
+    return f" in {file}, line {line}" if line and is_user_code(kind) else ""
 
 
-def begins_at(function: Callable[..., Any]) -> str:
+def definition_location(function: Callable[..., Any]) -> str:
     """Where a user's function begins, ` in FILE, line N`; empty for one of shipid, and for what has no lines."""
     file, line = _file_and_line(function)
-    return f" in {file}, line {line}" if line and of_users(function) else ""
+    return f" in {file}, line {line}" if line and is_user_code(function) else ""
 
 
-def file_of(kind: Callable[..., Any]) -> str:
+def definition_file(kind: Callable[..., Any]) -> str:
     """File of a class or function; empty where there is none, as in a notebook."""
     return _file_and_line(kind)[0] or ""
 
 
 def _file_and_line(kind: Callable[..., Any]) -> tuple[str | None, int]:
     """File of a class or function, and the first line of a function; no file where there is none, else 0."""
-    kind = inspect.unwrap(written(kind))
+    kind = inspect.unwrap(unwrap_callable(kind))
     code = getattr(kind, "__code__", None)
     if code is not None:
         return code.co_filename, code.co_firstlineno
-    return getattr(sys.modules.get(_module(kind)), "__file__", None), 0
+    return getattr(sys.modules.get(_module_name(kind)), "__file__", None), 0

@@ -16,10 +16,10 @@ import typer.testing
 from hypothesis import settings
 
 from shipid.data.dataset import Dataset
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.hybrid.device import use_threads
 from shipid.logs.importing import import_log, read_mapping
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 use_threads(1)  # the machine is shared
@@ -57,7 +57,7 @@ PATCHED: dict[str, tuple[str, Mapping[str, Any]]] = {
 
 #: ships of public simulators, each for another range of speeds: tests/vessel/test_published.py has their laws
 SIMULATED = ("container-175", "cybership2", "esso-190k", "naval-51", "otter", "supply-vessel")
-OF_LAWS = [name for name in bundled("models") if name not in SIMULATED]
+OF_LAWS = [name for name in bundled_documents("models") if name not in SIMULATED]
 
 
 @cache
@@ -98,7 +98,7 @@ def vessel(request: pytest.FixtureRequest) -> Vessel:
     return structure(request.param)
 
 
-@pytest.fixture(scope="session", params=list(bundled("models")))
+@pytest.fixture(scope="session", params=list(bundled_documents("models")))
 def bundled_vessel(request: pytest.FixtureRequest) -> Vessel:
     """Every vessel that comes with shipid, in turn."""
     return load_vessel(request.param)
@@ -127,7 +127,7 @@ def draw_inputs() -> Callable[[Vessel, int], Inputs]:
     """Start, commands and environment of a rollout, drawn from the envelope of the vessels."""
 
     def draw(vessel: Vessel, num_samples: int, seed: int = 7) -> Inputs:
-        rng, model = np.random.default_rng(seed), dynamics(vessel)
+        rng, model = np.random.default_rng(seed), vessel_dynamics(vessel)
         slow = pace(vessel)
 
         def group(names: tuple[str, ...]) -> dict[str, np.ndarray]:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from shipid.physics.grammar import derivative
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel
+from shipid.physics.grammar import hull_derivative
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document
 
 Random = np.random.Generator
 GRAVITY = 9.81
@@ -100,7 +100,7 @@ def drawn_ship(seed: int, dof: int = 3) -> Vessel:
         document["wind"] = _wind(size, dice)
     if dice.maybe():
         document["current"] = {"kind": "uniform"}
-    return check_vessel(document, f"drawn-{seed}.toml")
+    return check_document(document, f"drawn-{seed}.toml")
 
 
 def _masses(size: Size, dof: int, dice: Dice) -> dict[str, Any]:
@@ -162,13 +162,13 @@ def _monomials(
     dice: Dice, axes: str, motions: str, taken: set[str] | None = None, heel: bool = True
 ) -> dict[str, list[str]]:
     """Names of coefficients, each of another monomial, and their factors."""
-    seen = {derivative(name).canonical for name in taken or ()}
+    seen = {hull_derivative(name).canonical for name in taken or ()}
     names: dict[str, list[str]] = {}
     for _ in range(int(dice(2, 9))):
         factors = [dice.choice(motions) for _ in range(int(dice(1, 4)))] + ["phi"] * (heel and dice.maybe(0.2))
         name = f"{dice.choice(axes)}_{''.join(f'|{one}|' if dice.maybe(0.3) else one for one in factors)}"
-        if derivative(name).canonical not in seen:
-            seen.add(derivative(name).canonical)
+        if hull_derivative(name).canonical not in seen:
+            seen.add(hull_derivative(name).canonical)
             names[name] = factors
     return names
 
@@ -305,7 +305,7 @@ def _rudder(kind: str, size: Size, dice: Dice, y: float) -> dict[str, Any]:
 
 def extreme_inputs(vessel: Vessel, count: int, seed: int = 0) -> dict[str, dict[str, np.ndarray]]:
     """Start, commands, environment: rest, sternway, sideslip, hurricanes, shafts that stand or turn the other way."""
-    random, model, sizes = np.random.default_rng(seed), dynamics(vessel), vessel.document["particulars"]
+    random, model, sizes = np.random.default_rng(seed), vessel_dynamics(vessel), vessel.document["particulars"]
     U, L = sizes["U_0"], sizes["L_pp"]
     n = U / (0.6 * sizes["T"] * 0.55)
     ranges: Mapping[str, tuple[float, float, list[float]]] = {  # least, greatest, and what is often taken instead

@@ -17,11 +17,11 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls
-from shipid.simulation.gusts import Gusts, series
-from shipid.simulation.manoeuvre import Approached, Excitation, TurningCircle, Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.gusts import Gusts, gust_series
+from shipid.simulation.manoeuvre import ApproachedManoeuvre, Excitation, TurningCircle, Zigzag
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.standard import shaft_speed
-from shipid.vessel.load import Vessel, check_vessel
+from shipid.vessel.load import Vessel, check_document
 
 DRIVES = ("screw", "twin screw", "azimuth", "screw and tunnel")
 TRIES = 40  # ships are drawn until one goes straight and turns
@@ -80,7 +80,7 @@ def _candidates(random: np.random.Generator, drive: str, name: str) -> Iterator[
     for _ in range(TRIES):
         drawn = _ship(random, drive)
         try:
-            vessel = check_vessel(drawn["document"], name)
+            vessel = check_document(drawn["document"], name)
             n = shaft_speed(Controls(vessel), drawn["U"])
             if _sails(vessel, n, drawn):
                 yield drawn, vessel, n
@@ -250,9 +250,9 @@ def _sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:
     """Whether it turns at 35 deg neither on the spot nor hardly."""
     pace = drawn["L"] / drawn["U"]
     turn = TurningCircle(n_rpm=60 * n, duration=25 * pace)
-    log = perform(vessel, [turn], step=pace / 60)
+    log = perform_manoeuvres(vessel, [turn], step=pace / 60)
     across = (log["east"].max() - log["east"].min()) / drawn["L"]
-    zigzag = perform(vessel, [Zigzag(n_rpm=60 * n, angle_deg=10, duration=20 * pace)], step=pace / 60)
+    zigzag = perform_manoeuvres(vessel, [Zigzag(n_rpm=60 * n, angle_deg=10, duration=20 * pace)], step=pace / 60)
     return bool(TURN[0] < across < TURN[1] and np.abs(zigzag["psi"]).max() < np.radians(60))
 
 
@@ -261,7 +261,7 @@ def _log(random: np.random.Generator, vessel: Vessel, n: float, drawn: Mapping[s
     pace, U, L, quick = drawn["L"] / drawn["U"], drawn["U"], drawn["L"], drawn["quick"]
     interval = _round(pace / 12)
     step = interval / 6
-    kinds: list[Approached] = []
+    kinds: list[ApproachedManoeuvre] = []
     for number in range(count):
         how: dict[str, Any] = {"n_rpm": 60 * n * (1.0, 0.75)[number % 2], "course_deg": float(random.uniform(0, 360))}
         how["execute_at"] = float(np.ceil(2 * pace / interval) * interval)
@@ -286,12 +286,14 @@ def _log(random: np.random.Generator, vessel: Vessel, n: float, drawn: Mapping[s
     weather: dict[str, Any] = {"V_c": random.uniform(0, 0.05) * U, "beta_c": random.uniform(-3, 3)}
     if not drawn["model"]:
         mean = np.full(count, random.uniform(0, 7))
-        gusts = mean + series(Gusts(kind="npd"), mean, t, [(int(random.integers(1e6)), run) for run in range(count)])
+        gusts = mean + gust_series(
+            Gusts(kind="npd"), mean, t, [(int(random.integers(1e6)), run) for run in range(count)]
+        )
         weather |= {"V_w": np.maximum(gusts, 0.0), "beta_w": random.uniform(-3, 3)}
     environment = {
         name: value if np.ndim(value) == 2 else np.full((rows, count), value) for name, value in weather.items()
     }
-    frame = perform(vessel, kinds, step=step, interval=interval, environment=environment)
+    frame = perform_manoeuvres(vessel, kinds, step=step, interval=interval, environment=environment)
     hidden = [name for name in frame if str(name).startswith("actual.") or name in ("V_w", "beta_w", "V_c", "beta_c")]
     frame = frame.drop(columns=hidden)
     noise = {

@@ -21,7 +21,7 @@ from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls
 from shipid.simulation.standard import shaft_speed
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, check_vessel
+from shipid.vessel.load import Vessel, check_document
 from tests.strangers import TRIES
 from tests.strangers_ships import Random, Run, draw_ship, known_of, programme_of, record_of, sails, true_values
 from tests.strangers_words import CODES, DATES, GERMAN, IDLE, JOINED, LANGUAGES, ROLES, SIDES, SPELLED, UNITS, WORDS
@@ -117,7 +117,7 @@ def raw_stranger(seed: int, folder: Path, runs: int | None = None) -> RawStrange
     for _ in range(TRIES):
         drawn = draw_ship(random)
         try:
-            vessel = check_vessel(drawn["document"], f"stranger-raw-{seed}.toml")
+            vessel = check_document(drawn["document"], f"stranger-raw-{seed}.toml")
             n = shaft_speed(Controls(vessel), drawn["U"])
             if not sails(vessel, n, drawn):
                 continue

@@ -16,18 +16,18 @@ import pandas as pd
 import pymap3d
 from numpy.typing import NDArray
 
-from shipid.simulation.gusts import Gusts, series
+from shipid.simulation.gusts import Gusts, gust_series
 from shipid.simulation.manoeuvre import (
     CrashStop,
     Excitation,
     Manoeuvre,
     PullOut,
-    Steps,
-    Timed,
+    StepManoeuvre,
+    TimedManoeuvre,
     TurningCircle,
     Zigzag,
 )
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import RPM
 from shipid.vessel.load import Vessel
 from tests.strangers import TURN, _hull, _plain, _thrusters, _wetted, _wind
@@ -51,7 +51,7 @@ DRIVES = ("screw", "screw and tunnel", "twin screw", "azimuth")
 RACE = ("race", "polynomial", "coefficients")
 
 
-class SpeedChange(Timed):
+class SpeedChange(TimedManoeuvre):
     """The shaft goes from `n_rpm` to `to_rpm`, the helm amidships: acceleration, slowing down, coasting."""
 
     to_rpm: float
@@ -180,9 +180,9 @@ def sails(vessel: Vessel, n: float, drawn: Mapping[str, Any]) -> bool:
     """Whether it turns at 35 deg neither on the spot nor hardly, and a zigzag comes back; she may be unstable."""
     pace = drawn["L"] / drawn["U"]
     how: dict[str, Any] = {"n_rpm": 60 * n, "approach": "helmsman"}
-    turn = perform(vessel, [TurningCircle(duration=25 * pace, **how)], step=pace / 40)
+    turn = perform_manoeuvres(vessel, [TurningCircle(duration=25 * pace, **how)], step=pace / 40)
     across = (turn["east"].max() - turn["east"].min()) / drawn["L"]
-    zigzag = perform(vessel, [Zigzag(angle_deg=20, duration=20 * pace, **how)], step=pace / 40)
+    zigzag = perform_manoeuvres(vessel, [Zigzag(angle_deg=20, duration=20 * pace, **how)], step=pace / 40)
     return bool(TURN[0] < across < TURN[1] and np.abs(zigzag["psi"]).max() < np.radians(80))
 
 
@@ -279,7 +279,7 @@ def _manoeuvre(random: Random, run: Run, name: str, n: float, pace: float, drawn
             orders = orders | {"n_rpm": (0.2 * rpm, 0.5 * rpm), "bow.n_rpm": (-most, most)}
         start = drawn["U"] * run.speed * 0.6
         held = (1.5 * slow, 6 * slow)
-        return Steps(name=name, course_deg=how["course_deg"], orders=orders, hold=held, seed=seed,
+        return StepManoeuvre(name=name, course_deg=how["course_deg"], orders=orders, hold=held, seed=seed,
                      start_speed=start, duration=1.5 * length)  # fmt: skip
     signal: Literal["aprbs", "multisine"] = "aprbs" if random.random() < 0.5 else "multisine"
     return Excitation(
@@ -311,10 +311,10 @@ def record_of(
     if style["team"] != "basin":
         mean = np.full(count, random.uniform(0.5, 8) / drawn["quick"])
         keys = [(int(random.integers(1_000_000)), run) for run in range(count)]
-        gusts = series(Gusts(kind="npd"), mean, step * np.arange(rows), keys)
+        gusts = gust_series(Gusts(kind="npd"), mean, step * np.arange(rows), keys)
         weather = {"V_w": np.maximum(mean + gusts, 0.0), "beta_w": np.full((rows, count), random.uniform(-3, 3))}
     weather |= {"V_c": V_c, "beta_c": np.full(count, towards)}
-    frame = perform(vessel, tests, step=step, interval=interval, environment=weather)
+    frame = perform_manoeuvres(vessel, tests, step=step, interval=interval, environment=weather)
     frame = frame.drop(columns=[name for name in ("V_c", "beta_c") if name in frame])
     numbers = [name for name in frame if name not in ("run", "flags")]
     frame = frame.astype({**dict.fromkeys(numbers, "float64"), "run": "str"})

@@ -11,36 +11,36 @@ import pytest
 import torch
 
 import shipid
-from shipid.arguments import names_of, number, numbers, positive, steps_in, whole_number
+from shipid.arguments import as_float_array, as_names, check_number, check_positive, check_whole_number, whole_steps
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
 from shipid.hybrid.alone import Unchanged
 from shipid.observer import bank, observe
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 
 
 @pytest.mark.parametrize("value", [3, 3.0, np.int32(3), np.uint8(3), np.float32(3), np.array(3)])
 def test_a_whole_number_of_any_type_is_an_int(value: Any) -> None:
-    assert type(whole_number("horizon", value, 1)) is int
-    assert whole_number("horizon", value, 1) == 3
+    assert type(check_whole_number("horizon", value, 1)) is int
+    assert check_whole_number("horizon", value, 1) == 3
 
 
 @pytest.mark.parametrize("value", [0, -3, 2.5, "3", None, True, np.bool_(True), np.nan, np.inf, [3], 3 + 0j])
 def test_anything_else_is_no_whole_number(value: Any) -> None:
     with pytest.raises(DataError, match="horizon must be a whole number, 1 or more, not"):
-        whole_number("horizon", value, 1, DataError)
+        check_whole_number("horizon", value, 1, DataError)
 
 
 @pytest.mark.parametrize("value", [0.5, np.float64(0.5), np.float32(0.5), np.float16(0.5)])
 def test_a_number_of_any_type_is_a_float(value: Any) -> None:
-    assert type(positive("step", value)) is float
-    assert positive("step", value) == 0.5
+    assert type(check_positive("step", value)) is float
+    assert check_positive("step", value) == 0.5
 
 
 @pytest.mark.parametrize("value", [0, -0.5, "0.5", None, True, np.nan, np.inf, [0.5], 0.5 + 0j, np.complex128(0.5)])
 def test_anything_else_is_no_positive_number(value: Any) -> None:
     with pytest.raises(ShipidError, match="step must be a number above 0 and finite, not"):
-        positive("step", value)
+        check_positive("step", value)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_anything_else_is_no_positive_number(value: Any) -> None:
     ],
 )
 def test_a_time_consists_of_whole_steps_up_to_the_digits_that_one_writes(time: float, step: float, steps: int) -> None:
-    assert steps_in(time, step) == steps
+    assert whole_steps(time, step) == steps
 
 
 @pytest.mark.parametrize(
@@ -72,41 +72,41 @@ def test_a_time_consists_of_whole_steps_up_to_the_digits_that_one_writes(time: f
     ],
 )
 def test_numbers_of_any_type_are_floats(values: Any) -> None:
-    assert numbers("u", values).dtype == np.float64
-    np.testing.assert_array_equal(numbers("u", values), [1.0, 2.0])
+    assert as_float_array("u", values).dtype == np.float64
+    np.testing.assert_array_equal(as_float_array("u", values), [1.0, 2.0])
 
 
 @pytest.mark.parametrize("values", [["1"], [1j], [[1], [1, 2]], [pd.NA], {"u": 1}, torch.ones(1).requires_grad_()])
 def test_what_holds_no_numbers_is_refused(values: Any) -> None:
     with pytest.raises(ShipidError, match="u must be an array of numbers, not"):
-        numbers("u", values)
+        as_float_array("u", values)
 
 
 @pytest.mark.parametrize("value", ["a", ["a"], ("a",), np.array(["a"]), pd.Series(["a"], index=[3]), iter(["a"])])
 def test_one_name_or_several_are_names(value: Any) -> None:
-    assert names_of("runs", value) == ("a",)
+    assert as_names("runs", value) == ("a",)
 
 
 @pytest.mark.parametrize("value", [None, 3, np.nan, b"a"])
 def test_anything_else_is_no_name(value: Any) -> None:
     with pytest.raises(DataError, match="runs must be a name, or several names, not"):
-        names_of("runs", value, DataError)
+        as_names("runs", value, DataError)
 
 
 @pytest.mark.parametrize("value", [None, "1", [1.0], True, 1j, pd.NA])
 def test_what_is_no_number_is_refused(value: Any) -> None:
-    assert number("speed", np.float32(0.5)) == 0.5
+    assert check_number("speed", np.float32(0.5)) == 0.5
     with pytest.raises(ShipidError, match="speed must be a number, not"):
-        number("speed", value)
+        check_number("speed", value)
 
 
 ANY: Any = object()
 SHIP = shipid.load_vessel("mariner")
 NAMES = ("north", "east", "psi", "u", "v", "r")
 START = {name: np.array([7.0 if name == "u" else 0.0]) for name in NAMES}
-ORDERS = {name: np.zeros(1) for name in dynamics(SHIP).commands}
-STRAIGHT = shipid.standard(SHIP, "zigzag").manoeuvre
-LOG = shipid.perform(SHIP, STRAIGHT, step=1.0, duration=60.0)
+ORDERS = {name: np.zeros(1) for name in vessel_dynamics(SHIP).commands}
+STRAIGHT = shipid.define_standard(SHIP, "zigzag").manoeuvre
+LOG = shipid.perform_manoeuvres(SHIP, STRAIGHT, step=1.0, duration=60.0)
 DATA = shipid.Dataset(LOG[[name for name in LOG if not str(name).startswith("actual.")]], {})
 WINDOWS = shipid.cut_windows(DATA, horizon=3, step=1.0)
 PHYSICS = shipid.Physics(SHIP, 3, 1.0)
@@ -123,11 +123,11 @@ def identify(**given: Any) -> Any:
 
 
 def standard(**given: Any) -> Any:
-    return shipid.standard(SHIP, **{"name": "zigzag", **given})
+    return shipid.define_standard(SHIP, **{"name": "zigzag", **given})
 
 
 def performed(**given: Any) -> Any:
-    return shipid.perform(SHIP, **{"manoeuvres": STRAIGHT, "step": 1.0, "duration": 2.0, **given})
+    return shipid.perform_manoeuvres(SHIP, **{"manoeuvres": STRAIGHT, "step": 1.0, "duration": 2.0, **given})
 
 
 def exported(**given: Any) -> Any:
@@ -136,8 +136,8 @@ def exported(**given: Any) -> Any:
 
 CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "rollout": (lambda: shipid.rollout(ANY, {}, {}, step=1.0, num_steps=1), "vessel must be a Vessel, as of"),
-    "members": (lambda: shipid.members(shipid.Family(name="f"), ANY), "base must be a Vessel, as of"),
-    "simulate": (lambda: shipid.simulate(ANY, ANY), "truth must be a Truth, such as"),
+    "members": (lambda: shipid.draw_members(shipid.Family(name="f"), ANY), "base must be a Vessel, as of"),
+    "simulate": (lambda: shipid.simulate_truth(ANY, ANY), "truth must be a Truth, such as"),
     "cut_windows": (lambda: shipid.cut_windows(ANY, horizon=1), "dataset must be a Dataset, as of"),
     "write_dataset": (lambda: shipid.write_dataset(ANY, "x.parquet"), "dataset must be a Dataset, such as"),
     "check_dataset": (lambda: shipid.check_dataset(ANY), "dataset must be a Dataset, as of"),
@@ -148,10 +148,10 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
         "commands must be a dict, of a name to an array, not object",
     ),
     "Vessel": (lambda: shipid.Vessel({}, "x"), "no document of a vessel: read one with `load_vessel`"),
-    "standard": (lambda: shipid.standard(ANY, "zigzag"), "vessel must be a Vessel, as of"),
+    "standard": (lambda: shipid.define_standard(ANY, "zigzag"), "vessel must be a Vessel, as of"),
     "Physics": (lambda: shipid.Physics(None, 2, 1.0, observer=ANY), "observer must be an Observer, such as"),
-    "draw": (lambda: shipid.draw(ANY, 0, ANY), "family must be a Family, such as"),
-    "numbers": (lambda: shipid.members(shipid.Family(name="f"), ANY, numbers=ANY), "base must be a Vessel"),
+    "draw": (lambda: shipid.draw_variant(ANY, 0, ANY), "family must be a Family, such as"),
+    "numbers": (lambda: shipid.draw_members(shipid.Family(name="f"), ANY, numbers=ANY), "base must be a Vessel"),
     "run_identification": (lambda: shipid.run_identification(ANY, ANY, ANY), "settings must be an Identify, such as"),
     "screen": (lambda: next(shipid.screen(ANY, ANY, [], 1)), "plan must be a Plan, as of"),
     "compare": (lambda: shipid.compare(ANY), "name two folders or more"),
@@ -226,7 +226,7 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
 
 def test_a_table_is_taken_where_names_with_arrays_are() -> None:
     """Before, pandas refused to say whether a table is true."""
-    weather = pd.DataFrame({name: np.zeros(1) for name in dynamics(SHIP).environment})
+    weather = pd.DataFrame({name: np.zeros(1) for name in vessel_dynamics(SHIP).environment})
     pd.testing.assert_frame_equal(performed(environment=weather), performed())
     known = shipid.fit(shipid.Alone(), PHYSICS, WINDOWS, kinds=pd.Series({"M001": "zigzag"}))
     columns = {name: values for name, values in WINDOWS.columns.items() if name != "run"}

@@ -23,14 +23,14 @@ NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
 
 def test_every_leaf_is_got_by_its_path() -> None:
-    for path, value in documents.leaves(NESTED):
-        assert documents.get(NESTED, path) == value
+    for path, value in documents.document_leaves(NESTED):
+        assert documents.value_at_path(NESTED, path) == value
 
 
 @pytest.mark.parametrize(("path", "part"), [("a.x", "x"), ("a.c.2", "2"), ("a.b.c", "c"), ("a.c.x", "x"), ("", "")])
 def test_get_names_what_is_missing(path: str, part: str) -> None:
     with pytest.raises(KeyError, match=f"there is no '{part}'"):
-        documents.get(NESTED, path)
+        documents.value_at_path(NESTED, path)
 
 
 @pytest.mark.parametrize("seed", seeds(5, 40))
@@ -48,13 +48,13 @@ def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
     expected: Any = document
     try:
         for path, value in copy.deepcopy(changes).items():
-            expected = documents.replace(expected, {path: value})
+            expected = documents.replace_values(expected, {path: value})
     except DocumentError as error:
         with pytest.raises(DocumentError, match=re.escape(str(error))):
-            documents.replace(document, changes)
+            documents.replace_values(document, changes)
         return
     before = copy.deepcopy(document)
-    assert documents.replace(document, changes) == expected
+    assert documents.replace_values(document, changes) == expected
     assert document == before
 
 
@@ -70,10 +70,10 @@ def test_entries_of_a_list_are_selected_by_name() -> None:
         ("family.9.members", "family.9.members"),
         ("grid.N_D.0", "grid.N_D.0"),
     ):
-        assert documents.by_name(study, path) == shown
+        assert documents.path_with_names(study, path) == shown
     twice = {"family": [{"name": "a"}, {"name": "a"}]}
-    assert documents.by_name(twice, "family.1.name") == "family.1.name"
-    changed = documents.replace(study, {"family.high.members": 2, 'family."a.b".perturb.0.factor': 3})
+    assert documents.path_with_names(twice, "family.1.name") == "family.1.name"
+    changed = documents.replace_values(study, {"family.high.members": 2, 'family."a.b".perturb.0.factor': 3})
     assert changed["family"][0] == {"name": "high", "members": 2}
     assert changed["family"][1]["perturb"] == [{"factor": 3}]
 
@@ -91,7 +91,7 @@ def test_entries_of_a_list_are_selected_by_name() -> None:
 def test_a_path_that_reaches_nothing_is_refused(path: str, message: str) -> None:
     study = {"family": [{"name": "high", "perturb": []}, {"name": "low"}], "step": 0.5}
     with pytest.raises(DocumentError) as caught:
-        documents.replace(study, {path: 2}, "study.toml")
+        documents.replace_values(study, {path: 2}, "study.toml")
     assert str(caught.value) == f"study.toml: {path}: {message}"
     assert study == {"family": [{"name": "high", "perturb": []}, {"name": "low"}], "step": 0.5}
 
@@ -110,14 +110,16 @@ def test_a_path_that_reaches_nothing_is_refused(path: str, message: str) -> None
 )
 def test_match_takes_names_literally_but_for_the_star(pattern: str, matches: list[str]) -> None:
     paths = ["hull.Y_v", "hull.Y_v|v|", "thruster.port.D_p", "thruster.starboard.D_p"]
-    assert documents.match(pattern, paths) == matches
+    assert documents.match_paths(pattern, paths) == matches
 
 
 def test_digest_does_not_depend_on_the_order_of_keys() -> None:
-    assert documents.digest({"a": 1, "b": {"c": 2.5, "d": 3}}) == documents.digest({"b": {"d": 3, "c": 2.5}, "a": 1})
-    assert documents.digest({"a": 1}) != documents.digest({"a": 2})
-    assert documents.digest({"a": 0.1}) != documents.digest({"a": 0.1 + 1e-17 + 2**-55})
-    assert len(documents.digest({})) == 16
+    assert documents.digest_document({"a": 1, "b": {"c": 2.5, "d": 3}}) == documents.digest_document(
+        {"b": {"d": 3, "c": 2.5}, "a": 1}
+    )
+    assert documents.digest_document({"a": 1}) != documents.digest_document({"a": 2})
+    assert documents.digest_document({"a": 0.1}) != documents.digest_document({"a": 0.1 + 1e-17 + 2**-55})
+    assert len(documents.digest_document({})) == 16
 
 
 def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
@@ -125,12 +127,12 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
         file = tmp_path / "x.toml"
         file.write_bytes(content)
         with pytest.raises(DocumentError, match=remedy) as caught:
-            documents.read(file)
+            documents.read_document(file)
         assert caught.value.file == str(file)
         assert "\n" not in str(caught.value)
     for missing in (tmp_path / "gone.toml", tmp_path):
         with pytest.raises(DocumentError, match="cannot be read"):
-            documents.read(missing)
+            documents.read_document(missing)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +148,7 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
 )
 def test_a_line_that_is_no_toml_is_shown(line: str, remedy: str) -> None:
     with pytest.raises(DocumentError, match=remedy):
-        documents.loads(f"a = 1\n{line}\nb = 2\n")
+        documents.parse_toml(f"a = 1\n{line}\nb = 2\n")
 
 
 def test_find_prefers_the_folder_of_the_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,15 +156,15 @@ def test_find_prefers_the_folder_of_the_document(tmp_path: Path, monkeypatch: py
     (tmp_path / "here" / "x.toml").write_text("a = 1")
     (tmp_path / "x.toml").write_text("a = 2")
     monkeypatch.chdir(tmp_path)
-    assert documents.read(documents.find("./x.toml", "models", tmp_path / "here")) == {"a": 1}
-    assert documents.read(documents.find("./x.toml", "models")) == {"a": 2}
-    assert documents.find("gunnerus-28.9", "models").name == "gunnerus-28.9.toml"
+    assert documents.read_document(documents.find_document("./x.toml", "models", tmp_path / "here")) == {"a": 1}
+    assert documents.read_document(documents.find_document("./x.toml", "models")) == {"a": 2}
+    assert documents.find_document("gunnerus-28.9", "models").name == "gunnerus-28.9.toml"
 
 
 @pytest.mark.parametrize("kind", ["models", "studies"])
 def test_find_corrects_names(kind: str) -> None:
     with pytest.raises(DocumentError, match="a path to another file needs a slash"):
-        documents.find("nothing-like-it", kind)
+        documents.find_document("nothing-like-it", kind)
 
 
 class Inner(BaseModel):
@@ -192,7 +194,7 @@ class Outer(BaseModel):
 )
 def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, message: str) -> None:
     with pytest.raises(DocumentError) as caught:
-        documents.parse(Outer, data, "x.toml", "top")
+        documents.parse_model(Outer, data, "x.toml", "top")
     assert caught.value.path == path
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -219,37 +221,39 @@ class Numbers(BaseModel):
 )
 def test_truth_values_and_texts_are_no_numbers(data: Any, path: str, value: str) -> None:
     with pytest.raises(DocumentError) as caught:
-        documents.parse(Numbers, data, "x.toml", "top")
+        documents.parse_model(Numbers, data, "x.toml", "top")
     assert (caught.value.path, caught.value.message) == (path, f"{value}: must be a number")
-    assert documents.parse(Numbers, {"count": 1, "part": 2, "on": True}, "x.toml").on is True
+    assert documents.parse_model(Numbers, {"count": 1, "part": 2, "on": True}, "x.toml").on is True
 
 
 READ = {"studies": read_plan, "models": load_vessel, "studies/mappings": lambda file: read_mapping(Path(file))}
 
 
-@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in READ for name in documents.bundled(kind)])
+@pytest.mark.parametrize(
+    ("kind", "name"), [(kind, name) for kind in READ for name in documents.bundled_documents(kind)]
+)
 def test_no_number_of_a_document_may_be_a_truth_value_or_a_text(kind: str, name: str, tmp_path: Path) -> None:
-    source, file = documents.bundled(kind)[name], tmp_path / "changed.toml"
-    document = documents.read(source)
+    source, file = documents.bundled_documents(kind)[name], tmp_path / "changed.toml"
+    document = documents.read_document(source)
     if (source.parent / "tables").is_dir():
         shutil.copytree(source.parent / "tables", tmp_path / "tables")
     file.write_text(tomlkit.dumps(document), encoding="utf-8")
     READ[kind](str(file))
-    places = [path for path, _ in documents.leaves(document)]
-    numbers = [path for path, value in documents.leaves(document) if type(value) in (int, float)]
+    places = [path for path, _ in documents.document_leaves(document)]
+    numbers = [path for path, value in documents.document_leaves(document) if type(value) in (int, float)]
     for path in random.Random(name).sample(numbers, min(len(numbers), 6)):
         for value in (True, "5"):
-            changed = documents.replace(document, {path: value})
-            if [place for place, _ in documents.leaves(changed)] == places:  # a key with dots is not one path
+            changed = documents.replace_values(document, {path: value})
+            if [place for place, _ in documents.document_leaves(changed)] == places:  # a key with dots is not one path
                 file.write_text(tomlkit.dumps(changed), encoding="utf-8")
                 with pytest.raises(ShipidError):
                     READ[kind](str(file))
 
 
 def test_a_quoted_key_may_hold_dots() -> None:
-    document = documents.replace({"sensors": {}}, {'sensors."port.n".noise': 0.1})
+    document = documents.replace_values({"sensors": {}}, {'sensors."port.n".noise': 0.1})
     assert document == {"sensors": {"port.n": {"noise": 0.1}}}
-    assert documents.get(document, 'sensors."port.n".noise') == 0.1
+    assert documents.value_at_path(document, 'sensors."port.n".noise') == 0.1
 
 
 @pytest.mark.parametrize(
@@ -272,7 +276,7 @@ def test_values_that_no_document_holds(text: str, remedy: str, tmp_path: Path) -
     file = tmp_path / "a.toml"
     file.write_text(text)
     with pytest.raises(DocumentError) as caught:
-        documents.read(file)
+        documents.read_document(file)
     line = str(caught.value)
     assert remedy.replace("\\\\", "\\") in line
     assert line.isprintable()
@@ -289,12 +293,12 @@ def test_objects_that_toml_has_not(value: Any) -> None:
 @pytest.mark.parametrize("value", ["inf", "-0.0", "1e24", "1e-100", "999999999999999", '"a\\n\\tb"', "[[[1]]]", "true"])
 def test_values_that_documents_hold(value: str, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(f"a = {value}")
-    assert "a" in documents.read(tmp_path / "a.toml")
+    assert "a" in documents.read_document(tmp_path / "a.toml")
 
 
 def test_what_has_no_end_is_no_document() -> None:
     with pytest.raises(DocumentError, match="a device or a pipe"):
-        documents.read("/dev/zero")
+        documents.read_document("/dev/zero")
 
 
 def test_names_are_as_short_as_is_clear() -> None:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.engine.gradient import rollout_gradient, squared_distance
-from shipid.engine.native import compiler
+from shipid.engine.gradient import rollout_gradient, squared_distance_loss
+from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.export.c import Precision
 from shipid.export.c_vessel import vessel_files
@@ -23,7 +23,7 @@ ALL = pytest.mark.parametrize(("seed", "dof"), SHIPS)
 NEAR = {"native": 1e-9, "torch": 1e-9, "single": 2e-3}  # of the greatest value of each channel
 SAMPLES, STEPS = 9, 8
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
 
 def step_of(vessel: Vessel) -> float:
@@ -66,7 +66,7 @@ def test_gradients_agree_and_are_finite(seed: int, dof: int) -> None:
     vessel = drawn_ship(seed, dof)
     given = extreme_inputs(vessel, SAMPLES)
     names = [str(name) for name in np.random.default_rng(seed).choice(list(vessel.parameters), 8, replace=False)]
-    loss = squared_distance(np.zeros((STEPS, SAMPLES, 2)))
+    loss = squared_distance_loss(np.zeros((STEPS, SAMPLES, 2)))
     native, torch = (
         rollout_gradient(
             vessel, **given, loss=loss, step=step_of(vessel), num_steps=STEPS, names=names, keep=("u", "r"),

@@ -5,9 +5,18 @@ import pickle
 
 import pytest
 
-from shipid.errors import DataError, Diverges, DocumentError, ResultError, ShipidError, choices, is_utf_8, visible
+from shipid.errors import (
+    DataError,
+    DivergenceError,
+    DocumentError,
+    ResultError,
+    ShipidError,
+    escape_unprintable,
+    is_utf_8,
+    suggest_name,
+)
 
-ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, Diverges, DataError, ResultError])
+ERRORS = pytest.mark.parametrize("error", [ShipidError, DocumentError, DivergenceError, DataError, ResultError])
 
 
 @ERRORS
@@ -27,22 +36,22 @@ def test_errors_come_home_from_workers(error: type[ShipidError]) -> None:
 
 
 def test_choices_suggest_what_is_close() -> None:
-    assert choices("derivativs", ["derivatives", "crossflow"]) == "did you mean 'derivatives'?"
-    assert choices("KIND", ["behind", "kind"]) == "did you mean 'kind'?"
-    assert choices("X_h", ["X_hh", "x_H"]) == "did you mean 'x_H'?"
+    assert suggest_name("derivativs", ["derivatives", "crossflow"]) == "did you mean 'derivatives'?"
+    assert suggest_name("KIND", ["behind", "kind"]) == "did you mean 'kind'?"
+    assert suggest_name("X_h", ["X_hh", "x_H"]) == "did you mean 'x_H'?"
 
 
 def test_choices_list_what_is_valid() -> None:
-    assert choices("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
-    assert choices("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
-    assert choices("zzz", []) == "nothing is defined there"
-    assert choices(None, ["alpha"]) == choices([], ["alpha"]) == "valid: alpha"
+    assert suggest_name("zzz", ["beta", "alpha"]) == "valid: alpha, beta"
+    assert suggest_name("zzz", (f"n{i:02}" for i in range(20))).endswith("n11, ...")
+    assert suggest_name("zzz", []) == "nothing is defined there"
+    assert suggest_name(None, ["alpha"]) == suggest_name([], ["alpha"]) == "valid: alpha"
 
 
 @pytest.mark.parametrize("name", ["\x1b[2J\x1b[31m", "\u202eabc", "a\rb", "\x00", "\x07"])
 def test_control_characters_are_made_visible(name: str) -> None:
-    assert visible(f"ship {name}\nsea").replace("\n", "").isprintable()
-    assert visible("R/V Gunnerus, 28.9 m ä 船\n") == "R/V Gunnerus, 28.9 m ä 船\n"
+    assert escape_unprintable(f"ship {name}\nsea").replace("\n", "").isprintable()
+    assert escape_unprintable("R/V Gunnerus, 28.9 m ä 船\n") == "R/V Gunnerus, 28.9 m ä 船\n"
 
 
 def test_names_with_bytes_that_are_not_utf_8_are_told_from_others() -> None:

@@ -80,7 +80,7 @@ def test_who_may_read_and_write_a_file_may_do_so_with_the_one_that_replaces_it(
 def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path: Path) -> None:
     file = tmp_path / "out.txt"
     file.write_text("old")
-    with files.whole(file) as temporary:
+    with files.replace_whole(file) as temporary:
         temporary.write_text("new")
         assert file.read_text() == "old"
         assert temporary.name == file.name
@@ -94,7 +94,7 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     """Killed at any call that changes the folder."""
     old, new = ({tmp_path / name: f"{age} {name}" for name in ("a.c", "a.h")} for age in ("old", "new"))
     former = {tmp_path / "a-band.c": "old a-band.c"}
-    files.write_together(old | former)
+    files.write_set(old | former)
     calls = iter(range(100))
 
     def killed(call: Callable[..., Any]) -> Callable[..., Any]:
@@ -108,7 +108,7 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     for place, name in ((Path, "write_text"), (Path, "unlink"), (os, "replace"), (files, "sync")):
         monkeypatch.setattr(place, name, killed(getattr(place, name)))
     try:
-        files.write_together(new, former)
+        files.write_set(new, former)
         done = True
     except KeyboardInterrupt:
         done = False
@@ -187,7 +187,7 @@ def killed_while_it_writes(file: Path) -> int:
     """The process, which nobody has waited for."""
     process = os.fork()
     if not process:
-        with files.whole(file) as temporary:
+        with files.replace_whole(file) as temporary:
             temporary.write_text("half")
             os._exit(0)
     os.waitid(os.P_PID, process, os.WEXITED | os.WNOWAIT)
@@ -195,11 +195,11 @@ def killed_while_it_writes(file: Path) -> int:
 
 
 def test_what_a_killed_process_leaves_is_swept(tmp_path: Path) -> None:
-    with files.whole(tmp_path / "b.txt") as mine:
+    with files.replace_whole(tmp_path / "b.txt") as mine:
         mine.write_text("whole")
         os.waitpid(killed_while_it_writes(tmp_path / "a.txt"), 0)
         assert len(list(tmp_path.iterdir())) == 2
-        files.sweep(tmp_path)
+        files.sweep_temporary(tmp_path)
         assert list(tmp_path.iterdir()) == [mine.parent], "only what is at work stays"
     assert [file.name for file in tmp_path.iterdir()] == ["b.txt"]
 
@@ -217,7 +217,7 @@ def test_folder_and_file_are_synced_before_and_after_the_change(
 ) -> None:
     calls: list[str] = []
     replace = os.replace
-    monkeypatch.setattr(files, "sync", lambda place: calls.append(f"sync {Path(place).name}"))
+    monkeypatch.setattr(files, "sync_to_disk", lambda place: calls.append(f"sync {Path(place).name}"))
     monkeypatch.setattr(files.os, "replace", lambda one, other: (calls.append("replace"), replace(one, other)))
     files.write_text(tmp_path / "new" / "a.txt", "x")
     assert calls == [f"sync {tmp_path.name}", "sync a.txt", "replace", "sync new"]
@@ -253,4 +253,4 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     [("results/a", "results/a"), ("a b", "'a b'"), ("-x", "./-x"), ("-x y", "'./-x y'"), ("/a/-x", "/a/-x")],
 )
 def test_a_path_in_a_command_can_be_typed_as_it_is(path: str, typed: str) -> None:
-    assert files.as_argument(Path(path)) == typed
+    assert files.quote_argument(Path(path)) == typed

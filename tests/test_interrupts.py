@@ -10,7 +10,7 @@ from contextlib import nullcontext, suppress
 import pytest
 
 from shipid import interrupts
-from shipid.interrupts import recognised, uninterrupted
+from shipid.interrupts import hold_interrupts, raise_interrupts
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +29,7 @@ def test_it_is_raised_at_the_end_of_the_block() -> None:
     steps: list[str] = []
 
     def work() -> None:
-        with uninterrupted() as held:
+        with hold_interrupts() as held:
             press()
             assert held == [signal.SIGINT]
             steps.append("end of the block")
@@ -44,8 +44,8 @@ def test_the_outermost_block_holds() -> None:
     reached: list[int] = []
 
     def work() -> None:
-        with uninterrupted() as outer:
-            with uninterrupted() as inner:
+        with hold_interrupts() as outer:
+            with hold_interrupts() as inner:
                 press()
                 assert inner is outer
             reached.append(len(outer))
@@ -57,7 +57,7 @@ def test_the_outermost_block_holds() -> None:
 
 def test_it_is_raised_where_the_block_failed() -> None:
     def work() -> None:
-        with uninterrupted():
+        with hold_interrupts():
             press()
             raise ValueError("wrong arguments")
 
@@ -70,7 +70,7 @@ def test_another_thread_changes_no_handler(handler: object) -> None:
     seen: list[object] = []
 
     def work() -> None:
-        with uninterrupted() as held:
+        with hold_interrupts() as held:
             seen.extend([signal.getsignal(signal.SIGINT), list(held)])
 
     thread = threading.Thread(target=work)
@@ -81,7 +81,7 @@ def test_another_thread_changes_no_handler(handler: object) -> None:
 
 def test_an_error_behind_ctrl_c_is_ctrl_c() -> None:
     def work(press: Callable[[], object]) -> None:
-        with recognised():
+        with raise_interrupts():
             with suppress(KeyboardInterrupt):
                 press()
             raise SystemError("returned a result with an exception set")
@@ -96,7 +96,7 @@ def test_where_it_is_ignored_it_stays_so() -> None:
     """A worker, which ignores Ctrl-C, printed a traceback where it was pressed during a call into compiled code."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with uninterrupted() as held:
+        with hold_interrupts() as held:
             press()
         assert held == []
     finally:
@@ -111,9 +111,9 @@ def test_a_double_press_breaks_off_no_end(inside: bool, monkeypatch: pytest.Monk
     steps: list[str] = []
 
     def work() -> None:
-        with recognised():
+        with raise_interrupts():
             try:
-                with uninterrupted() if inside else nullcontext():
+                with hold_interrupts() if inside else nullcontext():
                     press()
             finally:
                 press()

@@ -16,15 +16,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipid import document as documents
-from shipid.engine.lowering import lower
+from shipid.engine.lowering import lower_function
 from shipid.physics import GIVEN, MOTION, TERMS
 from shipid.physics.grammar import Grammar
-from shipid.physics.signals import SIGNALS, named
+from shipid.physics.signals import SIGNALS, rows_of_role
 from shipid.simulation.sea import wave_loads
-from shipid.vessel.bindings import bindings
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
-from shipid.vessel.perturb import uniform
-from shipid.vessel.schema import SHARED, parameters, signals, structural, term_blocks, term_parameters
+from shipid.vessel.bindings import bind_document
+from shipid.vessel.load import Vessel, check_document, load_vessel
+from shipid.vessel.perturb import uniform_draw
+from shipid.vessel.schema import (
+    SHARED,
+    function_parameters,
+    function_signals,
+    structural_keys,
+    term_blocks,
+    term_parameters,
+)
 from tests.drawn import seeds
 
 ALL = pytest.mark.parametrize("key", list(TERMS))
@@ -75,19 +82,19 @@ class Example:
 @cache
 def example(key: str) -> Example:
     vessel, path = _with_term(key)
-    block = documents.get(vessel.document, path)
-    binding = bindings(vessel.document)[path]
+    block = documents.value_at_path(vessel.document, path)
+    binding = bind_document(vessel.document)[path]
     paths = tuple(dict.fromkeys(p for target in binding.values() for p in _paths(target)))
     symbols = ca.SX.sym("parameters", len(paths))
     value_of = dict(zip(paths, ca.vertsplit(symbols), strict=True))
     term = TERMS[key]
     columns = _columns(key, block)
-    names = tuple(name for name in signals(term.function) if name not in columns)
+    names = tuple(name for name in function_signals(term.function) if name not in columns)
     sizes = {**dict.fromkeys(VECTORS, 6), "wash": 3, "state": len(term.states(block)) if term.states else 0}
     inputs = {name: ca.SX.sym(name, sizes.get(name, 1)) for name in names}
-    mine = {parameter.name for parameter in parameters(term.function)}
+    mine = {parameter.name for parameter in function_parameters(term.function)}
     others = [*term.gives.values(), *([term.rates] if term.rates else [])]
-    elsewhere = {parameter.name for function in others for parameter in parameters(function)} - mine
+    elsewhere = {parameter.name for function in others for parameter in function_parameters(function)} - mine
     keywords = {keyword: _symbols(target, value_of) for keyword, target in binding.items() if keyword not in elsewhere}
     rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] or [{}]
     wrench = sum((term.function(**inputs, **row, **keywords) for row in rows), ca.SX(6, 1))
@@ -101,7 +108,7 @@ def example(key: str) -> Example:
 def _columns(key: str, block: Mapping[str, Any]) -> dict[str, Any]:
     """Component argument -> its values: those of the term, or two wave components as drawn for one ship."""
     term = TERMS[key]
-    keys = {name: block[name] for name in structural(term)}
+    keys = {name: block[name] for name in structural_keys(term)}
     if term.components:
         return dict(term.components(**keys))
     if not term.drawn:
@@ -118,43 +125,43 @@ def _columns(key: str, block: Mapping[str, Any]) -> dict[str, Any]:
 def _all_on(name: str) -> Vessel:
     """A bundled vessel with every term switched on."""
     document = load_vessel(name).document
-    off = [path for path, value in documents.leaves(document) if path.endswith(".off") and value]
-    return check_vessel(documents.replace(document, dict.fromkeys(off, False)), name)
+    off = [path for path, value in documents.document_leaves(document) if path.endswith(".off") and value]
+    return check_document(documents.replace_values(document, dict.fromkeys(off, False)), name)
 
 
 def _with_term(key: str) -> tuple[Vessel, str]:
     """A vessel that has this term, switched on, and where; made up if no bundled vessel has one."""
-    for name in sorted(documents.bundled("models"), key=lambda name: name != EXAMPLES.get(key)):
+    for name in sorted(documents.bundled_documents("models"), key=lambda name: name != EXAMPLES.get(key)):
         vessel = _all_on(name)
         for path, term_key, _ in term_blocks(vessel.document):
             if term_key == key:
                 return vessel, path
     group, kind = key.split(".")
     path = {"hull": key, "wind": "wind"}.get(group, f"{group}.{kind}")
-    base = load_vessel(next(iter(documents.bundled("models"))))
+    base = load_vessel(next(iter(documents.bundled_documents("models"))))
     lacking = {
-        f"{SHARED[name]}.{name}": 0.5 + uniform(key, name)
+        f"{SHARED[name]}.{name}": 0.5 + uniform_draw(key, name)
         for name in (parameter.name for parameter in term_parameters(TERMS[key]))
         if name in SHARED and name not in base.document[SHARED[name]]
     }
-    return check_vessel(documents.replace(base.document, {path: _made_up(key), **lacking}), "made up"), path
+    return check_document(documents.replace_values(base.document, {path: _made_up(key), **lacking}), "made up"), path
 
 
 def _made_up(key: str) -> dict[str, Any]:
     group, kind = key.split(".")
     block: dict[str, Any] = {} if group == "hull" else {"kind": kind}
-    block |= dict.fromkeys(structural(TERMS[key]), 5)
+    block |= dict.fromkeys(structural_keys(TERMS[key]), 5)
     candidates = ["X_u|u|", "Y_v", "Y_v|v|", "N_r", "N_rrr", "X_udot", "Y_vdot", "1", "J", "yy"]
-    for parameter in parameters(TERMS[key].function):
+    for parameter in function_parameters(TERMS[key].function):
         name = parameter.name
         if isinstance(parameter.unit, Grammar):
-            accepted = {c: -0.5 - uniform(key, name, c) for c in candidates if _accepts(parameter.unit, c)}
+            accepted = {c: -0.5 - uniform_draw(key, name, c) for c in candidates if _accepts(parameter.unit, c)}
             block |= accepted if parameter.kind == "open" else {name: accepted}
         elif parameter.kind == "list":
             block[name] = [0.0, 45.0, 90.0, 135.0, 180.0] if name.endswith("_deg") else [0.0, 0.7, 0.9, 0.4, 0.0]
             block[name] = WHOLE_CIRCLE.get(name, block[name])
         elif name not in SHARED:
-            block[name] = (-1 if name == "x_aft" else 1) * (0.5 + uniform(key, name))
+            block[name] = (-1 if name == "x_aft" else 1) * (0.5 + uniform_draw(key, name))
     return block
 
 
@@ -229,7 +236,7 @@ def jacobian_at(key: str, drawn: Mapping[str, Any]) -> np.ndarray:
 
 
 def test_the_signals_of_every_term_are_declared() -> None:
-    declared = {*MOTION, *named("command"), *named("environment"), *GIVEN}
+    declared = {*MOTION, *rows_of_role("command"), *rows_of_role("environment"), *GIVEN}
     assert {name for key in TERMS for name in example(key).signals} <= declared
     assert declared <= {*VECTORS, *RANGES, "state", "wash"}
 
@@ -238,11 +245,11 @@ def test_the_signals_of_every_term_are_declared() -> None:
 def test_what_a_term_gives_takes_signals_of_the_term(key: str) -> None:
     term = TERMS[key]
     for name, function in term.gives.items():
-        assert name in {*GIVEN, *named("output")}
-        assert set(signals(function)) <= set(signals(term.function))
+        assert name in {*GIVEN, *rows_of_role("output")}
+        assert set(function_signals(function)) <= set(function_signals(term.function))
 
 
-OUTPUTS = [(key, name) for key, term in TERMS.items() for name in term.gives if name in named("output")]
+OUTPUTS = [(key, name) for key, term in TERMS.items() for name in term.gives if name in rows_of_role("output")]
 
 
 def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False) -> float | None:
@@ -250,8 +257,8 @@ def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False
     vessel, path = _with_term(key)
     numbers = {p: ca.SX(vessel.parameters[p]) for p in vessel.parameters}
     function = TERMS[key].gives[name]
-    others = {p.name for p in term_parameters(TERMS[key])} - {p.name for p in parameters(function)}
-    keywords = {k: _symbols(v, numbers) for k, v in bindings(vessel.document)[path].items() if k not in others}
+    others = {p.name for p in term_parameters(TERMS[key])} - {p.name for p in function_parameters(function)}
+    keywords = {k: _symbols(v, numbers) for k, v in bind_document(vessel.document)[path].items() if k not in others}
     if mirrored:
         plus = {k: v for k, v in keywords.items() if k.endswith(("_plus", "_minus"))}
         keywords |= {
@@ -261,7 +268,7 @@ def output(key: str, name: str, drawn: Mapping[str, Any], mirrored: bool = False
             if k.endswith(end)
         }
         keywords |= {k: -keywords[k] for k in ("y",) if k in keywords}
-    value = function(*(ca.SX(drawn[signal]) for signal in signals(function)), **keywords)
+    value = function(*(ca.SX(drawn[signal]) for signal in function_signals(function)), **keywords)
     return None if value is None else float(ca.evalf(value))
 
 
@@ -430,7 +437,7 @@ def test_lowered_equals_casadi(key: str) -> None:
     """Values to rounding, and PyTorch's gradient against CasADi's, for a batch with rest and corners in it."""
     case = example(key)
     batch = [rest(case), *(random_signals(case, seed) for seed in range(20))]
-    lowered = lower(case.function)
+    lowered = lower_function(case.function)
     signal_tensors = [
         torch.tensor(np.stack([np.atleast_1d(drawn[name]) for drawn in batch], axis=-1)).requires_grad_()
         for name in case.signals

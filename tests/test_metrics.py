@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import spearmanr
 
 from shipid import metrics
-from shipid.metrics import BINS, tally, tally_quantile
+from shipid.metrics import BINS, tally_errors, tally_quantile
 
 
 @pytest.fixture
@@ -19,10 +19,10 @@ def test_lengths_are_those_of_hypot_in_every_layout_and_size() -> None:
     plain[0, 0], plain[0, 1], plain[0, 2] = (np.nan, 1.0), (np.inf, np.nan), (0.0, 0.0)
     expected = np.hypot(plain[..., 0], plain[..., 1])
     for vectors in (plain, np.asfortranarray(plain), plain.repeat(2, axis=1)[:, ::2]):
-        np.testing.assert_allclose(metrics.lengths(vectors), expected, rtol=4 * np.finfo(float).eps)
-        np.testing.assert_array_equal(metrics.lengths(vectors), metrics.lengths(plain))
+        np.testing.assert_allclose(metrics.vector_lengths(vectors), expected, rtol=4 * np.finfo(float).eps)
+        np.testing.assert_array_equal(metrics.vector_lengths(vectors), metrics.vector_lengths(plain))
     short = np.float32([[3.0, 4.0]])
-    assert metrics.lengths(short).tolist() == [5.0]
+    assert metrics.vector_lengths(short).tolist() == [5.0]
 
 
 def test_position_error_by_hand():
@@ -32,7 +32,7 @@ def test_position_error_by_hand():
 
 def test_summary_by_hand():
     error = np.arange(11.0).reshape(1, 11)
-    assert metrics.summary(error) == {
+    assert metrics.summarise_errors(error) == {
         "mean": pytest.approx(5.0),
         "p90": pytest.approx(9.0),
         "rms": pytest.approx(35.0**0.5),  # (0 + 1 + ... + 100) / 11 = 385 / 11
@@ -45,7 +45,7 @@ def test_a_diverged_window_is_reported_and_not_averaged_away():
     error = np.ones((3, 8))
     error[2, 5] = np.inf
     error[1:, 6] = np.nan
-    result = metrics.summary(error)
+    result = metrics.summarise_errors(error)
     assert result["status"] == "diverged"
     assert result["failed_share"] == 2 / 8
     assert np.isnan([result["mean"], result["p90"], result["rms"]]).all()
@@ -53,11 +53,11 @@ def test_a_diverged_window_is_reported_and_not_averaged_away():
 
 def test_horizon_and_time_are_the_two_margins(paths):
     error = metrics.position_error(*paths)
-    horizon = metrics.over_horizon(error)
+    horizon = metrics.error_of_steps(error)
     assert horizon["mean"].shape == horizon["p90"].shape == (30,)
-    assert metrics.over_time(error).shape == (40,)
-    assert horizon["mean"].mean() == pytest.approx(metrics.summary(error)["mean"])
-    assert metrics.over_time(error).mean() == pytest.approx(metrics.summary(error)["mean"])
+    assert metrics.error_of_windows(error).shape == (40,)
+    assert horizon["mean"].mean() == pytest.approx(metrics.summarise_errors(error)["mean"])
+    assert metrics.error_of_windows(error).mean() == pytest.approx(metrics.summarise_errors(error)["mean"])
     by_axis = metrics.over_horizon_by_axis(*paths)
     assert (by_axis["along"].mean(), by_axis["across"].mean()) == pytest.approx(metrics.error_by_axis(*paths))
     assert horizon["p90"][4] == pytest.approx(np.sort(error[4])[35] * 0.9 + np.sort(error[4])[36] * 0.1)
@@ -66,21 +66,21 @@ def test_horizon_and_time_are_the_two_margins(paths):
 def test_roughness_by_hand():
     """A zigzag of 1 m has second differences of 2 m; a circle of radius R has (speed x step)^2 / R."""
     zigzag = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [3.0, 1.0]])[:, None, :]
-    assert metrics.roughness(zigzag) == pytest.approx(2.0)
+    assert metrics.path_roughness(zigzag) == pytest.approx(2.0)
     angle = 0.01 * np.arange(30)
     circle = 50.0 * np.stack([np.sin(angle), 1 - np.cos(angle)], axis=-1)[:, None, :]
-    assert metrics.roughness(circle) == pytest.approx(0.5**2 / 50.0, rel=1e-4)
-    assert metrics.roughness(np.concatenate([zigzag, np.zeros_like(zigzag)], axis=1)) == pytest.approx(1.0)
-    assert metrics.roughness(zigzag[:3]) == pytest.approx(2.0)
+    assert metrics.path_roughness(circle) == pytest.approx(0.5**2 / 50.0, rel=1e-4)
+    assert metrics.path_roughness(np.concatenate([zigzag, np.zeros_like(zigzag)], axis=1)) == pytest.approx(1.0)
+    assert metrics.path_roughness(zigzag[:3]) == pytest.approx(2.0)
     with pytest.raises(ValueError, match="3 steps or more"):
-        metrics.roughness(zigzag[:2])
+        metrics.path_roughness(zigzag[:2])
 
 
 def test_a_long_run_counts_as_much_as_a_short_one():
     held = np.array([True, False, True, True, False])
     run = np.array(["b", "b", "a", "b", "b"])
-    np.testing.assert_array_equal(metrics.shares_by_run(held, run), [1.0, 0.5])
-    assert metrics.share_of(held, run) == 0.75
+    np.testing.assert_array_equal(metrics.coverage_by_run(held, run), [1.0, 0.5])
+    assert metrics.coverage_share(held, run) == 0.75
 
 
 def test_rank_correlation_knows_order_alone():
@@ -99,8 +99,8 @@ def test_a_tally_has_every_error_in_its_bin() -> None:
     edges = np.array([2.0**-10, 2.0**-10 * (1 + 1 / 512), 1.0, 3.0, 2.0**20])
     places = [0, 1, 10 * 512, 11 * 512 + 256, BINS - 1]
     for edge, place in zip(edges, places, strict=True):
-        assert tally(np.array([edge])).nonzero()[0] == [place]
-    ends = tally(np.array([0.0, np.nan, 1e-9, np.inf, 1e12]))
+        assert tally_errors(np.array([edge])).nonzero()[0] == [place]
+    ends = tally_errors(np.array([0.0, np.nan, 1e-9, np.inf, 1e12]))
     assert (ends[0], ends[-1], ends.sum()) == (3, 2, 5)
 
 
@@ -110,7 +110,7 @@ def test_quantiles_of_a_tally(share: float, count: int) -> None:
     """Within the width of a bin of the quantile of the errors themselves, as `summary` takes it."""
     rng = np.random.default_rng(count)
     errors = rng.gamma(2.0, 3.0, (3, count))
-    quantiles = tally_quantile(np.array([tally(one) for one in errors]), share)
+    quantiles = tally_quantile(np.array([tally_errors(one) for one in errors]), share)
     low, high = (np.quantile(errors, share, axis=1, method=end) for end in ("lower", "higher"))
     assert (quantiles >= low * (1 - 1 / 512)).all()
     assert (quantiles <= high * (1 + 1 / 512)).all()

@@ -20,7 +20,7 @@ from shipid.data.causal import causal_columns, last_known
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.engine import samples
-from shipid.engine.native import compiler
+from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
 from shipid.hybrid.alone import Unchanged
@@ -49,7 +49,7 @@ from shipid.observer import (
 )
 from shipid.predictor import Predictor
 from shipid.study.prepare import at_instants, window_memory
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks.observer import World, errors, physics, world
 from tests.conftest import structure
@@ -69,7 +69,7 @@ def calm() -> World:
 
 def test_moving_water_gives_the_equations_of_the_current_block() -> None:
     vessel = load_vessel("gunnerus-28.9").with_values({"current.kind": "uniform"})
-    model, rng = dynamics(vessel), np.random.default_rng(1)
+    model, rng = vessel_dynamics(vessel), np.random.default_rng(1)
     low, orders = SX.sym("low", LOW), SX.sym("orders", len(model.commands))
     weather, values = SX.sym("weather", len(model.environment)), SX(list(vessel.parameters.values()))
     ours = ca.Function("f", [low, orders, weather], [_rates(model, low, SX(0, 1), orders, weather, values)])
@@ -86,7 +86,7 @@ def test_moving_water_gives_the_equations_of_the_current_block() -> None:
 
 
 def test_one_step_is_finite_and_leaves_a_covariance(bundled_vessel: Vessel) -> None:
-    model = dynamics(bundled_vessel)
+    model = vessel_dynamics(bundled_vessel)
     if model.num_dof != 3:
         with pytest.raises(DocumentError, match="observer takes 3"):
             bank(bundled_vessel)
@@ -197,10 +197,10 @@ def test_what_is_known_badly_counts_little() -> None:
 def test_rows_far_apart_make_no_force_of_an_order() -> None:
     """Mariner, rows every 8 s, new orders every 160 s; the truth is without noise, and no force is in it."""
     vessel, step, rows = load_vessel("mariner"), 8.0, 160
-    rng, (shaft, helm) = np.random.default_rng(4), dynamics(vessel).commands
+    rng, (shaft, helm) = np.random.default_rng(4), vessel_dynamics(vessel).commands
     orders = {shaft: rng.uniform(1.1, 1.4, rows // 20), helm: rng.uniform(-0.4, 0.4, rows // 20)}
     orders = {name: np.repeat(values, 20) for name, values in orders.items()}
-    begun = {name: np.zeros(1) for name in dynamics(vessel).state} | {"u": np.full(1, 6.0)}
+    begun = {name: np.zeros(1) for name in vessel_dynamics(vessel).state} | {"u": np.full(1, 6.0)}
     fine = {name: np.repeat(values, 20)[:, None] for name, values in orders.items()}
     path = rollout(vessel, begun, fine, {}, step=step / 20, num_steps=20 * rows, every=20, method="rk4")
     log = pd.DataFrame({name: path[name][:rows, 0, 0] for name in MEASURED} | orders)
@@ -265,7 +265,7 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     tau = tau_extra(filters, columns, 30, 1.0)
     assert tau.shape == (30, 1, 3)
     assert tau[20, 0, 0] / tau[0, 0, 0] == pytest.approx(np.exp(-20.0 / filters.fade))
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     inputs = [np.zeros(6), [], np.zeros(len(model.commands)), np.zeros(len(model.environment))]
     inputs.append(list(vessel.parameters.values()))
     gained = np.array(model.rates(*inputs, tau[0, 0])) - np.array(model.rates(*inputs, np.zeros(3)))
@@ -277,7 +277,7 @@ def test_moving_water_carries_the_path_and_the_wind_along() -> None:
     """Galilei: ship, wind and water faster by one velocity make a path that goes with it, under the same force."""
     vessel, rng, count, horizon, step = load_vessel("gunnerus-28.9"), np.random.default_rng(5), 4, 20, 0.5
     water = np.array([[0.5], [-0.8]])
-    columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED, *dynamics(vessel).commands)}
+    columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED, *vessel_dynamics(vessel).commands)}
     columns |= {"u": rng.uniform(2, 4, count), "psi": rng.uniform(-3, 3, count), "r": rng.uniform(-0.05, 0.05, count)}
     wind = rng.uniform(-6, 6, (2, count))
     force = {f"observer.{name}": rng.uniform(-1e-3, 1e-3, count) for name in "XYN"}
@@ -305,7 +305,7 @@ def test_a_path_starts_where_it_is_compared(path: Literal["position", "velocity"
     motion = {
         name: rng.uniform(low, low + 0.05, count) for name, low in zip(MEASURED, (-9, 4, 1, 3, 0, 0), strict=True)
     }
-    columns = motion | {name: rng.uniform(0.2, 0.5, count) for name in dynamics(vessel).commands}
+    columns = motion | {name: rng.uniform(0.2, 0.5, count) for name in vessel_dynamics(vessel).commands}
     columns |= {"V_w": np.full(count, 5.0), "beta_w": rng.uniform(0, 6, count)}
     seen = {f"observer.{name}": motion.get(name, 0.0) + rng.normal(0, 1e-4, count) for name in COLUMNS}
     seen["observer.north"] = seen["observer.north"] + 2.0
@@ -415,7 +415,7 @@ def test_a_ship_adrift_is_observed_too() -> None:
     vessel, log = load_vessel("gunnerus-28.9"), weaving("ab")
     off = {f"thruster.{name}.off": True for name in vessel.document["thruster"]}
     adrift = vessel.with_values(off)
-    assert not dynamics(adrift).commands
+    assert not vessel_dynamics(adrift).commands
     estimates = observe(adrift, log, Observer(waves=(0.0,), change=(1.0,)))
     assert all(np.isfinite(values).all() for values in estimates.columns.values())
 
@@ -439,7 +439,7 @@ def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.Mon
         monkeypatch.setattr(samples, "COMPILE_FROM", from_here)
         ways.append(observe(vessel, log, filters.settings))
     one = filter_function(filters.model)
-    assert compiler() is None or samples._library(one, ("parameters",)) is not None
+    assert find_compiler() is None or samples._compile_sample_function(one, ("parameters",)) is not None
     assert (ways[0].weights[1:, 2:] == 0).all()  # those that diverged
     step, model = observer_function(filters.model, filters.num_filters), filters.model
     orders, weather = run[list(model.commands)].to_numpy(), run[list(model.environment)].to_numpy()

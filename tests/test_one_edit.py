@@ -33,23 +33,23 @@ from shipid.logs import readers
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
 from shipid.physics import TERMS, Term, helm, signals
-from shipid.physics.frames import force_at
+from shipid.physics.frames import wrench_of_force
 from shipid.physics.signals import Signal
 from shipid.predictor import fit
 from shipid.report.wording import number
-from shipid.schemas import schema as schema_of
+from shipid.schemas import document_schema as schema_of
 from shipid.simulation import manoeuvre
 from shipid.simulation.approach import Controls
-from shipid.simulation.standard import standard
-from shipid.simulation.truth import Truth, simulate
+from shipid.simulation.standard import define_standard
+from shipid.simulation.truth import Truth, simulate_truth
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import Plan, build_plan, orders_may_react
 from shipid.study.schema import Published
 from shipid.units import DEGREE
 from shipid.vessel import perturb
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
-from shipid.vessel.perturb import Rule
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document, load_vessel
+from shipid.vessel.perturb import PerturbationRule
 from tests import test_laws
 from tests.documented import entries, module, new_module
 from tests.logs.conftest import PLAIN, as_log, turning
@@ -76,7 +76,7 @@ T = np.arange(0.0, 60.0, 0.5)
 
 def flap_force(nu_r: Any, flap: Any, *, x: Annotated[Any, "m"], k: Annotated[Any, "kg m^-1"]) -> Any:
     """Sway force -k u|u| flap at x: a positive flap aft turns the ship to starboard."""
-    return force_at(x, ca.SX(0), ca.SX(0), ca.SX(0), -k * nu_r[0] * ca.fabs(nu_r[0]) * flap)
+    return wrench_of_force(x, ca.SX(0), ca.SX(0), ca.SX(0), -k * nu_r[0] * ca.fabs(nu_r[0]) * flap)
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def with_flap() -> Vessel:
     lag = {"flap": {"kind": "first_order", "T": 0.5, "rate": 0.2}}
     document = load_vessel("kvlcc2-l7").document
     block = {"kind": "flap", "x": -3.5, "k": 50.0, "actuator": lag}
-    return check_vessel({**document, "thruster": {**document["thruster"], "tail": block}}, "with a flap")
+    return check_document({**document, "thruster": {**document["thruster"], "tail": block}}, "with a flap")
 
 
 @pytest.mark.usefixtures("flap")
@@ -116,7 +116,7 @@ def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
 
 @pytest.mark.usefixtures("flap")
 def test_a_term_takes_it_and_its_actuator_lags() -> None:
-    model = dynamics(with_flap())
+    model = vessel_dynamics(with_flap())
     assert model.commands == ("propeller.n", "rudder.delta", "tail.flap")
     assert model.memory == {"rudder.delta": "rad", "tail.flap": "rad"}
     start = {**dict.fromkeys(("north", "east", "psi", "v", "r"), np.zeros(1)), "u": np.ones(1)}
@@ -201,7 +201,7 @@ def with_jets(*names: str) -> Vessel:
     """A ship that jets alone drive: no shaft, so no manoeuvre by the helm."""
     document = load_vessel("gunnerus-28.9").document
     jets = {name: {"kind": "jet", "x": -13.0, "F_max": 6e4} for name in names}
-    return check_vessel({**document, "thruster": jets}, "under jets")
+    return check_document({**document, "thruster": jets}, "under jets")
 
 
 @pytest.mark.usefixtures("jet")
@@ -227,7 +227,7 @@ def test_a_manoeuvre_by_shaft_and_helm_names_those_that_a_vessel_without_a_shaft
         _ = Controls(with_jets("main")).helm
     assert Controls(with_jets("main")).effects == ((), {})
     truth = Truth(**SHALLOWS, manoeuvre=[{"kind": "steps", "throttle": (0.2, 0.8)}])
-    assert simulate(truth, with_jets("main"))["main.throttle"].between(0.2, 0.8).all()
+    assert simulate_truth(truth, with_jets("main"))["main.throttle"].between(0.2, 0.8).all()
 
 
 SHALLOWS = {"vessel": "shallow", "manoeuvres": 3, "duration": 40.0, "step": 0.2, "wind_speed": (0.0, 0.0), "seed": 2}
@@ -245,7 +245,7 @@ def depth(monkeypatch: pytest.MonkeyPatch) -> Vessel:
     monkeypatch.setitem(test_laws.MIRROR, "depth", row.mirror)
     document = load_vessel("gunnerus-28.9").document
     block = {"c": 0.1, "T": 2.65, "L_pp": 28.9}
-    return check_vessel({**document, "hull": {**document["hull"], "shallow": block}}, "shallow")
+    return check_document({**document, "hull": {**document["hull"], "shallow": block}}, "shallow")
 
 
 @pytest.mark.usefixtures("depth")
@@ -260,7 +260,7 @@ def test_the_depth_obeys_the_laws() -> None:
 
 def test_a_truth_draws_the_depth_of_each_run_and_logs_it(depth: Vessel) -> None:
     """And a shallower run is slower: all else is equal but the course."""
-    log = simulate(Truth(**SHALLOWS, environment={"depth": (3.0, 20.0)}, manoeuvre=[ALIKE]), depth)
+    log = simulate_truth(Truth(**SHALLOWS, environment={"depth": (3.0, 20.0)}, manoeuvre=[ALIKE]), depth)
     runs = log.groupby("run")
     assert (runs["depth"].nunique() == 1).all()
     ends = pd.DataFrame({"depth": runs["depth"].last(), "u": runs["u"].last()}).sort_values("depth")
@@ -284,7 +284,7 @@ def test_a_guess_and_the_importer_take_the_depth(tmp_path: Path) -> None:
 
 def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Path) -> None:
     """Also where a method goes step by step, and in what is exported."""
-    log = simulate(Truth(**SHALLOWS, environment={"depth": (3.0, 20.0)}, manoeuvre=[ALIKE]), depth)
+    log = simulate_truth(Truth(**SHALLOWS, environment={"depth": (3.0, 20.0)}, manoeuvre=[ALIKE]), depth)
     windows = cut_windows(Dataset(log, {"clock": "run"}), horizon=5)
     physics, instants = Physics(depth, horizon=5, step=1.0, integrator="rk4"), windows.instants()
     deep = Instants({name: values for name, values in instants.columns.items() if name != "depth"})
@@ -351,7 +351,7 @@ def test_a_guess_recognises_it(tmp_path: Path) -> None:
     assert {column.name for column in proposal.columns} >= {"north", "east", "psi", "u", "v", "r", "rudder.delta"}
 
 
-SHIFT = Rule(
+SHIFT = PerturbationRule(
     float | tuple[float, float],
     lambda number, shift, u: number + (shift if isinstance(shift, float) else shift[0] + (shift[1] - shift[0]) * u),
     drawn=lambda shift: isinstance(shift, tuple),
@@ -445,16 +445,16 @@ def test_a_document_the_measures_of_a_log_and_the_command_take_the_manoeuvre(tmp
     assert [row["measure"] for row in done["measures"]] == list(rows)
     assert re.search(rf"half run: {number(done['measures'][2]['value'])}\sm", page.read_text())
     with pytest.raises(ShipidError, match="coast-down takes no angles"):
-        standard(load_vessel("kvlcc2-l7"), "coast-down", 10)
+        define_standard(load_vessel("kvlcc2-l7"), "coast-down", 10)
 
 
 @pytest.mark.usefixtures("coast_down")
 def test_a_study_and_its_schema_take_the_manoeuvre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = coasting_study(tmp_path)
     assert not orders_may_react(plan)
-    assert simulate(plan.study.truth, plan.truth)["propeller.n"].eq(0).all()
+    assert simulate_truth(plan.study.truth, plan.truth)["propeller.n"].eq(0).all()
     assert '"coast_down"' in json.dumps(schema_of("study"))
     coasting = manoeuvre.KINDS["coast_down"]
-    helmed = {"helmsman": lambda _, controls: helm.course_keeping(controls.commands)}
+    helmed = {"helmsman": lambda _, controls: helm.course_helmsman(controls.commands)}
     monkeypatch.setitem(manoeuvre.KINDS, "coast_on_course", type("CoastOnCourse", (coasting,), helmed))
     assert orders_may_react(coasting_study(tmp_path, "coast_on_course"))

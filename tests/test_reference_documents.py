@@ -11,13 +11,13 @@ from typing import get_type_hints
 
 import pytest
 
-from shipid.cli.simulation import manoeuvre
+from shipid.cli.simulation import manoeuvre_command
 from shipid.hybrid.methods import METHODS
 from shipid.logs.readers import READERS
 from shipid.logs.repairs import REPAIRS
 from shipid.physics import TERMS
 from shipid.simulation.manoeuvre import KINDS
-from shipid.simulation.standard import standards
+from shipid.simulation.standard import standard_manoeuvres
 from tests.measures.made_records import RECORDS, every
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -94,15 +94,15 @@ def test_the_kinds_that_a_helmsman_steers_are_named() -> None:
     assert named(sentence) == {name for name, kind in KINDS.items() if kind.reacts()}
 
 
-@pytest.mark.parametrize("name", standards())
+@pytest.mark.parametrize("name", standard_manoeuvres())
 def test_every_standard_manoeuvre_and_every_measure_is_named(name: str) -> None:
     """In the help of the command, in the table of the names that it takes, and in that of the measures."""
     text = page("manoeuvres")
     rows = section(text, "From the command line")
     assert re.search(rf"^\| `{name}` \|", rows, re.MULTILINE), f"docs/manoeuvres.md: no row for `{name}`"
-    argument = get_type_hints(manoeuvre, include_extras=True)["name"].__metadata__[0]
+    argument = get_type_hints(manoeuvre_command, include_extras=True)["name"].__metadata__[0]
     assert name in re.split(r", | or ", argument.help), f"shipid/cli/simulation.py: the help of NAME lacks {name}"
-    measures = standards()[name].measures(every(RECORDS[name](), 0.5))
+    measures = standard_manoeuvres()[name].measures(every(RECORDS[name](), 0.5))
     listed = {re.sub(r"_[234]$", "_1", measure) for measure in measures}  # `overshoot_1` ... `overshoot_4`
     assert not listed - named(section(text, "Measures")), "docs/manoeuvres.md: the table of the measures lacks some"
 

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 import tomlkit
 
-from shipid.document import bundled, bundled_folder
+from shipid.document import bundled_documents, bundled_documents_folder
 from shipid.errors import DocumentError
 from shipid.identification.outcome import read_settings
 from shipid.logs.mapping import read_mapping
-from shipid.schemas import SCHEMAS, schema, with_schema
+from shipid.schemas import SCHEMAS, add_schema_line, document_schema
 from shipid.study.plan import build_plan, read_plan
 from shipid.vessel.load import load_vessel
 
 jsonschema = pytest.importorskip("jsonschema")
 
 EVERY = {"vessel": "models", "study": "studies", "mapping": "studies/mappings"}
-BUNDLED = [(kind, name) for kind, folder in EVERY.items() for name in bundled(folder)]
+BUNDLED = [(kind, name) for kind, folder in EVERY.items() for name in bundled_documents(folder)]
 #: keys and tables whose keys or values are paths, files, runs or other documents: the schema cannot know them
 OPEN = {
     "set",
@@ -51,17 +51,17 @@ SETTINGS = {"identify": {"parameters": ["hull.*"], "prior": {"hull.*": 0.3}, "nu
 
 @pytest.fixture(scope="module")
 def validators() -> dict[str, Any]:
-    return {name: jsonschema.Draft7Validator(schema(name)) for name in SCHEMAS}
+    return {name: jsonschema.Draft7Validator(document_schema(name)) for name in SCHEMAS}
 
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the bundled vessels, beside which a spoilt one finds its tables."""
-    return Path(shutil.copytree(bundled_folder("models"), tmp_path_factory.mktemp("copy") / "models"))
+    return Path(shutil.copytree(bundled_documents_folder("models"), tmp_path_factory.mktemp("copy") / "models"))
 
 
 def document_of(kind: str, name: str) -> dict[str, Any]:
-    return tomllib.loads(bundled(EVERY[kind])[name].read_text(encoding="utf-8"))
+    return tomllib.loads(bundled_documents(EVERY[kind])[name].read_text(encoding="utf-8"))
 
 
 def refusal(kind: str, name: str, document: dict[str, Any], models: Path, known: dict[str, Any]) -> str | None:
@@ -77,7 +77,7 @@ def refusal(kind: str, name: str, document: dict[str, Any], models: Path, known:
         elif kind == "settings":
             read_settings(file)
         else:
-            build_plan(document, bundled("studies")[name], dict(known))
+            build_plan(document, bundled_documents("studies")[name], dict(known))
     except DocumentError as error:
         return str(error)
     return None
@@ -113,14 +113,14 @@ def spoilt(document: dict[str, Any], rng: np.random.Generator) -> tuple[dict[str
 
 @pytest.mark.parametrize("name", SCHEMAS)
 def test_a_schema_is_one(name: str) -> None:
-    document = schema(name)
+    document = document_schema(name)
     jsonschema.Draft7Validator.check_schema(document)
     assert json.loads(json.dumps(document)) == document
     text = json.dumps(document)
     assert '"null"' not in text, "TOML has no null"
     assert "prefixItems" not in text, "no draft that editors know has it"
     with pytest.raises(DocumentError, match="no such document: did you mean 'vessel'"):
-        schema("vesel")
+        document_schema("vesel")
 
 
 @pytest.mark.parametrize(("kind", "name"), BUNDLED)
@@ -172,9 +172,9 @@ def test_schemas_and_parser_agree_on_every_document(
 def test_a_draft_names_the_schema_beside_it(tmp_path: Path) -> None:
     """The path is relative, so that folder, document and schema travel together."""
     file = tmp_path / "new" / "ship.toml"
-    text = with_schema('name = "x"\n', file, "vessel")
+    text = add_schema_line('name = "x"\n', file, "vessel")
     line, _, rest = text.partition("\n")
     assert line.startswith("#:schema ./")
     assert rest == 'name = "x"\n'
     named = file.parent / line.removeprefix("#:schema ")
-    assert json.loads(named.read_text(encoding="utf-8")) == schema("vessel")
+    assert json.loads(named.read_text(encoding="utf-8")) == document_schema("vessel")

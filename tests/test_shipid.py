@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 import shipid
-from shipid.document import bundled_folder
+from shipid.document import bundled_documents_folder
 from shipid.errors import ShipidError
 from tests.documented import code
 from tests.study.tiny import TINY, without_workers
@@ -26,7 +26,7 @@ QUICK = f'"{shipid.read_plan("quick").folder}"'  # as a page of the documentatio
 
 
 def test_the_wheel_takes_models_and_studies_along() -> None:
-    """pyproject maps both folders to where `bundled_folder` looks first."""
+    """pyproject maps both folders to where `bundled_documents_folder` looks first."""
     build = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["tool"]["hatch"]["build"]
     assert build["targets"]["wheel"]["force-include"] == {
         "models": "shipid/_bundled/models",
@@ -40,8 +40,8 @@ def test_what_is_installed_comes_first(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "site" / "shipid" / "_bundled" / "models").mkdir(parents=True)
     (tmp_path / "site" / "models").mkdir()
     monkeypatch.setattr(document, "__file__", str(tmp_path / "site" / "shipid" / "document.py"))
-    assert bundled_folder("models") == tmp_path / "site" / "shipid" / "_bundled" / "models"
-    assert bundled_folder("studies") == tmp_path / "site" / "studies"
+    assert bundled_documents_folder("models") == tmp_path / "site" / "shipid" / "_bundled" / "models"
+    assert bundled_documents_folder("studies") == tmp_path / "site" / "studies"
 
 
 def test_public_names_load() -> None:

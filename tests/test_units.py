@@ -12,12 +12,12 @@ from shipid.units import (
     KNOT,
     MINUTE,
     RPM,
-    decimals_for,
-    digits,
+    digit_decimals,
     interval_text,
+    join_names,
     length_text,
-    listed,
-    percent,
+    percent_text,
+    significant_digits,
     unit_fault,
 )
 
@@ -66,17 +66,17 @@ def test_lengths_of_a_small_model_are_no_zeros(length: float, text: str) -> None
     ("value", "digits", "decimals"), [(12.3, 3, 1), (-0.0451, 3, 4), (1234.0, 3, 0), (9.99, 4, 3), (0.0, 3, 2)]
 )
 def test_a_number_has_so_many_digits(value: float, digits: int, decimals: int) -> None:
-    assert decimals_for(value, digits) == decimals
+    assert digit_decimals(value, digits) == decimals
 
 
 def test_percent_signs_stand_apart_from_their_number() -> None:
-    assert [percent(0.284), percent(0.0312, 1), percent(1.0), percent(-0.14, signed=True)] == [
+    assert [percent_text(0.284), percent_text(0.0312, 1), percent_text(1.0), percent_text(-0.14, signed=True)] == [
         "28 %",
         "3.1 %",
         "100 %",
         "-14 %",
     ]
-    assert percent(0.02, signed=True) == "+2 %"
+    assert percent_text(0.02, signed=True) == "+2 %"
 
 
 @pytest.mark.parametrize(
@@ -97,13 +97,13 @@ def test_both_ends_of_an_interval_have_the_decimals_of_its_width(low: float, hig
 
 
 def test_names_are_listed_as_in_a_sentence() -> None:
-    assert [listed(list("abc")[:count]) for count in range(4)] == ["", "a", "a and b", "a, b and c"]
+    assert [join_names(list("abc")[:count]) for count in range(4)] == ["", "a", "a and b", "a, b and c"]
 
 
 def test_digits_before_the_point_are_never_rounded() -> None:
     values = (0.012345, 12.345, 999.4, 1234.5, -4321.0)
-    assert [digits(value) for value in values] == ["0.0123", "12.3", "999", "1234", "-4321"]
-    assert digits(12.345, 2, "+") == "+12"
+    assert [significant_digits(value) for value in values] == ["0.0123", "12.3", "999", "1234", "-4321"]
+    assert significant_digits(12.345, 2, "+") == "+12"
 
 
 QUOTIENTS = ["N s^1.5 m^-1.5", "m^0.5", "kg/m/s", "N/(m/s)^2", "1/(m s)", "N/(m (rad/s)^2)", "deg/s", "rev/s"]

@@ -16,11 +16,11 @@ import pandas as pd
 from shipid.answer.verdict import count_runs, least_to_greatest, length_in_metres, model_list
 from shipid.evidence import share_interval
 from shipid.hybrid.bands import Region
-from shipid.metrics import share_of
+from shipid.metrics import coverage_share
 from shipid.predictor import NO_BAND
 from shipid.report.wording import listed
 from shipid.study.results import Results
-from shipid.units import level_text, percent, plural
+from shipid.units import level_text, percent_text, plural_word
 
 Array = np.ndarray
 REPORTED_LEVELS = (0.5, 0.8, 0.9, 0.95)
@@ -69,7 +69,7 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     for (level, model, family, N_D), seeds in sorted(parts.items(), key=lambda part: part[0][0]):
         inside, widths, ends = zip(*seeds, strict=True)  # seeds predict the same windows: no further evidence
         held, width, end = np.mean(inside, axis=0), np.mean(widths), np.mean(ends)
-        numbers = share_of(held, run), *share_interval(held, run), width, end, end / length
+        numbers = coverage_share(held, run), *share_interval(held, run), width, end, end / length
         rows.append((model, family, N_D, level, *numbers, count, len(seeds)))
     columns = ["model", "family", "N_D", "level", "coverage", "low", "high", "width", "end", "lengths", "runs", "seeds"]
     return pd.DataFrame(rows, columns=columns)
@@ -109,7 +109,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
             groups.append(("ahead", label, everywhere, reach[step], region.radius[step], ""))
         for by, group, chosen, inside, wide, note in groups:
             run, shares = test.run[chosen], inside[chosen]
-            numbers = share_of(shares, run), *share_interval(shares, run), float(wide[chosen].mean())
+            numbers = coverage_share(shares, run), *share_interval(shares, run), float(wide[chosen].mean())
             rows.append((row["model"], by, group, *numbers, len(np.unique(run)), note))
     columns = ["model", "by", "group", "coverage", "low", "high", "width", "runs", "note"]
     return pd.DataFrame(rows, columns=columns)
@@ -128,7 +128,7 @@ def answer_on_bands(results: Results) -> list[tuple[str, str]]:
         each = [*reasons] if len(reasons) == 1 else [f"{models}: {reason}" for reason, models in reasons.items()]
         return [(f"No band is promised: {'; '.join(each)}.", "cells")] if reasons else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
-    share, low, high = (percent(float(top[name].mean())) for name in ("coverage", "low", "high"))
+    share, low, high = (percent_text(float(top[name].mean())) for name in ("coverage", "low", "high"))
     radius = least_to_greatest(length_in_metres(top["width"].min()), length_in_metres(top["width"].max()))
     methods = results.cells["method"][results.cells["model"].isin(top["model"])].unique()
     data = f"{of_methods(results, [*methods])} with {top['N_D'].iloc[0]} runs; 95 % interval"
@@ -155,7 +155,7 @@ def of_methods(results: Results, names: Sequence[str]) -> str:
     """Say whose bands are meant, ` of the method 'drawn'`; nothing in a study of one method."""
     if len(results.plan.methods) == 1:
         return ""
-    return f" of the {plural(len(names), 'method')} {listed([repr(str(name)) for name in names])}"
+    return f" of the {plural_word(len(names), 'method')} {listed([repr(str(name)) for name in names])}"
 
 
 def worst_frame(results: Results) -> pd.DataFrame:

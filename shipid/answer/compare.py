@@ -23,12 +23,12 @@ from shipid import document as documents
 from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.findings import findings
 from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
-from shipid.arguments import path_of
+from shipid.arguments import as_path
 from shipid.document import Document
-from shipid.errors import DocumentError, ResultError, ShipidError, choices
+from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
 from shipid.evidence import which_significant, world_interval
-from shipid.files import as_argument
-from shipid.metrics import over_time, position_error
+from shipid.files import quote_argument
+from shipid.metrics import error_of_windows, position_error
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
 from shipid.study.results import Results, read_results
@@ -80,7 +80,7 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
     """
     if isinstance(folders, str | os.PathLike) or not isinstance(folders, Sequence) or len(folders) < 2:
         raise ShipidError("name two folders or more")
-    places = [path_of("folder", folder) for folder in folders]
+    places = [as_path("folder", folder) for folder in folders]
     if len({os.path.realpath(place) for place in places}) < len(places):
         raise ShipidError("a folder is named twice: name each folder once")
     return compare_results([read_results(place) for place in places], pairs)
@@ -115,7 +115,9 @@ def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
     for words, named, known in (("the first run", pairs, first), ("any other run", pairs.values(), there)):
         wrong = next((name for name in named if name not in known), None)
         if wrong is not None:
-            raise DocumentError(f"{wrong!r} is no family or method of {words}: {choices(wrong, known)}", path="--pair")
+            raise DocumentError(
+                f"{wrong!r} is no family or method of {words}: {suggest_name(wrong, known)}", path="--pair"
+            )
 
 
 def _short_names(folders: Sequence[Path]) -> tuple[str, ...]:
@@ -213,7 +215,7 @@ def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArr
     cells = []
     for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
         path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
-        error = over_time(position_error(path[:, windows], test.future[:, windows]))
+        error = error_of_windows(position_error(path[:, windows], test.future[:, windows]))
         row = results.cells[results.cells["cell"] == cell]
         learns = bool(cell) and learns_from_runs(results.plan, *row.iloc[0][["family", "method"]])
         cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
@@ -225,7 +227,7 @@ def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Docum
 
     called : method or family -> the name that it goes by here instead.
     """
-    study = documents.parse(Study, plan.document, plan.file)
+    study = documents.parse_model(Study, plan.document, plan.file)
     document: Document = study.model_dump(mode="json")
     for block, way in zip(document["method"], plan.methods, strict=True):
         block |= way.method.model_dump(mode="json")
@@ -287,7 +289,7 @@ def read_worlds(folders: Sequence[Path]) -> list[Results]:
     worlds = [read_results(folder) for folder in folders]
     for results in worlds:
         if not results.complete:
-            message = f"is not finished: continue with `shipid study resume {as_argument(results.folder)}`"
+            message = f"is not finished: continue with `shipid study resume {quote_argument(results.folder)}`"
             raise ResultError(message, file=results.folder)
     return worlds
 

@@ -40,12 +40,12 @@ from shipid.answer.verdict import (
     verdict_of,
 )
 from shipid.evidence import all_significant, any_significant, share_interval
-from shipid.metrics import rank_correlation, share_of
+from shipid.metrics import coverage_share, rank_correlation
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import judged_method
 from shipid.study.results import Results
-from shipid.units import level_text, percent
+from shipid.units import level_text, percent_text
 
 Array = NDArray[np.float64]
 BROKEN_BY = 0.05  # B2: a share that lies so far below its level is a broken promise
@@ -121,7 +121,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
             kinds,
             frozenset.intersection(*known) if known else None,
         ),
-        [share_of(np.mean(of_model[name], axis=0), run) for name in sound],
+        [coverage_share(np.mean(of_model[name], axis=0), run) for name in sound],
     )
     notes = (f"bands{of}" if of else "", too_few_manoeuvres(table.runs))
     return judge_claims(BAND_RULES, case, "; ".join(note for note in notes if note))
@@ -141,7 +141,7 @@ def _judge_widths(bands: BandEvidence) -> Judgement:
     decided, evidence, numbers = judge_width_trend(bands.widths)
     if not numbers:
         return decided, evidence, numbers
-    hold = least_to_greatest(percent(min(bands.shares)), percent(max(bands.shares)))
+    hold = least_to_greatest(percent_text(min(bands.shares)), percent_text(max(bands.shares)))
     return decided, f"{evidence}; these bands hold {hold} of whole paths", numbers
 
 
@@ -192,11 +192,11 @@ def _judge_promise(bands: BandEvidence) -> Judgement:
 def judge_held_share(promise: Promise) -> Judgement:
     """Verdict on B2 over all of these test runs."""
     low, high = share_interval(promise.held, promise.run)
-    share, sizes = share_of(promise.held, promise.run), np.unique(promise.run, return_counts=True)[1]
+    share, sizes = coverage_share(promise.held, promise.run), np.unique(promise.run, return_counts=True)[1]
     few, level = too_few_manoeuvres(len(sizes)), promise.level
-    interval = "" if few else f" [{percent(low)}, {percent(high)}]"
+    interval = "" if few else f" [{percent_text(low)}, {percent_text(high)}]"
     each = "" if (sizes == sizes[0]).all() else ", each counts the same"
-    hold = f"bands of {level_text(level)} hold {percent(share)}{interval} of whole paths"
+    hold = f"bands of {level_text(level)} hold {percent_text(share)}{interval} of whole paths"
     decided = "undecided" if few else verdict_of(low >= level - BROKEN_BY, high < level)
     return decided, f"{hold} ({count_manoeuvres(len(sizes))}{each})", {f"share at {level_text(level)}": share}
 

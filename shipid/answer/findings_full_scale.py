@@ -38,7 +38,7 @@ from shipid.evidence import Differences, all_significant, any_significant, paire
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.results import Results
-from shipid.units import percent
+from shipid.units import percent_text
 
 Array = NDArray[np.float64]
 ABOUT = 0.10  # R2: "about as good" means a mean error at most 10 % above
@@ -124,7 +124,7 @@ def _judge_worst(rivals: Rivals) -> Judgement:
     over_horizon = [error.mean(axis=0)[None] for error in (pure, *others)]
     each, whole = _lead_of_others(table, pure, others), _lead_of_others(table, over_horizon[0], over_horizon[1:])
     evidence = (
-        f"{quoted_model(NO_MODEL)} is worst at {percent(share)} of the steps, physics alone included; "
+        f"{quoted_model(NO_MODEL)} is worst at {percent_text(share)} of the steps, physics alone included; "
         f"most often worst: {worst}"
         if len(pure) > 1
         else f"worst over the horizon, physics alone included: {worst}"

@@ -66,12 +66,12 @@ from shipid.evidence import (
     partial_conjunction,
     which_significant,
 )
-from shipid.metrics import rank_correlation, roughness
+from shipid.metrics import path_roughness, rank_correlation
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import judged_method
 from shipid.study.results import Results
-from shipid.units import percent, plural
+from shipid.units import percent_text, plural_word
 
 Array = NDArray[np.float64]
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
@@ -170,7 +170,7 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     won = [int(which_significant(lead.above).sum()) for lead in leads]
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
-        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural(won[0], 'is', 'are')} shown to "
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown to "
         f"beat no physics ({grid.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
         f"that most keep the lead is {keeps}: {later}"
     )
@@ -187,7 +187,7 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
     left = float(np.median([grid.table.mean(model, end) / grid.table.mean(model, 0) for model in models]))
     evidence = (
         f"H is shown to fall for {fallen.sum() or 'none'} of {len(models)} models; twice the runs lower it by "
-        f"{_range_of(falls)}; N_D = {last} leaves {percent(left)} of the error at {first} in the median"
+        f"{_range_of(falls)}; N_D = {last} leaves {percent_text(left)} of the error at {first} in the median"
     )
     if not fallen.all():
         evidence += f"; not shown for: {model_list(m for m, good in zip(models, fallen, strict=True) if not good)}"
@@ -239,8 +239,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
     names = f" ({listed([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
     evidence = (
         f"at N_D = {grid.amounts[-1]}, {better.sum()} of {len(better)} high models "
-        f"{plural(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
-        f"{plural(len(worst), 'is', 'are')} shown to be worse{names}"
+        f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
+        f"{plural_word(len(worst), 'is', 'are')} shown to be worse{names}"
     )
     numbers = {
         f"share of high models shown to lead at N_D = {grid.amounts[-1]}": float(better.mean()),
@@ -250,7 +250,7 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
     if orders < FEWEST_ORDERS or not grid.moderate:
         lacks = (
             f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {orders} "
-            f"{plural(orders, 'seed')}"
+            f"{plural_word(orders, 'seed')}"
             if orders < FEWEST_ORDERS
             else "no moderate model to compare their fluctuation with"
         )
@@ -261,8 +261,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         more = _chance_of_mean(of_worst - calm)
         moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
         evidence += (
-            f"; over {orders} nested orders H of these varies by {percent(of_worst.mean())}, of moderate models by "
-            f"{percent(calm.mean())}"
+            f"; over {orders} nested orders H of these varies by {percent_text(of_worst.mean())}, of moderate models by "
+            f"{percent_text(calm.mean())}"
         )
         numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
     one_sided = all_significant(lead.above) or all_significant(lead.below)
@@ -390,7 +390,7 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     cells = cells[cells["N_D"] == grid.amounts[0]]
 
     def by_run(path: Array) -> Array:
-        return np.array([roughness(path[:, results.test.run == name]) for name in names])
+        return np.array([path_roughness(path[:, results.test.run == name]) for name in names])
 
     pure, together = (
         np.mean([by_run(results.paths[cell]) for m in models for cell in cells["cell"][cells["model"] == m]], axis=0)

@@ -11,7 +11,7 @@ import pandas as pd
 
 from shipid.files import read_json
 from shipid.hybrid.bands import Region
-from shipid.metrics import course_over_horizon, over_horizon, over_horizon_by_axis, over_time, position_error
+from shipid.metrics import course_over_horizon, error_of_steps, error_of_windows, over_horizon_by_axis, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import Snapshot
 from shipid.report.selection import FEW_RUNS, spread
@@ -73,7 +73,7 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     ahead, parts = test.step * np.arange(1, test.horizon + 1), []
     naive = {"model": "naive", "N_D": 0, "seed": 0, "source": "naive"}, constant_motion(test)
     for keys, path in (naive, *_shown_paths(results)):
-        errors = over_horizon(position_error(path, true)) | over_horizon_by_axis(path, true)
+        errors = error_of_steps(position_error(path, true)) | over_horizon_by_axis(path, true)
         errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
         parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors}))
     return pd.concat(parts, ignore_index=True)
@@ -88,7 +88,9 @@ def time_frame(results: Results) -> pd.DataFrame:
             curves.append((keys, position_error(path, test.future)))
     columns = ["run", "t", "model", "N_D", "seed", "source", "error"]
     parts = [
-        pd.DataFrame({"run": test.run[mask], "t": test.t[mask], **keys, "seed": seed, "error": over_time(error)[mask]})
+        pd.DataFrame(
+            {"run": test.run[mask], "t": test.t[mask], **keys, "seed": seed, "error": error_of_windows(error)[mask]}
+        )
         for keys, error in curves
     ]
     return insert_gaps(pd.concat(parts, ignore_index=True)[columns], ["run", "model", "N_D", "source"])

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.answer.comparison import CellErrors, compare_cells
-from shipid.arguments import of_class
+from shipid.arguments import check_class
 from shipid.evidence import ROUNDING, world_interval
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
@@ -38,7 +38,7 @@ def compare_methods(results: Results) -> pd.DataFrame:
 
     Raises ShipidError for results that are none.
     """
-    of_class("results", results, Results, "as of `read_results`")
+    check_class("results", results, Results, "as of `read_results`")
     return method_table(method_cells(results), judged_method(results.plan))
 
 

@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 from shipid.answer import bands, frames, memory, methods, sentences
 from shipid.answer.error_table import intervals_frame
 from shipid.answer.findings import findings
-from shipid.arguments import path_of
+from shipid.arguments import as_path
 from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
-from shipid.metrics import summary
+from shipid.metrics import summarise_errors
 from shipid.report import Finding, ReportContent, Sentence, write_report, write_summary
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, verdicts
@@ -55,7 +55,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
     if say is not None:
         say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
     words = *sentences.answer(results, verdicts(tables["methods"])), *bands.answer_on_bands(results)
-    best, naive = sentences.best_model(results), summary(results.naive)
+    best, naive = sentences.best_model(results), summarise_errors(results.naive)
     return ReportContent(
         title=plan.study.question,
         name=plan.name,
@@ -96,7 +96,7 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
 
     Raises ResultError if the folder holds no run or cannot be written.
     """
-    folder = path_of("folder", folder)
+    folder = as_path("folder", folder)
     store.stored_plan(folder)
     store.check_writable(folder)
     with sole_writer(folder, PAGES, wait=True):

@@ -18,7 +18,7 @@ from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals, judge_ri
 from shipid.answer.verdict import Finding, leave_undecided
 from shipid.data.checks import repeated
 from shipid.data.dataset import Dataset
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.study import store
 from shipid.study.code import code_digest
 from shipid.study.declared import NO_MODEL
@@ -48,9 +48,9 @@ def choose_turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[
     runs = [run for run in dataset.runs if run in cut]
     chosen: set[str] = set()
     for pattern in patterns:
-        matching = documents.match(pattern, runs)
+        matching = documents.match_paths(pattern, runs)
         if not matching:
-            raise DocumentError(f"{pattern!r} matches no run: {choices(pattern, runs)}", path="--tests")
+            raise DocumentError(f"{pattern!r} matches no run: {suggest_name(pattern, runs)}", path="--tests")
         chosen.update(matching)
     if len(chosen) < 2:
         message = f"only {chosen.pop()!r} matches: take turns with two or more of {', '.join(runs)}"
@@ -83,8 +83,10 @@ def rotate(
         for test in tests:
             rest, _, _ = partition(rotated_plan(plan, test, 2), dataset)
             changes = {"split.test": [test], "grid.N_D": [len(rest.spans)]}
-            turn = build_plan(documents.replace(plan.document, changes), Path(plan.file), plan.vessels, plan.sources)
-            folder = Path(place) / documents.digest(test)
+            turn = build_plan(
+                documents.replace_values(plan.document, changes), Path(plan.file), plan.vessels, plan.sources
+            )
+            folder = Path(place) / documents.digest_document(test)
             for _ in run_study(turn, folder, device=device):
                 pass
             floor = float(store.read_test(folder)[2].mean())
@@ -95,7 +97,7 @@ def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -
     """Folder of the turns of an interrupted rotation: one for each study, dataset, device and code."""
     vessels = {name: vessel.digest for name, vessel in plan.vessels.items()}  # the digest has them without their names
     decides = [plan.digest, vessels, dataset.digest, device, code_digest(), own_code(plan)]
-    return file.with_name(f"{file.name}.turns") / documents.digest(decides)
+    return file.with_name(f"{file.name}.turns") / documents.digest_document(decides)
 
 
 def remove_kept(kept: Path) -> None:

@@ -26,12 +26,12 @@ from shipid.answer.verdict import (
 )
 from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
-from shipid.metrics import over_time
+from shipid.metrics import error_of_windows
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, judged_method, learning_methods, orders_may_react
 from shipid.study.results import Results
-from shipid.units import percent, plural
+from shipid.units import percent_text, plural_word
 
 MOST_SHOWN = 5  # models that a sentence lists with their errors
 BEST = "best in validation"
@@ -193,7 +193,9 @@ def _missing_cells(results: Results) -> Iterator[str]:
     if len(failed):
         by_reason = failed.drop_duplicates("model").groupby("sentence", sort=False)["model"]
         why = "; ".join(f"{model_list(map(str, models))}: {reason}" for reason, models in by_reason)
-        sentences.append(f"{len(failed)} of {len(cells)} cells {plural(len(failed), 'has', 'have')} no result ({why})")
+        sentences.append(
+            f"{len(failed)} of {len(cells)} cells {plural_word(len(failed), 'has', 'have')} no result ({why})"
+        )
     if sentences:
         yield f"{'; '.join(sentences)}."
 
@@ -201,7 +203,7 @@ def _missing_cells(results: Results) -> Iterator[str]:
 def _families_that_saw_the_test(results: Results) -> Iterator[str]:
     """Which families saw the test runs, so that no other sentence counts them."""
     if saw := families_set_from(results.plan, results.test.spans):
-        it, them = plural(len(saw), "it is", "they are"), plural(len(saw), "it", "them")
+        it, them = plural_word(len(saw), "it is", "they are"), plural_word(len(saw), "it", "them")
         names = model_list(saw)
         yield f"The numbers of {names} were set from runs that test: {it} shown, and no other sentence counts {them}."
 
@@ -300,7 +302,7 @@ def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
         pure = case.H(NO_MODEL, largest)
         text = f"without physics {count_runs(largest)} are not enough for that{bounds}: they give {pure}"
     elif estimate.below:
-        do = plural(fewest, "does", "do")
+        do = plural_word(fewest, "does", "do")
         text = f"without physics the same {count_runs(fewest)} {do} as well{bounds}, {case.H(NO_MODEL, fewest)}"
     else:
         count = f"{estimate.value:.0f} runs{bounds}"
@@ -340,7 +342,7 @@ def _sides_in_words(case: AnswerCase, sides: Sides) -> str:
     verb = "do" if len(sides.better) > 1 else "does" if sides.better or not sides.unknown else "is shown to do"
     parts = [f"{len(sides.better) or 'none'} of {count} physics models {verb} better than no physics"]
     if sides.worse:
-        parts.append(f"{model_list(sides.worse)} {plural(len(sides.worse), 'does', 'do')} worse")
+        parts.append(f"{model_list(sides.worse)} {plural_word(len(sides.worse), 'does', 'do')} worse")
     if sides.unknown:
         parts.append(f"for {model_list(sides.unknown)} the test cannot tell")
     return "; ".join(parts)
@@ -352,8 +354,8 @@ def _error_left(case: AnswerCase) -> Iterator[str]:
     known = known[known["A"] > 0]
     if len(known):
         left = known["H"] / known["A"]
-        share, count = least_to_greatest(percent(left.min()), percent(left.max())), len(known)
-        models = f"(over {count} {plural(count, 'model')})"
+        share, count = least_to_greatest(percent_text(left.min()), percent_text(left.max())), len(known)
+        models = f"(over {count} {plural_word(count, 'model')})"
         yield f"Compensation with {count_runs(case.largest)} leaves {share} of the error of physics alone {models}."
 
 
@@ -383,7 +385,7 @@ def _harm_of_data(case: AnswerCase) -> Iterator[str]:
     sides = case.sides(models, case.table.compare([[(1.0, model, 0), (-1.0, model, last)] for model in models]))
     for names, how in ((sides.worse, "no"), (sides.unknown, "not clearly")):
         if names:
-            are = plural(len(names), "is", "are")
+            are = plural_word(len(names), "is", "are")
             yield f"With {count_runs(case.largest)} {model_list(names)} {are} {how} {than}."
 
 
@@ -396,11 +398,13 @@ def _against_constant_motion(case: AnswerCase) -> Iterator[str]:
         yield f"{begins}."
         return
     errors = np.stack([table.by_run(model, last) for model in models])
-    ahead = results.by_run(over_time(results.naive)) - errors
+    ahead = results.by_run(error_of_windows(results.naive)) - errors
     sides = case.sides(models, paired_difference(ahead, table.counts, errors @ table.weights * table.noise[last]))
     worse, unknown = sides.worse, sides.unknown
-    parts = [f"{model_list(worse)} {plural(len(worse), 'is', 'are')} worse"] if worse else []
-    parts += [f"{model_list(unknown)} {plural(len(unknown), 'is', 'are')} not shown to beat them"] if unknown else []
+    parts = [f"{model_list(worse)} {plural_word(len(worse), 'is', 'are')} worse"] if worse else []
+    parts += (
+        [f"{model_list(unknown)} {plural_word(len(unknown), 'is', 'are')} not shown to beat them"] if unknown else []
+    )
     text = ", and ".join(parts) or f"every model{case.whole} beats them"
     yield f"{begins}: at {count_runs(case.largest)} {text}."
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from shipid.answer.pages import write_pages
-from shipid.arguments import path_of
+from shipid.arguments import as_path
 from shipid.errors import ShipidError
 from shipid.study.plan import default_folder, read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.run import Event, run_study
-from shipid.units import decimals_of
+from shipid.units import length_decimals
 
 log = logging.getLogger(__name__)
 
@@ -70,7 +70,7 @@ def events(
     last event is that folder.
     """
     plan = read_plan(study, set)
-    folder = default_folder(plan) if out is None else path_of("out", out)
+    folder = default_folder(plan) if out is None else as_path("out", out)
     log.debug("study %s, digest %s, folder %s", plan.name, plan.digest, folder)
     yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
 
@@ -85,7 +85,7 @@ def event_line(event: Event) -> str:
     if event.kind != "cell":
         return ""
     if row["status"] == "ok":
-        H, H_90 = (f"{row[name]:.{max(decimals_of(row[name]), 3)}f} m" for name in ("H", "H_90"))
+        H, H_90 = (f"{row[name]:.{max(length_decimals(row[name]), 3)}f} m" for name in ("H", "H_90"))
         result = f"H {H}, H_90 {H_90}"
     else:
         result = f"{row['status']}: {row['sentence']}"

@@ -12,7 +12,7 @@ from shipid.evidence import FEWEST_RUNS, Differences
 from shipid.report.content import spoken
 from shipid.report.wording import listed
 from shipid.study.declared import NO_MODEL
-from shipid.units import decimals_of, plural
+from shipid.units import length_decimals, plural_word
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 Judgement = tuple[Verdict, str, Mapping[str, float]]  # with the evidence in words, and key numbers by name and unit
@@ -83,7 +83,7 @@ def length_in_metres(value: float) -> str:
 
 
 def _decimal_places(value: float) -> int:
-    return 1 if abs(value) >= 9.995 else decimals_of(value)
+    return 1 if abs(value) >= 9.995 else length_decimals(value)
 
 
 def _fixed(value: float, places: int) -> str:
@@ -111,19 +111,19 @@ def least_to_greatest(*numbers: str) -> str:
 
 def count_manoeuvres(count: int) -> str:
     """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
-    return f"{count} {plural(count, 'test manoeuvre')}"
+    return f"{count} {plural_word(count, 'test manoeuvre')}"
 
 
 def too_few_manoeuvres(count: int) -> str:
     """Say that so many test manoeuvres give no interval; empty if they do."""
     if count >= FEWEST_RUNS:
         return ""
-    return f"{count_manoeuvres(count)} {plural(count, 'gives', 'give')} no interval, {FEWEST_RUNS} would"
+    return f"{count_manoeuvres(count)} {plural_word(count, 'gives', 'give')} no interval, {FEWEST_RUNS} would"
 
 
 def count_runs(count: int) -> str:
     """Return `1 run`, `2 runs`, ..."""
-    return f"{count} {plural(count, 'run')}"
+    return f"{count} {plural_word(count, 'run')}"
 
 
 def quoted_model(model: str) -> str:

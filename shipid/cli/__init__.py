@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from shipid.cli import data, export, identify, predict, replay, schema, simulation, study, vessel
-from shipid.cli.outputs import Guarded
+from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError, is_utf_8
 
@@ -22,14 +22,14 @@ OPTIONS: dict[str, Any] = {
     "help": "How good must the physics be, and how much data is needed, to predict a ship's trajectory?",
 }
 COMMANDS: dict[str, Callable[..., Any]] = {
-    "simulate": simulation.simulate,
-    "manoeuvre": simulation.manoeuvre,
-    "replay": replay.replay,
-    "identify": identify.identify,
-    "predict": predict.predict,
-    "schema": schema.schema,
-    "export": export.export,
-    "aboard": export.aboard,
+    "simulate": simulation.simulate_command,
+    "manoeuvre": simulation.manoeuvre_command,
+    "replay": replay.replay_command,
+    "identify": identify.identify_command,
+    "predict": predict.predict_command,
+    "schema": schema.schema_command,
+    "export": export.export_command,
+    "aboard": export.aboard_command,
 }
 NAMELESS = {  # errors of the system that name no file -> what helps
     errno.EAGAIN: "this user has too many processes and threads: end some, raise `ulimit -u`, or take fewer --workers",
@@ -42,8 +42,8 @@ GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
-        _check_utf_8(sys.argv[1:])
-        _named(sys.argv[1:])()
+        _check_encoding(sys.argv[1:])
+        _app_of_arguments(sys.argv[1:])()
     except BrokenPipeError:
         sys.exit(141)
     except KeyboardInterrupt:
@@ -78,7 +78,7 @@ def error_line(error: Exception) -> str | None:
     return None
 
 
-def _check_utf_8(arguments: Sequence[str]) -> None:
+def _check_encoding(arguments: Sequence[str]) -> None:
     """Raise ShipidError for an argument that is not UTF-8: documents, pages and tables could not name such a file."""
     for argument in arguments:
         if not is_utf_8(argument):
@@ -88,7 +88,7 @@ def _check_utf_8(arguments: Sequence[str]) -> None:
             raise ShipidError(words, path=argument)
 
 
-def _before(
+def _configure_output(
     version: Annotated[bool, typer.Option("--version", help="show the version")] = False,
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="log what is done to standard error")] = False,
 ) -> None:
@@ -100,27 +100,27 @@ def _before(
         raise typer.Exit
 
 
-def _of(names: Collection[str], *, hollow: bool = False) -> typer.Typer:
+def _build_app(names: Collection[str], *, hollow: bool = False) -> typer.Typer:
     """Build the command line of some commands and groups; hollow groups only say what they are for."""
     app = typer.Typer(**OPTIONS)
-    app.callback(invoke_without_command=True)(_before)
+    app.callback(invoke_without_command=True)(_configure_output)
     for name, command in COMMANDS.items():
         if name in names:
-            app.command(name, cls=Guarded)(command)
+            app.command(name, cls=GuardedCommand)(command)
     for name, group in GROUPS.items():
         for registered in group.registered_commands:
-            registered.cls = Guarded
+            registered.cls = GuardedCommand
         if name in names:
             app.add_typer(typer.Typer(help=group.info.help) if hollow else group, name=name)
     return app
 
 
-def _named(arguments: Sequence[str]) -> typer.Typer:
+def _app_of_arguments(arguments: Sequence[str]) -> typer.Typer:
     """Take what the first argument names, alone: every command of an app is made before one runs, which takes time."""
     first = arguments[0] if arguments else ""
     if first in COMMANDS or first in GROUPS:
-        return _of([first])
-    return _of([*COMMANDS, *GROUPS], hollow=True) if first == "--help" else app
+        return _build_app([first])
+    return _build_app([*COMMANDS, *GROUPS], hollow=True) if first == "--help" else app
 
 
-app = _of([*COMMANDS, *GROUPS])
+app = _build_app([*COMMANDS, *GROUPS])

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.terminal import digits, show, table
+from shipid.cli.terminal import four_digits, print_table, text_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from shipid.cli.terminal import Table
+    from shipid.cli.terminal import TextTable
 
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object instead of tables; all else goes to stderr")]
 
@@ -38,12 +38,12 @@ class Answer:
         elif text:
             typer.echo(text)
 
-    def rows(self, name: str, rows: DataFrame | Iterable[Mapping[Any, Any]], shown: Table | None) -> None:
+    def rows(self, name: str, rows: DataFrame | Iterable[Mapping[Any, Any]], shown: TextTable | None) -> None:
         """Print a table, if there is one to be shown; for programs its rows under a name, SI and not rounded."""
         if self.as_json:
             self.contents[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
         elif shown is not None:
-            show(shown)
+            print_table(shown)
 
     def records(
         self,
@@ -59,28 +59,28 @@ class Answer:
         """
         records: Any = rows.to_dict("records") if hasattr(rows, "to_dict") else rows
         heads = heads or {key: key for record in records[:1] for key in record}
-        formats = dict.fromkeys(heads, _cell) | dict(formats or {})
+        formats = dict.fromkeys(heads, _format_cell) | dict(formats or {})
         cells = [[formats[key](record[key]) for key in heads] for record in records]
-        self.rows(name, rows, table(list(heads.values()), cells) if cells else None)
+        self.rows(name, rows, text_table(list(heads.values()), cells) if cells else None)
 
 
-def _cell(value: Any) -> str:
-    return digits(value) if isinstance(value, float) else str(value)
+def _format_cell(value: Any) -> str:
+    return four_digits(value) if isinstance(value, float) else str(value)
 
 
 @contextmanager
-def answering(as_json: bool) -> Iterator[Answer]:
+def open_answer(as_json: bool) -> Iterator[Answer]:
     """Give an `Answer`, and print it as JSON at the end of the block, also where that ends with an exit status."""
     answer = Answer(as_json)
     try:
         yield answer
     except typer.Exit:
-        _write(answer)
+        _print_answer(answer)
         raise
-    _write(answer)
+    _print_answer(answer)
 
 
-def _write(answer: Answer) -> None:
+def _print_answer(answer: Answer) -> None:
     if answer.as_json:
         from shipid.files import json_text
 

@@ -10,18 +10,18 @@ import typer
 Offer = Callable[[str], list[str]]
 
 
-def bundled_or_file(kind: str) -> Offer:
+def offer_documents(kind: str) -> Offer:
     """Offer the bundled documents of a kind (`models`, `studies`, `studies/mappings`), then TOML files."""
 
     def offer(incomplete: str) -> list[str]:
-        from shipid.document import bundled
+        from shipid.document import bundled_documents
 
-        return [*beginning(incomplete, bundled(kind)), *files(".toml")(incomplete)]
+        return [*names_beginning_with(incomplete, bundled_documents(kind)), *offer_files(".toml")(incomplete)]
 
     return offer
 
 
-def files(*endings: str) -> Offer:
+def offer_files(*endings: str) -> Offer:
     """Offer folders, and files of these endings."""
 
     def offer(incomplete: str) -> list[str]:
@@ -40,12 +40,16 @@ def files(*endings: str) -> Offer:
     return offer
 
 
-def cells(context: typer.Context, incomplete: str) -> list[str]:
+def offer_cells(context: typer.Context, incomplete: str) -> list[str]:
     """Offer the cells of the folder that the command names."""
     folder = context.params.get("folder") or next(iter(context.args), None)  # not parsed while the line is not whole
-    return beginning(incomplete, sorted(file.stem for file in Path(folder, "cells").glob("*.npz"))) if folder else []
+    return (
+        names_beginning_with(incomplete, sorted(file.stem for file in Path(folder, "cells").glob("*.npz")))
+        if folder
+        else []
+    )
 
 
-def beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+def names_beginning_with(incomplete: str, names: Iterable[str]) -> list[str]:
     """Return the names that begin so."""
     return [name for name in names if name.startswith(incomplete)]

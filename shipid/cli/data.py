@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from shipid.cli.answer import Answer, Json, answering
-from shipid.cli.completion import beginning, bundled_or_file, files
+from shipid.cli.answer import Answer, Json, open_answer
+from shipid.cli.completion import names_beginning_with, offer_documents, offer_files
 from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import criterion_table, measure_table, steps, table
+from shipid.cli.terminal import criterion_table, measure_table, show_steps, text_table
 from shipid.errors import ShipidError
-from shipid.units import percent, plural
+from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
 
 
-def _public(incomplete: str) -> list[str]:
-    from shipid.document import bundled
+def _offer_public_logs(incomplete: str) -> list[str]:
+    from shipid.document import bundled_documents
 
-    return beginning(incomplete, bundled("studies/mappings"))
+    return names_beginning_with(incomplete, bundled_documents("studies/mappings"))
 
 
 @app.command("fetch")
 def data_fetch(
-    name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022", autocompletion=_public)],
+    name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022", autocompletion=_offer_public_logs)],
 ) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
     from shipid.logs.catalogue import fetch
@@ -55,7 +55,7 @@ def data_import(
     vessel: Annotated[
         str | None,
         typer.Option(
-            help="with --guess: vessel whose names the commands take", autocompletion=bundled_or_file("models")
+            help="with --guess: vessel whose names the commands take", autocompletion=offer_documents("models")
         ),
     ] = None,
     frame: Annotated[
@@ -74,8 +74,8 @@ def data_import(
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
-        with answering(as_json) as answer:
-            _draft(guess, tuple(filter(None, names.split(","))), vessel, frame, out, answer)
+        with open_answer(as_json) as answer:
+            _draft_mapping(guess, tuple(filter(None, names.split(","))), vessel, frame, out, answer)
         return
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
@@ -91,32 +91,32 @@ def data_import(
     check_output(out, [source, Path(mapping)], "--out")
     if source.is_dir():
         check_output(out, source.glob("*"), "--out")
-    with steps() as say:
+    with show_steps() as say:
         dataset = import_log(
             declared,
             source,
             without=without or (),
-            progress=lambda share: say(f"{source.name}: {percent(share)} read"),
+            progress=lambda share: say(f"{source.name}: {percent_text(share)} read"),
         )
     file = write_dataset(dataset, out)
     repairs = dataset.metadata.get("repairs", [])
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.records("repairs", repairs)
-        _say_size(answer, dataset, file)
+        _say_dataset_size(answer, dataset, file)
 
 
-def _say_size(answer: Answer, dataset: Dataset, file: Path) -> None:
+def _say_dataset_size(answer: Answer, dataset: Dataset, file: Path) -> None:
     rows, runs = len(dataset.frame), len(dataset.runs)
-    answer.say(f"{rows} rows in {runs} {plural(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
+    answer.say(f"{rows} rows in {runs} {plural_word(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
 
 
-def _draft(
+def _draft_mapping(
     log: Path, names: tuple[str, ...], vessel: str | None, frame: Frame | None, out: Path | None, answer: Answer
 ) -> None:
     from shipid.files import check_new, write_new
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import NOT_YET, draft_mapping
-    from shipid.schemas import with_schema
+    from shipid.schemas import add_schema_line
     from shipid.vessel.load import load_vessel
 
     if out is not None:
@@ -126,18 +126,18 @@ def _draft(
     check_new(file, "mapping")
     check_output(file, [], "--out")
     text = draft_mapping(guessed)
-    write_new(with_schema(text, file, "mapping"), file)
+    write_new(add_schema_line(text, file, "mapping"), file)
     columns = [
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
     ]
-    answer.records("columns", columns, formats={"sure": percent})
+    answer.records("columns", columns, formats={"sure": percent_text})
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
-    answer.records("findings", findings, formats={"sure": percent})
+    answer.records("findings", findings, formats={"sure": percent_text})
     source = guessed.source
     if source.pattern is not None:
         count = f"{source.held} runs" if source.parts else "as many runs"
-        files = f"{len(source.files)} {plural(len(source.files), 'file')}"
+        files = f"{len(source.files)} {plural_word(len(source.files), 'file')}"
         sentence = f"{files} {source.pattern!r}: one source of {count}"
         answer.say(sentence, files=len(source.files), pattern=source.pattern)
     answer.records("left_out", [{"left out": name, "because": why} for name, why in source.skipped.items()])
@@ -173,7 +173,7 @@ def data_segment(
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch(mapping))
     write_new(segments_text(segments, unit), file)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         rows = [{"run": one.run, "start": one.start, "end": one.end} for one in segments]
         answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: moment(time, unit)))
         answer.say(f"{len(segments)} segments -> {file}", file=file)
@@ -182,7 +182,7 @@ def data_segment(
 @app.command("join")
 def data_join(
     datasets: Annotated[
-        list[Path], typer.Argument(help="datasets of one vessel, two or more", autocompletion=files(".parquet"))
+        list[Path], typer.Argument(help="datasets of one vessel, two or more", autocompletion=offer_files(".parquet"))
     ],
     out: Annotated[Path, typer.Option(help="dataset (Parquet) to write")],
     as_json: Json = False,
@@ -198,21 +198,21 @@ def data_join(
         raise ShipidError("is named twice: name each dataset once", file=twice)
     joined, notes = join({file: read_dataset(file) for file in datasets})
     file = write_dataset(joined, out)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-        _say_size(answer, joined, file)
+        _say_dataset_size(answer, joined, file)
 
 
 @app.command("check")
 def data_check(
     dataset: Annotated[
-        Path, typer.Argument(help="dataset written by `shipid data import`", autocompletion=files(".parquet"))
+        Path, typer.Argument(help="dataset written by `shipid data import`", autocompletion=offer_files(".parquet"))
     ],
     vessel: Annotated[
         str | None,
         typer.Option(
             help="vessel whose thrust, torque and rudder force are compared with the measured ones",
-            autocompletion=bundled_or_file("models"),
+            autocompletion=offer_documents("models"),
         ),
     ] = None,
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
@@ -234,7 +234,7 @@ def data_check(
 
         checks = pd.concat([checks, check_outputs(load_vessel(vessel), log)], ignore_index=True)
     ok = checks["ok"].astype(bool)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         if html is not None:
             from shipid.data.contents import check_content
             from shipid.report.checks import write_checks
@@ -244,11 +244,11 @@ def data_check(
         counts = (
             (name, len(group), (~group["ok"].astype(bool)).sum()) for name, group in checks.groupby("check", sort=False)
         )
-        answer.rows("checks", checks, table(["check", "runs", "failed"], counts))
+        answer.rows("checks", checks, text_table(["check", "runs", "failed"], counts))
         failed = int((~ok).sum())
         if failed:
             rows = checks.loc[~ok, ["run", "check", "sentence"]].to_numpy()
-            answer.rows("failed", checks[~ok], table(["run", "failed", "what to look at"], rows))
+            answer.rows("failed", checks[~ok], text_table(["run", "failed", "what to look at"], rows))
         answer.say(f"{len(checks) - failed} of {len(checks)} checks passed", passed=len(checks) - failed)
         notes = nothing_varies(log, log.runs)
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
@@ -258,7 +258,7 @@ def data_check(
 
 @app.command("measures")
 def data_measures(
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)", autocompletion=files(".parquet"))],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)", autocompletion=offer_files(".parquet"))],
     manoeuvre: Annotated[
         str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
     ] = None,
@@ -276,12 +276,12 @@ def data_measures(
     result = measure_dataset(read_dataset(dataset), manoeuvre, length)
     measures, criteria = (frame.to_dict("records") for frame in (result.measures, result.criteria))
     left = [{"run": run, "because": why} for run, why in result.left.items()]
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.rows("measures", measures, measure_table(measures, ["run", "kind"]) if measures else None)
         answer.rows("criteria", criteria, criterion_table(criteria, ["run"]) if criteria else None)
         answer.records("left", left)
         measured = result.measures["run"].nunique() if measures else 0
-        answer.say(f"{measured} {plural(measured, 'run')} measured, {len(left)} not")
+        answer.say(f"{measured} {plural_word(measured, 'run')} measured, {len(left)} not")
         if csv is not None:
             write_table(csv, result.measures)
             answer.say(f"measures -> {csv}", csv=csv)

@@ -11,7 +11,7 @@ from shipid.cli.options import Adaptive, Kind, check_band, command_line
 from shipid.cli.outputs import check_ending, check_output
 
 
-def export(
+def export_command(
     what: Annotated[
         str, typer.Argument(help="a cell, FOLDER/cells/NAME.npz, or a vessel: a document or a bundled name")
     ],
@@ -22,8 +22,8 @@ def export(
     name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
-    from shipid.document import bundled
-    from shipid.errors import DocumentError, choices
+    from shipid.document import bundled_documents
+    from shipid.errors import DocumentError, suggest_name
     from shipid.export.casadi import listing_of
     from shipid.export.write import EXAMPLE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
@@ -32,14 +32,14 @@ def export(
     if to == "casadi" and out.name:
         for file in (out, listing_of(out)):
             check_output(file, [Path(what)], "--out")
-    if what.endswith(".npz") or (what not in bundled("models") and Path(what).is_dir()):
+    if what.endswith(".npz") or (what not in bundled_documents("models") and Path(what).is_dir()):
         if integrator is not None:
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
         written = export_predictor(read_predictor(Path(what)), to, out, single=single, name=name)
     else:
         integrator = integrator or "rk4"
         if integrator not in ("euler", "rk4"):
-            raise DocumentError(f"no such rule: {choices(integrator, ('euler', 'rk4'))}", path="--integrator")
+            raise DocumentError(f"no such rule: {suggest_name(integrator, ('euler', 'rk4'))}", path="--integrator")
         vessel = load_vessel(what)
         written = export_vessel(vessel, to, out, integrator=integrator, single=single, name=name)  # type: ignore[arg-type]
     for file in written:
@@ -48,7 +48,7 @@ def export(
         typer.echo(f"{out / EXAMPLE} is there already and is kept; without it, an example is written")
 
 
-def aboard(
+def aboard_command(
     log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
     predictor: Annotated[Path, typer.Option("--predictor", help="a cell, FOLDER/cells/NAME.npz")],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.answer import Answer, Json, answering
-from shipid.cli.completion import files
-from shipid.cli.options import VesselName, assignments, command_line, parsed, stem
+from shipid.cli.answer import Answer, Json, open_answer
+from shipid.cli.completion import offer_files
+from shipid.cli.options import VesselName, command_line, document_stem, parse_assignments, parse_changes
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import digits, ended_by, motion_errors, steps, table
+from shipid.cli.terminal import end_on_interrupt, four_digits, motion_errors, show_steps, text_table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import interval_text, listed, plural
+from shipid.units import interval_text, join_names, plural_word
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from shipid.vessel.load import Vessel
 
 
-def identify(
+def identify_command(
     vessel: VesselName,
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=offer_files(".parquet"))],
     parameters: Annotated[
         list[str] | None,
         typer.Option(
@@ -101,40 +101,40 @@ def identify(
         raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
     if band is not None and not 0 < band < 1:
         raise ShipidError(f"{band:g}: must be between 0 and 1, such as 0.9", path="--band")
-    file = out or Path(f"{stem(vessel)}-{'structure' if structures else 'identified'}.toml")
+    file = out or Path(f"{document_stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     check_new(file, "vessel" if structures else "patch")
     check_ending(html, ".html")
     check_output(file, [], "--out")
     given: dict[str, Any] = {
-        "parameters": parameters and _paths(parameters),
-        "fixed": fixed and _paths(fixed),
-        "together": together and [_paths([group]) for group in together],
-        "prior": prior and assignments(prior, "--prior", "paths=0.3"),
-        "bounds": bounds and assignments(bounds, "--bounds", "paths=[0.5,2]"),
-        "nuisance": nuisance and _widths(nuisance),
+        "parameters": parameters and _split_paths(parameters),
+        "fixed": fixed and _split_paths(fixed),
+        "together": together and [_split_paths([group]) for group in together],
+        "prior": prior and parse_assignments(prior, "--prior", "paths=0.3"),
+        "bounds": bounds and parse_assignments(bounds, "--bounds", "paths=[0.5,2]"),
+        "nuisance": nuisance and _nuisance_widths(nuisance),
         "horizon": horizon,
     }
     options = {key: value for key, value in given.items() if value is not None}
     if structures is not None and settings is None and parameters is None:
         options["parameters"] = ["hull.*"]
-    declared = read_settings(settings, options | parsed(changes))
+    declared = read_settings(settings, options | parse_changes(changes))
     ship, log = load_vessel(vessel), read_dataset(dataset)
-    names = [] if structures is None else _structures(structures)
+    names = [] if structures is None else _structure_names(structures)
     how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
     how |= {} if folds is None else {"folds": folds}
     if structures is None:
-        with _of_settings(settings):
+        with _errors_of_settings(settings):
             check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
     elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
         raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
     else:
         comparable(log, declared, names, **how)
-    with answering(as_json) as answer, _of_settings(settings):
-        _look(ship, log, runs or (), test or (), answer)
+    with open_answer(as_json) as answer, _errors_of_settings(settings):
+        _look_first(ship, log, runs or (), test or (), answer)
         if structures is not None:
-            _compare(ship, log, declared, names, how, band, file, html, dataset, answer)
+            _compare_structures(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
-        with ended_by(), steps("cutting runs") as say:
+        with end_on_interrupt(), show_steps("cutting runs") as say:
             outcome = run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
                 programme=design, band=band,
@@ -143,7 +143,7 @@ def identify(
         _show_identified(outcome, answer)
         write_patch(outcome, file)
         count = len(outcome.solution.values)
-        answer.say(f"{count} {plural(count, 'number')} as a patch on {ship.key} -> {file}", file=file)
+        answer.say(f"{count} {plural_word(count, 'number')} as a patch on {ship.key} -> {file}", file=file)
         if html is not None:
             from shipid.identification.contents import identification_content
             from shipid.report.identification import write_identification
@@ -153,7 +153,7 @@ def identify(
 
 
 @contextmanager
-def _of_settings(settings: Path | None) -> Iterator[None]:
+def _errors_of_settings(settings: Path | None) -> Iterator[None]:
     """Errors of the block of settings are those of its file, where it has one."""
     try:
         yield
@@ -163,18 +163,18 @@ def _of_settings(settings: Path | None) -> Iterator[None]:
         raise DocumentError(error.message, file=settings, path=error.path) from None
 
 
-def _paths(given: Sequence[str]) -> list[str]:
+def _split_paths(given: Sequence[str]) -> list[str]:
     return [path.strip() for words in given for path in words.split(",")]
 
 
-def _structures(given: str) -> list[str]:
+def _structure_names(given: str) -> list[str]:
     """Names of the structures of `--structures`."""
     from shipid.identification.structures import PRESENT, STRUCTURES
 
     return [PRESENT, *STRUCTURES] if given == "all" else [name.strip() for name in given.split(",")]
 
 
-def _compare(
+def _compare_structures(
     ship: Vessel,
     log: Dataset,
     declared: Identify,
@@ -190,7 +190,7 @@ def _compare(
     from shipid.identification.statistics import LEVEL
     from shipid.study.structures import compare_structures, structures_content, write_chosen
 
-    with ended_by(), steps() as say:
+    with end_on_interrupt(), show_steps() as say:
         compared = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)
     _show_structures(compared, answer)
     written = write_chosen(compared, file)
@@ -215,30 +215,30 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
             row["structure"],
             str(row["numbers"]),
             *motion_errors(row),
-            digits(row["more"]),
+            four_digits(row["more"]),
             interval_text(row["low"], row["high"]) if row["low"] == row["low"] else "-",
-            digits(row["test"]),
+            four_digits(row["test"]),
             row["note"],
         ]
         for row in compared.table.to_dict("records")
     ]
     heads = ["structure", "numbers", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]", "more [m]", "95 % interval"]
-    answer.rows("structures", compared.table, table([*heads, "test runs [m]", ""], rows))
+    answer.rows("structures", compared.table, text_table([*heads, "test runs [m]", ""], rows))
     known = [row for row in compared.manoeuvres.to_dict("records") if row["measure"]]
     names = [name for name in compared.table["structure"] if name in {row["structure"] for row in known}]
     wide = {(row["manoeuvre"], row["measure"]): row for row in compared.spread.to_dict("records")}
     rows = []
     for place in dict.fromkeys((row["manoeuvre"], row["measure"]) for row in known):
         by = {row["structure"]: row for row in known if (row["manoeuvre"], row["measure"]) == place}
-        cells = [_with_interval(by[name]) if name in by else "-" for name in names]
-        two = [digits(wide[place][name]) if place in wide else "-" for name in ("spread", "width")]
+        cells = [_value_with_interval(by[name]) if name in by else "-" for name in names]
+        two = [four_digits(wide[place][name]) if place in wide else "-" for name in ("spread", "width")]
         rows.append([*place, *cells, *two, next(iter(by.values()))["unit"]])
     heads = ["calm water", "measure", *names, "between", "within", "unit"]
-    answer.rows("manoeuvres", compared.manoeuvres, table(heads, rows))
+    answer.rows("manoeuvres", compared.manoeuvres, text_table(heads, rows))
     answer.say("between: range over the structures not shown to be worse; within: the widest interval of one of them")
     if len(compared.groups):
         answer.say(f"Errors of {compared.chosen} by side, helm and speed, on runs that the fit has not seen:")
-        answer.rows("groups", compared.groups, table(list(HEADS), shown(compared.groups)))
+        answer.rows("groups", compared.groups, text_table(list(HEADS), shown(compared.groups)))
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
     answer.rows("spread", compared.spread, None)
     notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & (compared.manoeuvres["measure"] == "")]
@@ -252,12 +252,12 @@ def _show_structures(compared: Compared, answer: Answer) -> None:
         typer.echo(f"warning: {warning}", err=True)
 
 
-def _with_interval(row: Any) -> str:
+def _value_with_interval(row: Any) -> str:
     within = f" ({interval_text(row['low'], row['high'])})" if row["low"] == row["low"] else ""
-    return f"{digits(row['value'])}{within}"
+    return f"{four_digits(row['value'])}{within}"
 
 
-def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
+def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
     """Say before anything is fitted whether the vessel predicts the log better than constant u, v, r."""
     from shipid.errors import DataError
     from shipid.identification.outcome import pick_runs, without_shared
@@ -266,7 +266,7 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     try:
-        with steps("comparing the vessel as it is with the runs, before the fit"):
+        with show_steps("comparing the vessel as it is with the runs, before the fit"):
             ahead, step = proposed_horizon(ship, log)
             look = first_look(ship, log, fitted, ahead=ahead, step=step)
     except DataError:
@@ -278,14 +278,14 @@ def _look(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], 
     answer.say(first_look=look.sentence)
 
 
-def _widths(given: list[str]) -> list[str] | dict[str, Any]:
+def _nuisance_widths(given: list[str]) -> list[str] | dict[str, Any]:
     """Return the names; or name -> width if any has one, with the default width for the others."""
     if not any("=" in name for name in given):
         return given
     from shipid.identification.settings import WIDE
 
     named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
-    return named | assignments([name for name in given if "=" in name], "--nuisance", "current=0.3")
+    return named | parse_assignments([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
 def _show_nuisances(outcome: Identified, answer: Answer) -> None:
@@ -297,11 +297,11 @@ def _show_nuisances(outcome: Identified, answer: Answer) -> None:
     scalars = dict.fromkeys(name for numbers in of_runs.values() for name in numbers if name in UNITS_OF_NUISANCES)
     if not rows:
         return
-    shown = [[run, *(digits(numbers[name]) for name in scalars)] for run, numbers in of_runs.items()]
+    shown = [[run, *(four_digits(numbers[name]) for name in scalars)] for run, numbers in of_runs.items()]
     heads = [f"{name.replace('_', ' ')} [{UNITS_OF_NUISANCES[name]}]" for name in scalars]
     if scalars:
         answer.say("Unknowns of each run, estimated beside the factors:")
-    answer.rows("nuisances", rows, table(["run", *heads], shown) if scalars else None)
+    answer.rows("nuisances", rows, text_table(["run", *heads], shown) if scalars else None)
 
 
 def _show_identified(outcome: Identified, answer: Answer) -> None:
@@ -314,7 +314,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     _show_manoeuvres(outcome, answer)
     if len(outcome.groups):
         answer.say(f"Errors by side, helm and speed, on {'runs held out' if outcome.held_out else 'the fitted runs'}:")
-        answer.rows("groups", outcome.groups, table(list(HEADS), shown(outcome.groups)))
+        answer.rows("groups", outcome.groups, text_table(list(HEADS), shown(outcome.groups)))
     if outcome.solution.effective:
         worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
         counts = dict(outcome.solution.effective)
@@ -355,12 +355,12 @@ def _show_estimates(outcome: Identified, answer: Answer) -> None:
         for row in outcome.estimates.to_dict("records")
     ]
     columns = ["parameter", "unit", "base", "estimate", "factor", "std error", "95 % interval", "identified"]
-    answer.rows("estimates", outcome.estimates, table(columns, rows))
+    answer.rows("estimates", outcome.estimates, text_table(columns, rows))
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
     none = outcome.estimates.loc[outcome.estimates["base"] == 0, "name"].tolist()
     answer.say(
         f"Factors are relative to the base, and so are errors and intervals, by {words[outcome.statistics.chosen]}."
-        + (f" The base has 0 for {listed(none)}: there they are relative to the scale." if none else ""),
+        + (f" The base has 0 for {join_names(none)}: there they are relative to the scale." if none else ""),
         standard_errors_by=outcome.statistics.chosen,
     )
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
@@ -378,7 +378,7 @@ def _show_free_runs(outcome: Identified, answer: Answer) -> None:
         for row in outcome.errors.to_dict("records")
         if row["run"] == ALL
     ]
-    answer.rows("free_runs", outcome.errors, table(heads, rows))
+    answer.rows("free_runs", outcome.errors, text_table(heads, rows))
     if len(outcome.outputs):
         columns = {"output": "measured output", "unit": "unit", "measured": "rms", "before": "error before"}
         answer.records("outputs", outcome.outputs, columns | {"after": "after"})
@@ -389,7 +389,7 @@ def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
     banded = "low" in outcome.manoeuvres
     compared = [
         [
-            *(row["manoeuvre"], row["measure"], digits(row["before"]), digits(row["after"])),
+            *(row["manoeuvre"], row["measure"], four_digits(row["before"]), four_digits(row["after"])),
             *([interval_text(row["low"], row["high"]) if row["low"] == row["low"] else "-"] if banded else []),
             *(row["unit"], row["note"]),
         ]
@@ -397,7 +397,7 @@ def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
         if row["measure"]
     ]
     heads = ["calm water", "measure", "before", "after", *["band"] * banded, "unit", "note"]
-    answer.rows("manoeuvres", outcome.manoeuvres, table(heads, compared) if compared else None)
+    answer.rows("manoeuvres", outcome.manoeuvres, text_table(heads, compared) if compared else None)
     refused = outcome.manoeuvres[outcome.manoeuvres["measure"] == ""]
     for note, titles in refused.groupby("note", sort=False)["manoeuvre"]:
         typer.echo(f"note: no {', '.join(titles)}: {note}", err=True)

@@ -10,23 +10,25 @@ from typing import Annotated, Any
 
 import typer
 
-from shipid.cli.completion import bundled_or_file, files
+from shipid.cli.completion import offer_documents, offer_files
 from shipid.errors import DocumentError, ShipidError
 
 HIGHEST = 0.99  # level of the bands of a predictor; `shipid.hybrid.bands.LEVELS` ends there
 VesselName = Annotated[
     str,
     typer.Argument(
-        help="bundled name, or path of a vessel or patch document", autocompletion=bundled_or_file("models")
+        help="bundled name, or path of a vessel or patch document", autocompletion=offer_documents("models")
     ),
 ]
 StudyName = Annotated[
-    str, typer.Argument(help="bundled study or path of one", autocompletion=bundled_or_file("studies"))
+    str, typer.Argument(help="bundled study or path of one", autocompletion=offer_documents("studies"))
 ]
 MappingName = Annotated[
-    str, typer.Argument(help="bundled mapping or path of one", autocompletion=bundled_or_file("studies/mappings"))
+    str, typer.Argument(help="bundled mapping or path of one", autocompletion=offer_documents("studies/mappings"))
 ]
-Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d", autocompletion=files())]
+Folder = Annotated[
+    Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d", autocompletion=offer_files())
+]
 Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
 Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
 Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]
@@ -36,21 +38,21 @@ Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 _ASSIGNMENT = re.compile(r"(.*?[^<>=])=(?!=)(.*)", re.DOTALL)  # not the sign of a comparison
 
 
-def parsed(changes: list[str] | None) -> dict[str, Any]:
+def parse_changes(changes: list[str] | None) -> dict[str, Any]:
     """Return path -> value of `path=value` texts; a value is read as TOML, or taken as text."""
-    return assignments(changes or [], "--set", "--set path=value, such as --set grid.N_D=[10,30]", text=True)
+    return parse_assignments(changes or [], "--set", "--set path=value, such as --set grid.N_D=[10,30]", text=True)
 
 
-def assignments(given: list[str], option: str, example: str, *, text: bool = False) -> dict[str, Any]:
+def parse_assignments(given: list[str], option: str, example: str, *, text: bool = False) -> dict[str, Any]:
     """Return path -> value of `path=value` texts, the value TOML, or also text; paths may hold a comparison."""
-    from shipid.document import check_values, loads
+    from shipid.document import check_values, parse_toml
 
     result: dict[str, Any] = {}
     for pair in given:
         match = _ASSIGNMENT.fullmatch(pair)
         path = match[1].strip() if match else ""
         try:
-            value = loads(f"value = {match[2]}")["value"] if match else None
+            value = parse_toml(f"value = {match[2]}")["value"] if match else None
         except DocumentError:
             value = match[2] if match and text else None
         if not path or value is None:
@@ -79,7 +81,7 @@ def check_band(level: float | None, kind: str | None, adaptive: float | None) ->
         )
 
 
-def stem(name: str | Path) -> str:
+def document_stem(name: str | Path) -> str:
     """Return the name of a document or dataset without folder and ending; a dot in a vessel's name is no ending."""
     return Path(name).name.removesuffix(".toml").removesuffix(".parquet")
 

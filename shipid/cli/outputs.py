@@ -12,7 +12,7 @@ import typer
 import typer.core
 
 from shipid.errors import ShipidError
-from shipid.interrupts import recognised
+from shipid.interrupts import raise_interrupts
 
 OUTPUTS = ("out", "csv", "html", "log", "save")
 """Names of options that say what to write."""
@@ -28,7 +28,7 @@ NO_NUMBER = {
 """What Pydantic calls a mistake -> what would be right."""
 
 
-class Guarded(typer.core.TyperCommand):
+class GuardedCommand(typer.core.TyperCommand):
     """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -54,17 +54,17 @@ class Guarded(typer.core.TyperCommand):
                     raise ShipidError(f"{value:g}: must be a finite number", path=path)
         options = {one.name for one in self.params if one.param_type_name == "option"}
         written = {name: value for name, value in ctx.params.items() if name in OUTPUTS and name in options and value}
-        read = [one for name, value in ctx.params.items() if name not in written for one in _files(value)]
+        read = [one for name, value in ctx.params.items() if name not in written for one in _existing_files(value)]
         for name, value in written.items():
             check_output(Path(value), read, f"--{name}")
             read.append(Path(value))
-        with recognised():
+        with raise_interrupts():
             return super().invoke(ctx)
 
 
 def check_output(file: Path, read: Iterable[Path], option: str) -> None:
     """Raise ShipidError where a file to write is one of those that are read, is no file, or cannot be there."""
-    if any(_same(file, one) for one in read):
+    if any(_is_same_file(file, one) for one in read):
         message = "is named twice, and would be written over: name another file to write"
         raise ShipidError(message, file=file, path=option)
     if file.exists() and not (file.is_file() or file.is_dir()):
@@ -75,7 +75,7 @@ def check_output(file: Path, read: Iterable[Path], option: str) -> None:
     if not os.access(folder.parent if folder.is_file() else folder, os.W_OK | os.X_OK):
         message = "is in a folder that this user may not write into: name another place to write"
         raise ShipidError(message, file=file, path=option)
-    if file.is_file() and (results := results_of(file)) is not None:
+    if file.is_file() and (results := results_folder(file)) is not None:
         message = f"belongs to the results in {results}, and would be written over: name another file to write"
         raise ShipidError(message, file=file, path=option)
 
@@ -86,12 +86,12 @@ def check_ending(file: Path | None, ending: str) -> None:
         raise ShipidError(f"{ENDINGS[ending]}: let the name end in {ending}", file=file)
 
 
-def results_of(file: Path) -> Path | None:
+def results_folder(file: Path) -> Path | None:
     """The folder of results that a file belongs to, if it does."""
     return next((one for one in file.absolute().parents if all((one / name).is_file() for name in RESULTS)), None)
 
 
-def _files(value: Any) -> Iterator[Path]:
+def _existing_files(value: Any) -> Iterator[Path]:
     """Files that exist among the values of a parameter."""
     for one in value if isinstance(value, list | tuple) else [value]:
         if isinstance(one, Path | str) and one and len(str(one)) < 4096 and "\0" not in str(one):
@@ -102,7 +102,7 @@ def _files(value: Any) -> Iterator[Path]:
                 continue
 
 
-def _same(one: Path, other: Path) -> bool:
+def _is_same_file(one: Path, other: Path) -> bool:
     try:
         return one.resolve() == other.resolve() or one.samefile(other)
     except (OSError, RuntimeError):  # not there, or a link to itself

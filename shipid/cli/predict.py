@@ -7,17 +7,19 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.completion import cells
+from shipid.cli.completion import offer_cells
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
 from shipid.cli.outputs import check_output
 from shipid.errors import ShipidError
-from shipid.units import percent
+from shipid.units import percent_text
 
 
-def predict(
+def predict_command(
     folder: Folder,
     log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
-    cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet", autocompletion=cells)],
+    cell: Annotated[
+        str, typer.Option(help="cell whose predictor to use; see results.parquet", autocompletion=offer_cells)
+    ],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv; default: <cell>.parquet")] = None,
     level: Annotated[
@@ -41,5 +43,7 @@ def predict(
     if frame.attrs["gaps"]:
         typer.echo(f"{frame.attrs['gaps']}: a past over one of them is interpolated")
     if outside:
-        sentence = f"{percent(outside)} of the instants lie outside what the cell was trained on (column `outside`)"
+        sentence = (
+            f"{percent_text(outside)} of the instants lie outside what the cell was trained on (column `outside`)"
+        )
         typer.echo(sentence + (": no band is promised there" if level is not None else ""))

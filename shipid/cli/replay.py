@@ -7,17 +7,17 @@ from typing import Annotated, Literal
 
 import typer
 
-from shipid.cli.answer import Json, answering
-from shipid.cli.completion import files
-from shipid.cli.options import VesselName, command_line, stem
+from shipid.cli.answer import Json, open_answer
+from shipid.cli.completion import offer_files
+from shipid.cli.options import VesselName, command_line, document_stem
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import motion_errors, table
+from shipid.cli.terminal import motion_errors, text_table
 from shipid.errors import ShipidError
 
 
-def replay(
+def replay_command(
     vessel: VesselName,
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=files(".parquet"))],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=offer_files(".parquet"))],
     runs: Annotated[
         list[str] | None, typer.Option("--run", help="runs, * for any part of a name; default: all")
     ] = None,
@@ -44,7 +44,7 @@ def replay(
     from shipid.version import __version__
     from shipid.vessel.load import load_vessel
 
-    file = out or Path(f"{stem(vessel)}-replay.html")
+    file = out or Path(f"{document_stem(vessel)}-replay.html")
     check_ending(file, ".html")
     check_output(file, [], "--out")
     if not step > 0:
@@ -76,7 +76,7 @@ def replay(
         },
         command=command_line(),
     )
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
         heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
         answer.say(assumed=zero, late=None if late is None else late.words)
@@ -90,7 +90,7 @@ def replay(
             answer.say(f"{holes}: orders are held there")
         if late is not None:
             answer.say(f"{late.words}: the turns are late; compare with --commands between")
-        answer.rows("errors", replayed.errors.drop(columns="model"), table(heads, rows))
+        answer.rows("errors", replayed.errors.drop(columns="model"), text_table(heads, rows))
         if csv is not None:
             write_table(csv, replayed.series)
             answer.say(f"motions -> {csv}", csv=csv)

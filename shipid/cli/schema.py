@@ -10,7 +10,7 @@ import typer
 from shipid.errors import ShipidError
 
 
-def schema(
+def schema_command(
     name: Annotated[Literal["vessel", "study", "mapping", "settings"], typer.Argument(help="kind of document")],
     out: Annotated[Path | None, typer.Option(help="JSON file to write; default: standard output")] = None,
 ) -> None:
@@ -19,9 +19,9 @@ def schema(
     from shipid.files import json_text, write_json
 
     if out is None:
-        typer.echo(json_text(schemas.schema(name)))
+        typer.echo(json_text(schemas.document_schema(name)))
     elif out.suffix != ".json":
         raise ShipidError("a schema is a JSON file: let the name end in .json", file=out)
     else:
-        write_json(out, schemas.schema(name))
+        write_json(out, schemas.document_schema(name))
         typer.echo(f"schema -> {out}")

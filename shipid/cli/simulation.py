@@ -7,22 +7,22 @@ from typing import Annotated, Any
 
 import typer
 
-from shipid.cli.answer import Json, answering
-from shipid.cli.completion import bundled_or_file
-from shipid.cli.options import Changes, VesselName, command_line, parsed, stem
+from shipid.cli.answer import Json, open_answer
+from shipid.cli.completion import offer_documents
+from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import criterion_table, measure_table, table
+from shipid.cli.terminal import criterion_table, measure_table, text_table
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import plural
+from shipid.units import plural_word
 
 
-def simulate(
+def simulate_command(
     name: Annotated[
         str,
         typer.Argument(
             metavar="STUDY|VESSEL",
             help="bundled name or path of a study with a [truth]; with --manoeuvres of a vessel",
-            autocompletion=bundled_or_file("studies"),
+            autocompletion=offer_documents("studies"),
         ),
     ],
     out: Annotated[
@@ -42,30 +42,30 @@ def simulate(
     elif changes:
         raise ShipidError("changes a study: write the document of manoeuvres as it is meant", path="--set")
     else:
-        _simulate_vessel(name, manoeuvres, out or Path(f"{stem(name)}-simulated.csv"), as_json)
+        _simulate_vessel(name, manoeuvres, out or Path(f"{document_stem(name)}-simulated.csv"), as_json)
 
 
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
     """A log of a vessel: manoeuvres by a document."""
     from shipid.data.dataset import Dataset, write_dataset
     from shipid.files import check_table, write_table
-    from shipid.simulation.scripted import simulated
+    from shipid.simulation.scripted import simulate_script
     from shipid.vessel.load import load_vessel
 
     check_table(out)
     check_output(out, [], "--out")
     ship = load_vessel(vessel)
     dataset = Dataset(
-        simulated(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
+        simulate_script(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
     )
     if out.suffix == ".parquet":
         write_dataset(dataset, out)
     else:
         write_table(out, dataset.frame)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
         answer.say(
-            f"{ship.name}: {counts['runs']} {plural(counts['runs'], 'run')}, {counts['rows']} rows -> {out}",
+            f"{ship.name}: {counts['runs']} {plural_word(counts['runs'], 'run')}, {counts['rows']} rows -> {out}",
             file=out,
             **counts,
         )
@@ -79,7 +79,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     from shipid.study.prepare import obtain, partition, runs_by_amount
 
     check_ending(out, ".parquet")
-    plan = read_plan(study, parsed(changes))
+    plan = read_plan(study, parse_changes(changes))
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
     file = out or Path(f"{plan.name}.parquet")
@@ -90,25 +90,27 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     ranges = envelope_table(rows_of_sets, plan.study.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [
-        [str(name), *(_limits(part[part["quantity"] == quantity]) for quantity in units)]
+        [str(name), *(_range_words(part[part["quantity"] == quantity]) for quantity in units)]
         for name, part in ranges.groupby("set", sort=False)
     ]
     write_dataset(dataset, file)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
         answer.say(
-            f"{counts['runs']} {plural(counts['runs'], 'run')}, {counts['rows']} rows -> {file}", file=file, **counts
+            f"{counts['runs']} {plural_word(counts['runs'], 'run')}, {counts['rows']} rows -> {file}",
+            file=file,
+            **counts,
         )
         answer.say("least / mean / greatest at the instants of prediction:")
         heads = ["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())]
-        answer.rows("envelope", ranges, table(heads, rows))
+        answer.rows("envelope", ranges, text_table(heads, rows))
 
 
-def _limits(row: Any) -> str:
+def _range_words(row: Any) -> str:
     return " / ".join(f"{row[name].iloc[0]:.1f}" for name in ("min", "mean", "max")) if len(row) else ""
 
 
-def manoeuvre(
+def manoeuvre_command(
     vessel: VesselName,
     name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
     angles: Annotated[
@@ -140,11 +142,11 @@ def manoeuvre(
     from shipid.data.dataset import Dataset, write_dataset
     from shipid.files import check_table, write_table
     from shipid.report.manoeuvre import write_manoeuvre
-    from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
+    from shipid.simulation.measured import approach_words, manoeuvre_content, measure_standard
     from shipid.vessel.load import load_vessel
 
     check_ending(log, ".parquet")
-    out = out or Path(f"{stem(vessel)}-{name}.html")
+    out = out or Path(f"{document_stem(vessel)}-{name}.html")
     check_ending(out, ".html")
     check_output(out, [], "--out")
     if csv is not None:
@@ -154,9 +156,9 @@ def manoeuvre(
         ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
     )
     title, approached_by = done.standard.title, done.standard.manoeuvre
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.say(
-            f"{ship.name}: {title}, {approached(done)}",
+            f"{ship.name}: {title}, {approach_words(done)}",
             title=title,
             approach=approached_by.approach,
             speed=done.standard.speed,

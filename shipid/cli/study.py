@@ -10,13 +10,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from shipid.cli.answer import Answer, Json, answering
-from shipid.cli.completion import bundled_or_file, files
-from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, parsed, stem
+from shipid.cli.answer import Answer, Json, open_answer
+from shipid.cli.completion import offer_documents, offer_files
+from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, document_stem, parse_changes
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import counted, digits, draw, ended_by, short, show_reasons, steps, table
+from shipid.cli.terminal import (
+    count_blocks,
+    draw_events,
+    end_on_interrupt,
+    four_digits,
+    print_reasons,
+    shorten_text,
+    show_steps,
+    text_table,
+)
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import decimals_for, decimals_of, length_text, level_text, percent, plural
+from shipid.units import digit_decimals, length_decimals, length_text, level_text, percent_text, plural_word
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -33,10 +42,13 @@ FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "cla
 @app.command("list")
 def study_list(as_json: Json = False) -> None:
     """List the bundled studies."""
-    from shipid.document import bundled, read
+    from shipid.document import bundled_documents, read_document
 
-    rows = [{"name": name, "question": read(file)["question"]} for name, file in bundled("studies").items()]
-    with answering(as_json) as answer:
+    rows = [
+        {"name": name, "question": read_document(file)["question"]}
+        for name, file in bundled_documents("studies").items()
+    ]
+    with open_answer(as_json) as answer:
         answer.records("studies", rows)
 
 
@@ -45,7 +57,7 @@ def study_new(
     vessel: Annotated[
         list[str],
         typer.Option(
-            help="bundled name, or path of a vessel or patch; may be repeated", autocompletion=bundled_or_file("models")
+            help="bundled name, or path of a vessel or patch; may be repeated", autocompletion=offer_documents("models")
         ),
     ],
     data: Annotated[
@@ -57,22 +69,22 @@ def study_new(
     as_json: Json = False,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
-    from shipid.files import as_argument, check_new, write_new
-    from shipid.schemas import with_schema
+    from shipid.files import check_new, quote_argument, write_new
+    from shipid.schemas import add_schema_line
     from shipid.study.new import draft_study
 
-    file = out or Path(f"{stem(data or vessel[0])}-study.toml")
+    file = out or Path(f"{document_stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
     check_output(file, [], "--out")
     draft = draft_study(vessel, data, file)
-    write_new(with_schema(draft.text, file, "study"), file, "study")
-    with answering(as_json) as answer:
+    write_new(add_schema_line(draft.text, file, "study"), file, "study")
+    with open_answer(as_json) as answer:
         choices = [
-            {"path": choice.path, "value": _written(choice.value), "why": choice.why} for choice in draft.choices
+            {"path": choice.path, "value": _toml_text(choice.value), "why": choice.why} for choice in draft.choices
         ]
         answer.say(choices=choices)
         if not as_json:
-            show_reasons(choices)
+            print_reasons(choices)
         for warning in draft.warnings:
             typer.echo(f"warning: {warning}", err=True)
         for look in draft.looks.values():
@@ -81,10 +93,10 @@ def study_new(
         models = [model.name for model in draft.plan.foundations]
         sentence = f"{draft.plan.cells} cells of {len(models)} foundations ({', '.join(models)}) -> {file}"
         answer.say(sentence, file=file, cells=draft.plan.cells, foundations=models, warnings=draft.warnings)
-        answer.say(f"run it with: shipid study run {as_argument(file)}")
+        answer.say(f"run it with: shipid study run {quote_argument(file)}")
 
 
-def _written(value: Any) -> str:
+def _toml_text(value: Any) -> str:
     """A value as the study document has it; a text alone without quotes."""
     from tomlkit import item
 
@@ -113,7 +125,7 @@ def study_variants(
 
     if save is not None:
         check_empty(save)
-    plan = read_plan(study, parsed(changes))
+    plan = read_plan(study, parse_changes(changes))
     models, scores = plan.foundations, {}
     if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
         prepared = prepare(plan, obtain(plan))
@@ -131,16 +143,16 @@ def study_variants(
         }
         for model in models
     ]
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         heads = ["foundation", "A [m]", "changed", "factors"]
-        answer.rows("foundations", foundations, table(heads, map(_factors, foundations)))
+        answer.rows("foundations", foundations, text_table(heads, map(_factor_words, foundations)))
         if save is not None:
             from shipid.study.store import write_patches
 
             answer.say(f"{write_patches(save, models)} patches -> {save}", patches=save)
 
 
-def _factors(row: dict[str, Any]) -> list[str]:
+def _factor_words(row: dict[str, Any]) -> list[str]:
     """A foundation as words: its accuracy, how many numbers are changed, and by which factors."""
     if row["identified"]:
         return [row["foundation"], "-", "-", "identified from the runs of each cell, so A differs by cell"]
@@ -172,40 +184,40 @@ def study_screen(
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.engine.engines import ENGINES, REPEATED, named
+    from shipid.engine.engines import ENGINES, REPEATED, engine_by_name
     from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain, partition
 
     engine = "single" if single else REPEATED
-    named(engine, device)
+    engine_by_name(engine, device)
     if single and not ENGINES[engine].available():
         raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
-    plan, file = _before_work(study, changes, device, out, "screen")
+    plan, file = _prepare_command(study, changes, device, out, "screen")
     wanted, dataset = screen.families(plan, family), obtain(plan)
     cut = partition(plan, dataset)
     for note in screen.notes(plan, cut, wanted):
         typer.echo(note, err=True)
-    blocks = counted(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
+    blocks = count_blocks(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
     frame = screen.joined(list(blocks))
     write_table(file, frame)
     spread = screen.spread(frame)
-    shares = [percent(share) for share in screen.SHARES]
+    shares = [percent_text(share) for share in screen.SHARES]
     rows = [[*map(str, row[:3]), *map(length_text, row[3:])] for row in spread.itertuples(index=False)]
     correlations = screen.drivers(frame)
     pairs = [
         (str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in correlations.itertuples()
     ]
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
-        answer.rows("accuracy", spread, table(["family", "members", "diverged", *shares], rows))
+        answer.rows("accuracy", spread, text_table(["family", "members", "diverged", *shares], rows))
         if pairs:
             answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
-        shown = table(["family", "parameter", "factor", "distance"], pairs)
+        shown = text_table(["family", "parameter", "factor", "distance"], pairs)
         answer.rows("drivers", correlations, shown if pairs else None)
         for row in spread[~spread["family"].isin(correlations["family"])].to_dict("records"):
             count = row["members"] - row["diverged"]
-            answer.say(f"{row['family']}: {count} {plural(count, 'member shows', 'members show')} no driver of A")
+            answer.say(f"{row['family']}: {count} {plural_word(count, 'member shows', 'members show')} no driver of A")
         answer.say(f"{len(frame)} members -> {file}", file=file)
 
 
@@ -226,7 +238,7 @@ def study_rotate(
     from shipid.files import write_table
     from shipid.study.prepare import obtain
 
-    plan, file = _before_work(study, changes, device, out, "rotate")
+    plan, file = _prepare_command(study, changes, device, out, "rotate")
     dataset = obtain(plan)
     wanted = rotate.choose_turns(plan, dataset, tests)
     from shipid.study.plan import grid_seeds
@@ -237,7 +249,7 @@ def study_rotate(
     kept = rotate.kept_folder(file, plan, dataset, device)
     blocks = rotate.rotate(plan, dataset, wanted, device, kept)
     sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
-    frame = pd.concat(list(counted(blocks, cells, "cells", sentence)), ignore_index=True)
+    frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
     write_table(file, frame)
     rotate.remove_kept(kept)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
@@ -247,18 +259,18 @@ def study_rotate(
     for row in over.to_dict("records"):
         better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
         name = model_label(plan, row["foundation"], row["method"])
-        inside = "-" if row["coverage"] != row["coverage"] else percent(row["coverage"])
-        rows.append([name, *(digits(row[column]) for column in columns), inside, better])
+        inside = "-" if row["coverage"] != row["coverage"] else percent_text(row["coverage"])
+        rows.append([name, *(four_digits(row[column]) for column in columns), inside, better])
     band = f"in band of {level_text(plan.study.bands.level)}"
     heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
     verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
     from shipid.study.plan import families_set_from
 
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
-        answer.rows("turns", over, table(heads, rows))
-        answer.say(f"constant u, v, r: {digits(naive)} m", naive=naive)
+        answer.rows("turns", over, text_table(heads, rows))
+        answer.say(f"constant u, v, r: {four_digits(naive)} m", naive=naive)
         if words := rotate.repeated_runs_in_words(plan, dataset):
             answer.say(words, copied=words)
         if saw := families_set_from(plan, wanted):
@@ -267,7 +279,7 @@ def study_rotate(
             )
         if verdicts:
             answer.say("findings over the turns, in brackets 95 % intervals:")
-        shown = table(
+        shown = text_table(
             ["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in verdicts)
         )
         answer.rows("findings", verdicts, shown if verdicts else None)
@@ -293,10 +305,10 @@ def study_run(
         import_for_workers()  # before this process imports for itself
     from shipid.study.plan import read_plan
 
-    plan = read_plan(study, parsed(changes))
+    plan = read_plan(study, parse_changes(changes))
     from shipid.study.plan import default_folder
 
-    _run(plan, out or default_folder(plan), workers, scheduler, device, _shard(shard))
+    _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, _shard(shard))
 
 
 def _shard(text: str | None) -> tuple[int, int] | None:
@@ -320,7 +332,7 @@ def study_prepare(
     from shipid.study.plan import read_plan
     from shipid.study.run import prepare_study
 
-    plan = read_plan(study, parsed(changes))
+    plan = read_plan(study, parse_changes(changes))
     from shipid.study.plan import default_folder
 
     for event in prepare_study(plan, out or default_folder(plan), device=device):
@@ -337,7 +349,7 @@ def study_resume(
     """Continue an interrupted run."""
     from shipid.study.store import stored_plan
 
-    _run(stored_plan(folder), folder, workers, scheduler, device)
+    _run_to_report(stored_plan(folder), folder, workers, scheduler, device)
 
 
 @app.command("report")
@@ -345,7 +357,7 @@ def study_report(folder: Folder) -> None:
     """Write report.html, summary.md and results.parquet from what is stored."""
     from shipid.answer.pages import write_pages
 
-    with steps() as say:
+    with show_steps() as say:
         report = write_pages(folder, say)
     typer.echo(str(report))
 
@@ -356,7 +368,7 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
     from shipid.study.check import check_folder
 
     report = check_folder(folder)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         answer.say("\n".join(report.lines), lines=report.lines, faults=report.faults)
         if report.faults:
             raise typer.Exit(1)
@@ -366,7 +378,7 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
 def study_compare(
     folders: Annotated[
         list[Path],
-        typer.Argument(help="two or more folders of runs; the first is what others meet", autocompletion=files()),
+        typer.Argument(help="two or more folders of runs; the first is what others meet", autocompletion=offer_files()),
     ],
     pair: Annotated[
         list[str] | None,
@@ -385,18 +397,18 @@ def study_compare(
 
     if out is not None:
         check_table(out)
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         if pair is None and compare.are_worlds(folders):
             errors = _show_worlds(compare.read_worlds(folders), answer)
         else:
-            pairs = dict(_counterpart(one) for one in pair or ())
+            pairs = dict(_parse_counterpart(one) for one in pair or ())
             errors = _show_matched(compare.compare(folders, pairs), answer)
         if out is not None:
             write_table(out, errors)
             answer.say(f"{len(errors)} rows -> {out}", file=out)
 
 
-def _counterpart(pair: str) -> tuple[str, str]:
+def _parse_counterpart(pair: str) -> tuple[str, str]:
     first, equals, other = pair.partition("=")
     if not (first and equals and other):
         raise DocumentError(f"{pair!r}: write --pair FIRST=OTHER, such as --pair drawn=trained", path="--pair")
@@ -407,8 +419,8 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     """Show what differs between runs, and the errors of cells that match; returns these."""
     documents, errors = compared.documents, compared.errors
     answer.say("", folders=compared.names)
-    rows = [[short(str(text), 60) for text in row] for row in documents.itertuples(index=False)]
-    shown = table(["what differs", *compared.names], rows[:MOST_DIFFERENCES])
+    rows = [[shorten_text(str(text), 60) for text in row] for row in documents.itertuples(index=False)]
+    shown = text_table(["what differs", *compared.names], rows[:MOST_DIFFERENCES])
     answer.rows("documents", documents, shown if rows else None)
     if not rows:
         answer.say("the documents are equal")
@@ -429,9 +441,9 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
             *["in band"] * banded,
             "verdict",
         ]
-        places = max(3, *map(decimals_of, part[["first", "other"]].max(axis=1)))
-        lines = [_difference(row, places, banded) for row in part.to_dict("records")]
-        answer.rows("errors", errors, table(heads, lines))
+        places = max(3, *map(length_decimals, part[["first", "other"]].max(axis=1)))
+        lines = [_difference_words(row, places, banded) for row in part.to_dict("records")]
+        answer.rows("errors", errors, text_table(heads, lines))
         answer.say(
             f"verdict: lower or higher where the test shows it, corrected for {len(part)} rows; empty: it does not"
         )
@@ -441,13 +453,13 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     return errors
 
 
-def _difference(row: Mapping[Any, Any], places: int, banded: bool) -> list[str]:
+def _difference_words(row: Mapping[Any, Any], places: int, banded: bool) -> list[str]:
     """One row of a comparison as words, with so many decimals."""
     known = row["low"] == row["low"] and row["verdict"] != "identical"
     interval = f" [{row['low']:+.{places}f}, {row['high']:+.{places}f}]" if known else ""
     amount = "A" if row["N_D"] == 0 else str(row["N_D"])
     shares = row["coverage_first"], row["coverage_other"]
-    inside = ", ".join("-" if share != share else percent(share) for share in shares)
+    inside = ", ".join("-" if share != share else percent_text(share) for share in shares)
     return [
         *(row["family"], row["method"], amount, str(row["cells"])),
         *(f"{row[side]:.{places}f}" for side in ("first", "other")),
@@ -457,16 +469,16 @@ def _difference(row: Mapping[Any, Any], places: int, banded: bool) -> list[str]:
     ]
 
 
-def _with_ends(mean: float, low: float, high: float) -> str:
+def _length_with_ends(mean: float, low: float, high: float) -> str:
     """A length [m] with an interval, in the decimals of the length."""
-    places = decimals_of(mean)
+    places = length_decimals(mean)
     return f"{mean:.{places}f} [{low:.{places}f}, {high:.{places}f}]"
 
 
-def _to_three_digits(mean: float, low: float, high: float) -> str:
+def _number_with_ends(mean: float, low: float, high: float) -> str:
     """A number with its interval, if it has one, in the decimals that give the largest of them three digits."""
     size = max((abs(value) for value in (mean, low, high) if math.isfinite(value)), default=0.0)
-    places = decimals_for(size, 3)
+    places = digit_decimals(size, 3)
     interval = f" [{low:z.{places}f}, {high:z.{places}f}]" if math.isfinite(low) else ""
     return f"{mean:z.{places}f}{interval}"
 
@@ -479,18 +491,18 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     bands = errors[errors["width"].notna()]
     words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
     values = [
-        _to_three_digits(row["mean"], row["low"], row["high"]) if row["number"] else ""
+        _number_with_ends(row["mean"], row["low"], row["high"]) if row["number"] else ""
         for row in findings.to_dict("records")
     ]
-    shown = table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
+    shown = text_table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
     answer.rows("findings", findings, shown if len(findings) else None)
-    texts = [_with_ends(*numbers) for numbers in errors[["H", "H_low", "H_high"]].to_numpy()]
+    texts = [_length_with_ends(*numbers) for numbers in errors[["H", "H_low", "H_high"]].to_numpy()]
     several = bool(errors.duplicated(["family", "N_D"]).any())
     names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
     wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")
     wide = wide.reindex(names.unique()).fillna("-")
     columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
-    answer.rows("errors", errors, table(columns, wide.reset_index().to_numpy().tolist()))
+    answer.rows("errors", errors, text_table(columns, wide.reset_index().to_numpy().tolist()))
     if len(bands):
         level = worlds[0].plan.study.bands.level
         answer.say(
@@ -501,17 +513,17 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
         [
             *(str(row[name]) for name in ("family", "method", "N_D")),
             "{:.2f} [{:.2f}, {:.2f}]".format(*(row[f"coverage{end}"] for end in ("", "_low", "_high"))),
-            _with_ends(*(row[f"width{end}"] for end in ("", "_low", "_high"))),
+            _length_with_ends(*(row[f"width{end}"] for end in ("", "_low", "_high"))),
             str(row["worlds"]),
         ]
         for row in bands.to_dict("records")
     ]
     heads = ["family", "method", "N_D", "coverage", "width [m]", "worlds"]
-    answer.rows("bands", bands, table(heads, rows) if rows else None)
+    answer.rows("bands", bands, text_table(heads, rows) if rows else None)
     return errors
 
 
-def _before_work(
+def _prepare_command(
     study: str, changes: list[str] | None, device: str, out: Path | None, command: str
 ) -> tuple[Plan, Path]:
     """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
@@ -520,7 +532,7 @@ def _before_work(
     from shipid.study.plan import read_plan
 
     check_device(device)
-    plan = read_plan(study, parsed(changes))
+    plan = read_plan(study, parse_changes(changes))
     file = out or Path(f"{plan.name}-{command}.csv")
     check_table(file)
     from shipid.study.plan import input_files
@@ -529,7 +541,7 @@ def _before_work(
     return plan, file
 
 
-def _run(
+def _run_to_report(
     plan: Plan,
     folder: Path,
     workers: int | None,
@@ -538,20 +550,20 @@ def _run(
     shard: tuple[int, int] | None = None,
 ) -> None:
     from shipid.answer.pages import ANSWER, write_pages
-    from shipid.files import as_argument
+    from shipid.files import quote_argument
     from shipid.study import run, store
     from shipid.study.plan import program_of
     from shipid.study.progress import Watch
 
-    resume = f"{program_of(plan)} study resume {as_argument(folder)}"
-    with ended_by(f"interrupted; what is finished is kept. Continue with: {resume}"):
+    resume = f"{program_of(plan)} study resume {quote_argument(folder)}"
+    with end_on_interrupt(f"interrupted; what is finished is kept. Continue with: {resume}"):
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, shard=shard)
         with closing(events):  # where a line cannot be printed, the lock is given back before the process ends
-            draw(events, Watch(plan, folder))
+            draw_events(events, Watch(plan, folder))
     if shard is not None:
         typer.echo(f"shard {shard[0]} of {shard[1]} is finished. When all are: {resume}")
         return
-    with store.in_place(folder, plan), steps() as say:
+    with store.in_place(folder, plan), show_steps() as say:
         report = write_pages(folder, say)
     for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
         typer.echo(f"  {line}")

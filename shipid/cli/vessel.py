@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
-from shipid.cli.answer import Json, answering
+from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
-from shipid.cli.terminal import criterion_table, table
+from shipid.cli.terminal import criterion_table, text_table
 from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
@@ -19,10 +19,10 @@ app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled o
 @app.command("list")
 def vessel_list(as_json: Json = False) -> None:
     """List the bundled vessels."""
-    from shipid.document import bundled, read
+    from shipid.document import bundled_documents, read_document
 
-    rows = [{"name": name, "vessel": read(file)["name"]} for name, file in bundled("models").items()]
-    with answering(as_json) as answer:
+    rows = [{"name": name, "vessel": read_document(file)["name"]} for name, file in bundled_documents("models").items()]
+    with open_answer(as_json) as answer:
         answer.records("vessels", rows)
 
 
@@ -32,25 +32,25 @@ def vessel_show(
     as_json: Json = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
-    from shipid.vessel.load import load_vessel, sources
+    from shipid.vessel.load import load_vessel, term_sources
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
     ship = load_vessel(vessel)
     document = ship.document
-    origin = sources(ship)
+    origin = term_sources(ship)
     terms: list[dict[str, Any]] = [
         {"term": path, "kind": key.split(".")[1], "off": off, "source": origin[path]}
         for off in (False, True)
         for path, key, _ in term_blocks(document, off)
     ]
     known = {key: document["particulars"][key] for key in PARTICULARS if key in document.get("particulars", {})}
-    with answering(as_json) as answer:
+    with open_answer(as_json) as answer:
         words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
         answer.say("\n".join(filter(None, words)), name=ship.name, file=ship.file, digest=ship.digest)
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
         answer.say(f"particulars: {sentence}", particulars=known)
         rows = ((t["term"], t["kind"] + ", off" * t["off"], t["source"]) for t in terms)
-        answer.rows("terms", terms, table(["term", "kind", "source"], rows))
+        answer.rows("terms", terms, text_table(["term", "kind", "source"], rows))
         for path, _, block in term_blocks(document):
             if "table" in block:
                 omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
@@ -59,7 +59,7 @@ def vessel_show(
         answer.rows(
             "parameters",
             [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()],
-            table(["parameter", "value", "unit"], _parameter_rows(ship.parameters, ship.units)),
+            text_table(["parameter", "value", "unit"], _parameter_rows(ship.parameters, ship.units)),
         )
 
 
@@ -96,8 +96,8 @@ def vessel_new(
         raise ShipidError("exists already: choose another name", file=out)
     from shipid.document import check_values
     from shipid.files import write_text
-    from shipid.schemas import with_schema
-    from shipid.simulation.measured import trials
+    from shipid.schemas import add_schema_line
+    from shipid.simulation.measured import measure_trials
     from shipid.vessel.template import Particulars, first_guess
 
     check_values({"name": name or ""}, "vessel new")
@@ -106,8 +106,8 @@ def vessel_new(
         tunnel_thruster, scale,
     )  # fmt: skip
     guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
-    write_text(out, with_schema(guessed.text, out, "vessel"))
-    with answering(as_json) as answer:
+    write_text(out, add_schema_line(guessed.text, out, "vessel"))
+    with open_answer(as_json) as answer:
         count = len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)
         answer.say(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s", n=guessed.n, speed=given.service)
@@ -116,7 +116,7 @@ def vessel_new(
         else:
             grows = f"a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
             answer.say(f"course-UNSTABLE by these formulae: {grows}", growth=guessed.growth)
-        judged, notes = trials(guessed.vessel, given.service)
+        judged, notes = measure_trials(guessed.vessel, given.service)
         answer.say("\n".join(guessed.remarks), remarks=guessed.remarks)
         answer.rows("criteria", judged, criterion_table(judged, []) if judged else None)
         answer.say("\n".join(notes), notes=notes)

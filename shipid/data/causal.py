@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array, Dataset, stretches
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, suggest_name
 
 ROUNDING = 1e-7  # of a column's largest step: below it a second difference is zero
 
@@ -51,7 +51,7 @@ def causal_columns(dataset: Dataset, columns: Sequence[str] = ("u", "v")) -> Dat
     frame = dataset.frame.copy()
     for name in columns:
         if name not in frame:
-            raise DataError(f"missing column: {choices(name, list(map(str, frame.columns)))}", path=name)
+            raise DataError(f"missing column: {suggest_name(name, list(map(str, frame.columns)))}", path=name)
         whole = frame[name].to_numpy(dtype=float).copy()
         for _, rows in stretches(dataset):
             t, values = frame["t"].to_numpy()[rows], whole[rows]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.arguments import of_class
+from shipid.arguments import check_class
 from shipid.data.dataset import (
     Array,
     Dataset,
@@ -22,7 +22,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.lapses import Lapse, lapses
 from shipid.errors import DataError
-from shipid.physics.signals import row_of, turns_round
+from shipid.physics.signals import is_all_round, signal_row
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
@@ -52,7 +52,7 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     suspicious; it changes nothing. Limits are engineering judgement, and widened by what the noise of the log makes.
     Raises DataError for what is no dataset.
     """
-    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     by_run = pieces_by_run(dataset)
     motions = {run: _motion(stretches) for run, stretches in by_run.items()}
     faulty = _faulty_commands(dataset)
@@ -126,7 +126,7 @@ def _roughness(rows: pd.DataFrame, name: str, clock: bool) -> float:
 def _ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[dict[str, Any]]:
     """Whether values are plausible; those that others prove are, however large."""
     for name in map(str, stretches[0].columns):
-        row = row_of(name)
+        row = signal_row(name)
         if row is not None and row.plausible is not None:
             largest = max(float(rows[name].abs().max()) for rows in stretches)
             unit = unit_of(name) or ""
@@ -148,7 +148,7 @@ def _faulty_commands(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
     follows &= steps <= GAP * np.median(steps[follows])
     found: dict[str, list[dict[str, Any]]] = {}
     for name in dataset.commands:
-        values = np.concatenate([np.unwrap(rows[name]) if turns_round(name) else rows[name] for _, rows in parts])
+        values = np.concatenate([np.unwrap(rows[name]) if is_all_round(name) else rows[name] for _, rows in parts])
         by_run: dict[str, list[Lapse]] = {}
         for lapse in lapses(name, t, values, psi, follows):
             by_run.setdefault(runs[lapse.first], []).append(lapse)

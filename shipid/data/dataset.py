@@ -17,10 +17,10 @@ import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from shipid.arguments import names_of, of_class, path_of
-from shipid.errors import DataError, choices
-from shipid.files import open_file, read_arrow, whole
-from shipid.physics.signals import SIGNALS, is_command, is_output, named, signal_of, wraps
+from shipid.arguments import as_names, as_path, check_class
+from shipid.errors import DataError, suggest_name
+from shipid.files import open_file, read_arrow, replace_whole
+from shipid.physics.signals import SIGNALS, is_command, is_output, is_wrapped_angle, rows_of_role, signal_of
 
 Array = NDArray[np.float64]
 Rows = pd.DataFrame | Mapping[str, NDArray[Any]]
@@ -81,7 +81,7 @@ class Dataset:
 
         Names that no run has are passed over.
         """
-        names = names_of("runs", runs, DataError)
+        names = as_names("runs", runs, DataError)
         chosen = self.frame["run"].isin(names)
         if not chosen.any():
             raise DataError(f"no run is named {', '.join(names)}: there are {', '.join(self.runs)}", path="run")
@@ -243,7 +243,7 @@ def sample(rows: Rows, instants: Array) -> dict[str, NDArray[Any]]:
         if name == "flags" or is_command(name):
             result[name] = values[last]
         else:
-            result[name] = np.interp(instants, t, np.unwrap(values) if wraps(name) else values)
+            result[name] = np.interp(instants, t, np.unwrap(values) if is_wrapped_angle(name) else values)
     return result
 
 
@@ -335,8 +335,8 @@ def _check_column(name: str, column: pd.Series[Any]) -> None:
         right, wanted = pd.api.types.is_integer_dtype(column.dtype), "integers"
     elif unit is None:
         raise DataError(
-            f"unknown column: {choices(name, [*required(), *optional(), 'run', 'flags'])} "
-            f"(or <component>.<signal>, signals {', '.join((*named('command'), *named('output')))})",
+            f"unknown column: {suggest_name(name, [*required(), *optional(), 'run', 'flags'])} "
+            f"(or <component>.<signal>, signals {', '.join((*rows_of_role('command'), *rows_of_role('output')))})",
             path=name,
         )
     else:
@@ -357,8 +357,8 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     Raises DataError for a name that does not end in .parquet, for metadata that JSON cannot hold, or where the file
     cannot be written.
     """
-    of_class("dataset", dataset, Dataset, "such as Dataset(frame, metadata)", DataError)
-    target = path_of("file", file, DataError)
+    check_class("dataset", dataset, Dataset, "such as Dataset(frame, metadata)", DataError)
+    target = as_path("file", file, DataError)
     if target.suffix != ".parquet":
         raise DataError("a dataset is a Parquet file: let the name end in .parquet", file=target)
     metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
@@ -369,7 +369,7 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
     table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: text.encode()})
     try:
-        with whole(target) as part, part.open("wb") as stream:  # Arrow takes no name that is not UTF-8
+        with replace_whole(target) as part, part.open("wb") as stream:  # Arrow takes no name that is not UTF-8
             pyarrow.parquet.write_table(table, stream, compression="zstd")
     except OSError as error:
         raise DataError(f"cannot be written ({error.strerror or error})", file=target) from None
@@ -381,7 +381,7 @@ def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
 
     remedy : what else helps where the file is no Parquet file, added to the sentence that says so.
     """
-    file = path_of("file", file, DataError)
+    file = as_path("file", file, DataError)
     if os.path.isdir(file):
         raise DataError("is a folder: name one dataset; `shipid data join` makes one of several", file=file)
     try:

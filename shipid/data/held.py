@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from shipid.data.dataset import Array, Dataset
-from shipid.physics.signals import row_of
-from shipid.units import DEGREE, listed, plural
+from shipid.physics.signals import signal_row
+from shipid.units import DEGREE, join_names, plural_word
 
 NOISE = {True: 0.5 * DEGREE, False: 0.01}
 """Standard deviation that counts as none, of angles [rad] and as a share of others: assumed for measured feedback."""
@@ -25,7 +25,7 @@ def held_commands(dataset: Dataset, runs: Iterable[str]) -> tuple[str, ...]:
     by_run, held = frame.groupby("run", sort=False), []
     for name in dataset.commands:
         usual = by_run[name].median()
-        row = row_of(name)
+        row = signal_row(name)
         angle = row is not None and row.angle
         noise = NOISE[angle] * (1.0 if angle else float(usual.abs().max()))
         if (
@@ -51,9 +51,9 @@ def nothing_varies(dataset: Dataset, runs: Iterable[str]) -> list[str]:
     held = held_commands(dataset, runs)
     if not held or len(held) < len(dataset.commands):
         return []
-    are, do = plural(len(held), "is", "are"), plural(len(held), "it does", "they do")
+    are, do = plural_word(len(held), "is", "are"), plural_word(len(held), "it does", "they do")
     where = f"in all {len(runs)} runs" if len(runs) > 1 else "throughout the only run"
     return [
-        f"{listed(held)} {are} the same {where}: what {do} cannot be learnt from this log, nor can damping be told "
+        f"{join_names(held)} {are} the same {where}: what {do} cannot be learnt from this log, nor can damping be told "
         "from the force that steers, or resistance from thrust"
     ]

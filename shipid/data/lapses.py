@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
-from shipid.physics.signals import is_shaft, steers, turns_round
+from shipid.physics.signals import is_all_round, is_shaft, is_steering
 
 Rows = NDArray[np.bool_]
 
@@ -70,8 +70,8 @@ def _zeros_and_spikes(name: str, t: Array, values: Array, follows: Rows) -> Iter
     if step > SLOW:
         return
     low, high = np.percentile(values, [0.5, 99.5])
-    floor = ANGLE if steers(name) else SHARE * float(np.percentile(np.abs(values), 75))
-    least = max(floor, PART * float(high - low)) if steers(name) else floor
+    floor = ANGLE if is_steering(name) else SHARE * float(np.percentile(np.abs(values), 75))
+    least = max(floor, PART * float(high - low)) if is_steering(name) else floor
     zeros = _zeros(t, values, follows, floor, step)
     spikes = _spikes(name, values, follows, least)
     other = follows.copy()  # steps that no lapse makes
@@ -83,7 +83,7 @@ def _zeros_and_spikes(name: str, t: Array, values: Array, follows: Rows) -> Iter
     changes = steps[other & (steps > 0)]
     most = float(changes.max(initial=0.0))
     if not len(changes) or np.mean(changes > least) > STEPPED:
-        zeros = [] if steers(name) else _of_order(t, values, zeros, step)
+        zeros = [] if is_steering(name) else _of_order(t, values, zeros, step)
         spikes = [one for one in spikes if _beyond_orders(values, one, kept)]
     else:
         noise = _is_noise(np.diff(values)[other])
@@ -101,7 +101,7 @@ def _is_fast(name: str, values: Array, zero: Lapse, most: float, noise: bool) ->
     Among noise, some rows of exactly 0 say more, also where an angle is another one afterwards.
     """
     long, back = noise and zero.end - zero.first > 1, _is_back(values, zero)
-    return zero.size > (FAST if long and back else FASTER) * most and (back or (long and steers(name)))
+    return zero.size > (FAST if long and back else FASTER) * most and (back or (long and is_steering(name)))
 
 
 def _is_back(values: Array, lapse: Lapse) -> bool:
@@ -112,8 +112,8 @@ def _is_back(values: Array, lapse: Lapse) -> bool:
 def _is_no_kick(name: str, values: Array, spike: Lapse, step: float) -> bool:
     """Whether a spike of an angle begins away from 0, goes where no rudder goes, or is faster than all gears."""
     beside, top = abs(values[spike.first - 1]), float(np.abs(values[spike.first : spike.end]).min())
-    away = bool(beside > ANGLE) or (top > WIDE and not turns_round(name))
-    return away or spike.size > GEAR * step or not steers(name)
+    away = bool(beside > ANGLE) or (top > WIDE and not is_all_round(name))
+    return away or spike.size > GEAR * step or not is_steering(name)
 
 
 def _zeros(t: Array, values: Array, follows: Rows, least: float, step: float) -> list[Lapse]:
@@ -139,9 +139,9 @@ def _spikes(name: str, values: Array, follows: Rows, least: float) -> list[Lapse
         one_side = np.abs(np.sum(np.sign(off), axis=0)) == rows
         whole = np.stack([follows[k : len(follows) - rows + k] for k in range(rows + 1)]).all(axis=0)
         hit = (size > least) & one_side & (np.abs(after - before) < AGREE * size) & whole & ~(inside == 0).any(axis=0)
-        if turns_round(name):
+        if is_all_round(name):
             hit &= np.abs(size / (2 * np.pi) - 1) > 0.05  # it crosses its 0 for a row
-        if not steers(name):
+        if not is_steering(name):
             hit &= np.abs(before) > SHARE * size  # a thruster that runs for a moment lapses not
         for row in map(int, np.flatnonzero(hit) + 1):
             if row not in found and row - 1 not in found:

@@ -9,10 +9,10 @@ import pandas as pd
 
 from shipid.data.checks import rms
 from shipid.data.dataset import Dataset, pieces, unit_of
-from shipid.engine.casadi import memory_along, outputs_of
+from shipid.engine.casadi import evaluate_outputs, memory_along
 from shipid.errors import DataError
-from shipid.simulation.log import aboard, column_of
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.log import body_velocities, state_column
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 OFF = 0.15  # of the prediction: a larger scale error or scatter is reported
@@ -20,7 +20,7 @@ OFF = 0.15  # of the prediction: a larger scale error or scatter is reported
 
 def common_outputs(vessel: Vessel, dataset: Dataset) -> list[str]:
     """Outputs that were measured and that the vessel predicts; none where a command was not recorded."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     if not set(model.commands) <= set(dataset.commands):
         return []
     return [name for name in dataset.outputs if name in model.outputs]
@@ -32,14 +32,14 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     Returns one row for each row of the dataset, with `run`, `t` [s] and a column [SI] for each of `common_outputs`.
     Nothing is simulated but the actuators, so that errors of the hull do not count. Currents are taken as 0.
     """
-    model, wanted = dynamics(vessel), common_outputs(vessel, dataset)
+    model, wanted = vessel_dynamics(vessel), common_outputs(vessel, dataset)
     places = [list(model.outputs).index(name) for name in wanted]
     values, parts = np.array(list(vessel.parameters.values())), []
     for run, rows in pieces(dataset):
         columns = {str(name): rows[name].to_numpy() for name in rows.columns if name != "run"}
         still = np.zeros(len(rows))
-        motion = columns | aboard(columns)
-        states = [motion.get(column_of(name), still) for name in (*model.state, *model.hidden)]
+        motion = columns | body_velocities(columns)
+        states = [motion.get(state_column(name), still) for name in (*model.state, *model.hidden)]
         memory = memory_along(vessel, {name: columns[name] for name in model.commands}, columns["t"]) or {}
         seen = (
             states,
@@ -48,7 +48,7 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
             [columns.get(name, still) for name in model.environment],
         )
         state, reached, orders, weather = (np.array(part).reshape(len(part), len(rows)) for part in seen)
-        shown = outputs_of(model, state, reached, orders, weather, values)[places]
+        shown = evaluate_outputs(model, state, reached, orders, weather, values)[places]
         parts.append(pd.DataFrame({"run": run, "t": columns["t"], **dict(zip(wanted, shown, strict=True))}))
     return pd.concat(parts, ignore_index=True)
 
@@ -78,7 +78,7 @@ def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     """
     if not common_outputs(vessel, dataset):
         measured = ", ".join(dataset.outputs) or "none"
-        predicted = ", ".join(dynamics(vessel).outputs) or "none"
+        predicted = ", ".join(vessel_dynamics(vessel).outputs) or "none"
         raise DataError(
             f"{vessel.name} predicts {predicted}; the data have {measured}: nothing to compare", path="--vessel"
         )

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class, one_of, positive, whole_number
+from shipid.arguments import check_choice, check_class, check_positive, check_whole_number
 from shipid.data.checks import GAP
 from shipid.data.dataset import (
     Array,
@@ -25,7 +25,7 @@ from shipid.data.dataset import (
     shares_clock,
 )
 from shipid.errors import DataError
-from shipid.units import plural
+from shipid.units import plural_word
 
 Mask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
@@ -251,10 +251,10 @@ def cut_windows(
     DataError : a horizon or past that is no whole number, a time that is not positive and finite, an unknown path, or
         no run is as long as past and horizon together.
     """
-    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    horizon, past = whole_number("horizon", horizon, 1, DataError), whole_number("past", past, 0, DataError)
-    step, interval = positive("step", step, DataError), positive("interval", interval, DataError)
-    one_of("path", path, get_args(PathSource), DataError)
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    horizon, past = check_whole_number("horizon", horizon, 1, DataError), check_whole_number("past", past, 0, DataError)
+    step, interval = check_positive("step", step, DataError), check_positive("interval", interval, DataError)
+    check_choice("path", path, get_args(PathSource), DataError)
     shared = shares_clock(dataset)
     parts = []
     for run, rows in sorted(columns_of_pieces(dataset), key=itemgetter(0)):
@@ -432,7 +432,7 @@ def gaps_in_words(dataset: Dataset, least: float) -> str:
     """How many times without rows the runs have, and the longest; empty where they have none. least : as of `gaps`."""
     spans = gaps(dataset, least)
     count = sum(map(len, spans.values()))
-    return f"{count} {plural(count, 'time')} without rows, {longest_gap(spans)}" if count else ""
+    return f"{count} {plural_word(count, 'time')} without rows, {longest_gap(spans)}" if count else ""
 
 
 def coarse_in_words(dataset: Dataset, step: float) -> str:
@@ -516,7 +516,7 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
     (run,) = windows.spans
     length, span = (windows.num_past + windows.horizon) * windows.step, float(windows.end.max() - windows.begin.min())
     raise DataError(
-        f"the {len(windows)} {plural(len(windows), 'window')} of run {run!r} {plural(len(windows), 'spans', 'span')} "
+        f"the {len(windows)} {plural_word(len(windows), 'window')} of run {run!r} {plural_word(len(windows), 'spans', 'span')} "
         f"{span:g} s, too short to train and validate with windows of "
         f"{length:g} s, which takes more than {3 * length:g} s: shorten the horizon, or raise prediction.samples if set"
     )

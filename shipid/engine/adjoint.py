@@ -16,21 +16,21 @@ import numpy as np
 from casadi import SX
 
 from shipid.engine.casadi import summed_rates
-from shipid.engine.integrate import Array, Batch, Job, Method, integrate
+from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, integrate_step
 from shipid.engine.native import (
     C,
-    Parts,
-    compiled_for,
-    longs,
-    num_parts,
-    packed_records,
-    padded,
-    target,
-    width,
+    StagedSource,
+    as_c_longs,
+    compile_or_explain,
+    compiler_target,
+    count_parts,
+    pad_samples,
+    padded_width,
+    run_packed,
 )
 from shipid.engine.printing import STAGES, print_function
-from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import Target, head
+from shipid.engine.threads import run_tasks, threaded_source
+from shipid.engine.vectors import CompilerTarget, vector_source
 from shipid.errors import ShipidError
 from shipid.vessel.dynamics import INPUTS, Dynamics
 
@@ -62,7 +62,7 @@ class Adjoint:
     state: Array
 
 
-def checked_loss(loss: Loss, path: Array) -> tuple[Array, Array]:
+def evaluate_loss(loss: Loss, path: Array) -> tuple[Array, Array]:
     """Values (S,) and slopes (T + 1, S, C) of a loss for a path; ShipidError for wrong shapes."""
     values, slopes = (np.asarray(part, dtype=float) for part in loss(path))
     if values.shape != path.shape[1:2] or slopes.shape != path.shape:
@@ -72,7 +72,7 @@ def checked_loss(loss: Loss, path: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class _Line:
+class _TapeLine:
     """One line of a step: `out` = rates of (state, memory), memory after dt, or state + a k."""
 
     kind: str
@@ -81,15 +81,15 @@ class _Line:
     number: float = 0.0
 
 
-def _recorded(step: float, method: Method) -> tuple[list[_Line], str, str]:
+def _record_step(step: float, method: Method) -> tuple[list[_TapeLine], str, str]:
     """The lines of one step from `x` and `m`, and the names of the state and memory after it."""
-    lines: list[_Line] = []
+    lines: list[_TapeLine] = []
 
     def note(kind: str, *operands: str, number: float = 0.0) -> str:
-        lines.append(_Line(kind, f"b{len(lines)}", operands, number))
+        lines.append(_TapeLine(kind, f"b{len(lines)}", operands, number))
         return lines[-1].out
 
-    after, memory_after = integrate(
+    after, memory_after = integrate_step(
         lambda x, m: note("rates", x, m),
         lambda m, dt: note("advance", m, number=dt),
         lambda x, a, k: note("add", x, k, number=a),
@@ -98,7 +98,7 @@ def _recorded(step: float, method: Method) -> tuple[list[_Line], str, str]:
     return lines, after, memory_after
 
 
-def _needed(lines: Sequence[_Line]) -> set[str]:
+def _needed_values(lines: Sequence[_TapeLine]) -> set[str]:
     """Names of the forward values that the sweep needs: operands of rates and memories, and their operands."""
     needed = {name for line in lines if line.kind != "add" for name in line.operands}
     for line in reversed(lines):
@@ -107,12 +107,12 @@ def _needed(lines: Sequence[_Line]) -> set[str]:
     return needed
 
 
-class _Source(Parts):
+class _AdjointSource(StagedSource):
     """C source of the reverse sweep of one model."""
 
     def __init__(self, model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> None:
         self.model, self.wanted = model, wanted
-        self.tape = _recorded(step, method)
+        self.tape = _record_step(step, method)
         sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
         inputs = [SX.sym(name, size) for name, size in zip(INPUTS, (*sizes, len(model.parameters)), strict=True)]
         tau, dt = SX.sym("tau_extra", model.num_dof), SX.sym("dt")
@@ -177,7 +177,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         lines, after, memory_after = self.tape
         sizes = {"rates": len(self.model.state) + len(self.model.hidden), "advance": len(self.model.memory)}
         sizes["add"] = sizes["rates"]
-        forward, backward, needed = [], [], _needed(lines)
+        forward, backward, needed = [], [], _needed_values(lines)
         for line in lines:
             size = sizes[line.kind]
             if line.out in needed:
@@ -191,7 +191,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         ends += [f"for (int i = 0; i < {sizes['advance']}; ++i) m_next[i] = m_bar[i];"]
         return "\n".join([*forward, *bars, *backward, *ends])
 
-    def _forward(self, line: _Line, size: int) -> str:
+    def _forward(self, line: _TapeLine, size: int) -> str:
         if line.kind == "rates":
             return f"rates({', '.join(line.operands)}, tau, saved0, saved1, {line.out});"
         if line.kind == "advance":
@@ -199,7 +199,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         x, k = line.operands
         return f"for (int i = 0; i < {size}; ++i) {line.out}[i] = {x}[i] + {line.number!r} * {k}[i];"
 
-    def _backward(self, line: _Line, size: int) -> str:
+    def _backward(self, line: _TapeLine, size: int) -> str:
         bar = f"{line.out}_bar"
         if line.kind == "rates":
             x, m = line.operands
@@ -214,7 +214,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
             f"for (int i = 0; i < {size}; ++i) {{ {x}_bar[i] += {bar}[i]; {k}_bar[i] += {line.number!r} * {bar}[i]; }}"
         )
 
-    def text(self, wanted: Target) -> str:
+    def text(self, wanted: CompilerTarget) -> str:
         """The complete C source for the target processor."""
         model = self.model
         nx, nm, n = len(model.state) + len(model.hidden), len(model.memory), model.num_dof
@@ -245,42 +245,44 @@ for (long g = groups * number / parts; g < groups * (number + 1) / parts; ++g) {
   for (int i = 0; i < {nx}; ++i) *AT(state_bar, i) = x_next[i];
   for (int i = 0; i < {count}; ++i) *AT(parameters_bar, i) = grad[i];
 }}"""
-        return f"""{head(wanted)}
+        return f"""{vector_source(wanted)}
 {self.functions()}
 #define AT(array, row) ((U *)((array) + (row) * stride + g * W))
 #define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
 #define SLOPES(record) for (long i = 0; i < num_rows; ++i) {{ \\
   V slope = *AT(slopes, (record) * num_rows + i); \\
   if (rows[i] < {nx}) x_next[rows[i]] += slope; else m_next[rows[i] - {nx}] += slope; }}
-{threaded(_SIZES, _ARRAYS, task)}"""
+{threaded_source(_SIZES, _ARRAYS, task)}"""
 
 
 @lru_cache(maxsize=32)
-def _library(model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> Any:
+def _compile_adjoint(model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> Any:
     """The compiled function `run` of a sweep, from the cache if possible."""
-    return compiled_for(lambda: _Source(model, wanted, step, method).text(target()))
+    return compile_or_explain(lambda: _AdjointSource(model, wanted, step, method).text(compiler_target()))
 
 
-def gradient_native(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
+def gradient_native(
+    model: Dynamics, batch: RolloutBatch, job: RolloutJob, wanted: tuple[int, ...], loss: Loss
+) -> Adjoint:
     """A loss on the job's channels and its derivatives, samples on SIMD lanes and threads.
 
     wanted : indices of the parameters to differentiate by. The batch has one variant and no drawn components.
     """
-    nx, nm, num_samples, wide = len(batch.state), len(batch.memory), batch.state.shape[1], width(batch)
-    records, worst = packed_records(model, batch, replace(job, every=1, rows=tuple(range(nx + nm))))
+    nx, nm, num_samples, wide = len(batch.state), len(batch.memory), batch.state.shape[1], padded_width(batch)
+    records, worst = run_packed(model, batch, replace(job, every=1, rows=tuple(range(nx + nm))))
     path = records[0][:, list(job.rows)].transpose(0, 2, 1)[:, :num_samples]
-    values, slopes = checked_loss(loss, path)
-    series = [padded(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
+    values, slopes = evaluate_loss(loss, path)
+    series = [pad_samples(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
     force = np.empty((job.num_steps, model.num_dof, wide))
     state, slope = np.empty((nx, wide)), np.empty((len(wanted), wide))
     numbers = np.ascontiguousarray(batch.parameters[0], dtype=float)
-    given = [longs(len(part) for part in series), longs(job.rows), numbers, records, *series]
-    given.append(padded(slopes.transpose(0, 2, 1), wide))
-    parts = num_parts(batch)
-    work = wide / target().lanes / parts * job.num_steps
+    given = [as_c_longs(len(part) for part in series), as_c_longs(job.rows), numbers, records, *series]
+    given.append(pad_samples(slopes.transpose(0, 2, 1), wide))
+    parts = count_parts(batch)
+    work = wide / compiler_target().lanes / parts * job.num_steps
     sizes = parts, wide, job.num_steps, len(job.rows)
-    run = _library(model, wanted, job.step, job.method)
-    in_parallel(run, sizes, [*given, state, slope, force], parts, work)
+    run = _compile_adjoint(model, wanted, job.step, job.method)
+    run_tasks(run, sizes, [*given, state, slope, force], parts, work)
     return Adjoint(
         values, path, worst[0, :num_samples], slope[:, :num_samples], force[:, :, :num_samples], state[:, :num_samples]
     )

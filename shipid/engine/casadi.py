@@ -9,12 +9,14 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
-from shipid.engine.integrate import Array, Batch, Job, Method, integrate, num_threads
-from shipid.interrupts import uninterrupted
-from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, count_threads, integrate_step
+from shipid.interrupts import hold_interrupts
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
-BLOCK = 256  # steps of one call in `memory_along`, samples of one in `_of_samples`: made once, whatever is asked for
+BLOCK = (
+    256  # steps of one call in `memory_along`, samples of one in `_evaluate_samples`: made once, whatever is asked for
+)
 
 
 def summed_rates(model: Dynamics, inputs: Sequence[Any], tau: Any, drawn: Mapping[str, Any]) -> Any:
@@ -54,7 +56,7 @@ def casadi_scan(
         return model.advance(state, m, commands, environment, parameters, dt)
 
     greatest = ca.MX.sym("greatest")
-    after, memory_after = integrate(rates, advance, lambda x, a, k: x + a * k, state, memory, step, method)
+    after, memory_after = integrate_step(rates, advance, lambda x, a, k: x + a * k, state, memory, step, method)
     one = ca.Function(
         "step",
         [ca.vertcat(state, memory, greatest), commands, environment, tau, fixed],
@@ -77,7 +79,7 @@ def casadi_scan(
     return ca.Function("rollout", [x, c, e, t, fixed], [path])
 
 
-def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def run_casadi(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S), sample by sample on CasADi's threads."""
     num_steps, counts = job.num_steps, tuple(drawn.shape[2] for drawn in batch.components)
     scan = casadi_scan(model, job.step, num_steps, job.method, job.every, counts)
@@ -90,11 +92,11 @@ def run_casadi(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
         return full.transpose(1, 2, 0).reshape(held.shape[1], num_samples * num_steps)
 
     inputs = [start, over_time(batch.commands), over_time(batch.environment), over_time(batch.tau_extra)]
-    mapped = scan.map(num_samples, "thread", min(num_threads(), num_samples))
+    mapped = scan.map(num_samples, "thread", min(count_threads(), num_samples))
     drawn = [part.transpose(2, 0, 1).reshape(-1, num_samples) for part in batch.components]
     records, worst = [], []
     for values in batch.parameters:
-        with uninterrupted():
+        with hold_interrupts():
             result = np.array(mapped(*inputs, np.concatenate([np.tile(values[:, None], (1, num_samples)), *drawn])))
         path = result.reshape(len(start), num_samples, num_records).transpose(2, 1, 0)
         path = np.concatenate([start.T[None], path])
@@ -122,7 +124,7 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
 
     The states begin at the first order; each order is held until the next row. They are simulated, not measured.
     """
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     if not model.memory:
         return None
     orders = np.stack([np.asarray(commands[name], dtype=float) for name in model.commands])
@@ -134,7 +136,7 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
     values = np.tile(np.array(list(vessel.parameters.values()))[list(used), None], (1, BLOCK))
     held = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1)  # the last block is padded
     reached, dt = first, np.diff(t)
-    with uninterrupted():
+    with hold_interrupts():
         for rows in held.reshape(-1, BLOCK):
             parts.append(np.array(scan(reached, orders[:, rows], dt[None, rows], values)))
             reached = parts[-1][:, -1]
@@ -144,27 +146,27 @@ def memory_along(vessel: Vessel, commands: Mapping[str, Array], t: Array) -> dic
 
 
 @lru_cache(maxsize=64)
-def _mapped(model: Dynamics, name: Literal["orders", "measured"]) -> ca.Function:
+def _map_function(model: Dynamics, name: Literal["orders", "measured"]) -> ca.Function:
     """A function of a model over `BLOCK` samples with the same parameters."""
     function: ca.Function = getattr(model, name)
     return function.map(name, "serial", BLOCK, [function.n_in() - 1], [])
 
 
-def orders_of(
+def evaluate_orders(
     model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
 ) -> Array:
     """Orders (n_ordered, n) of the helmsman in n samples, each input (channels, n); parameters (P,)."""
-    return _of_samples(_mapped(model, "orders"), [states, memory, commands, environment], parameters)
+    return _evaluate_samples(_map_function(model, "orders"), [states, memory, commands, environment], parameters)
 
 
-def outputs_of(
+def evaluate_outputs(
     model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
 ) -> Array:
     """Outputs (n_outputs, n) of the components in n samples, each input (channels, n); parameters (P,)."""
-    return _of_samples(_mapped(model, "measured"), [states, memory, commands, environment], parameters)
+    return _evaluate_samples(_map_function(model, "measured"), [states, memory, commands, environment], parameters)
 
 
-def _of_samples(mapped: ca.Function, inputs: Sequence[Array], parameters: Array) -> Array:
+def _evaluate_samples(mapped: ca.Function, inputs: Sequence[Array], parameters: Array) -> Array:
     count = inputs[0].shape[1]
     blocks = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(-1, BLOCK)  # the last is padded
     parts = [np.array(mapped(*(part[:, samples] for part in inputs), parameters)) for samples in blocks]

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import casadi as ca
 
-from shipid.engine.graph import Graph, operate
+from shipid.engine.graph import InstructionGraph, apply_operation
 from shipid.engine.tables import inside_tables
 
 FEW = 2  # terms of a sum that is multiplied out
@@ -30,7 +30,7 @@ def collect_terms(function: ca.Function, early: frozenset[str]) -> ca.Function:
     return _Collector(function, early).function()
 
 
-class _Sum:
+class _CollectedSum:
     """Coefficients, which are known early, of monomials of atoms: what is neither a sum nor a product."""
 
     def __init__(self, terms: Mapping[Monomial, ca.SX]) -> None:
@@ -69,13 +69,13 @@ class _Collector:
     """Walks the instructions of a function, and keeps of each a sum; writes out those that others need as a value."""
 
     def __init__(self, function: ca.Function, early: frozenset[str]) -> None:
-        self.given, self.graph = function, Graph(function)
+        self.given, self.graph = function, InstructionGraph(function)
         self.inputs = [ca.SX.sym(function.name_in(i), function.sparsity_in(i)) for i in range(function.n_in())]
         self.early = early
         self.uses = Counter(operand for operands in self.graph.operands for operand in operands)
         self.literal = inside_tables(function)
         self.atoms: list[ca.SX] = []
-        self.sums: dict[int, _Sum] = {}
+        self.sums: dict[int, _CollectedSum] = {}
         self.written: dict[int, ca.SX] = {}  # of instructions
         self.products: dict[Monomial, ca.SX] = {}
         # products of coefficients, after these, by their places in memory: which must stay theirs
@@ -92,23 +92,23 @@ class _Collector:
         names = self.given.name_in(), self.given.name_out()
         return ca.Function(self.given.name(), self.inputs, [out], *names)
 
-    def instruction(self, k: int, operation: int) -> _Sum:
+    def instruction(self, k: int, operation: int) -> _CollectedSum:
         """What an instruction gives; a sum that several others use is an atom."""
         if operation == ca.OP_CONST:
-            return _Sum({(): ca.SX(self.given.instruction_constant(k))})
+            return _CollectedSum({(): ca.SX(self.given.instruction_constant(k))})
         if operation == ca.OP_INPUT:
             source, entry = self.given.instruction_input(k)
             value = self.inputs[source].nz[entry]
-            return _Sum({(): value}) if self.given.name_in(source) in self.early else self.atom(value)
+            return _CollectedSum({(): value}) if self.given.name_in(source) in self.early else self.atom(value)
         operands = self.graph.operands[k]
         if all(self.sums[i].early for i in operands):
-            return _Sum({(): operate(operation, [self.sums[i].constant for i in operands])})
+            return _CollectedSum({(): apply_operation(operation, [self.sums[i].constant for i in operands])})
         made = None if k in self.literal else self.combined(operation, operands)
         if made is None:
-            return self.atom(operate(operation, [self.value(i) for i in operands]))
+            return self.atom(apply_operation(operation, [self.value(i) for i in operands]))
         return made if self.uses[k] < 2 or len(made.terms) < 2 else self.atom(self.expression(made.terms))
 
-    def combined(self, operation: int, operands: tuple[int, ...]) -> _Sum | None:
+    def combined(self, operation: int, operands: tuple[int, ...]) -> _CollectedSum | None:
         """A sum or product of sums; None for another operation."""
         a, b = self.sums[operands[0]], self.sums[operands[-1]]
         if operation in (ca.OP_ADD, ca.OP_SUB):
@@ -116,7 +116,7 @@ class _Collector:
             for monomial, value in b.terms.items():
                 signed = -value if operation == ca.OP_SUB else value
                 terms[monomial] = terms[monomial] + signed if monomial in terms else signed
-            return _Sum(terms)
+            return _CollectedSum(terms)
         if operation == ca.OP_NEG:
             return self.times(operands[0], ca.SX(-1))
         if operation == ca.OP_TWICE:
@@ -129,14 +129,14 @@ class _Collector:
             return self.product(operands[0], operands[-1])
         return None
 
-    def times(self, k: int, factor: ca.SX) -> _Sum:
+    def times(self, k: int, factor: ca.SX) -> _CollectedSum:
         """A sum by what is known early; a long one, or one without products, is an atom by it."""
         of = self.sums[k]
         if not _is_unit(factor) and (of.plain or len(of.late) > FEW):
             of = self.as_atom(k)
-        return _Sum({monomial: self.by(value, factor) for monomial, value in of.terms.items()})
+        return _CollectedSum({monomial: self.by(value, factor) for monomial, value in of.terms.items()})
 
-    def product(self, first: int, second: int) -> _Sum:
+    def product(self, first: int, second: int) -> _CollectedSum:
         """The product of two sums: a short one by a single term is multiplied out, else sums are atoms."""
         a, b = self.sums[first], self.sums[second]
         if first == second or (len(a.terms) > 1 and len(b.terms) > 1):
@@ -150,7 +150,7 @@ class _Collector:
             for right, y in b.terms.items():
                 monomial, value = tuple(sorted(left + right)), self.by(x, y)
                 terms[monomial] = terms[monomial] + value if monomial in terms else value
-        return _Sum(terms)
+        return _CollectedSum(terms)
 
     def by(self, x: ca.SX, y: ca.SX) -> ca.SX:
         """The product of two coefficients, the same expression each time."""
@@ -159,12 +159,12 @@ class _Collector:
             self.scaled[key] = x, y, x * y
         return self.scaled[key][2]
 
-    def atom(self, value: ca.SX) -> _Sum:
+    def atom(self, value: ca.SX) -> _CollectedSum:
         """A new atom."""
         self.atoms.append(value)
-        return _Sum({(len(self.atoms) - 1,): ca.SX(1)})
+        return _CollectedSum({(len(self.atoms) - 1,): ca.SX(1)})
 
-    def as_atom(self, k: int) -> _Sum:
+    def as_atom(self, k: int) -> _CollectedSum:
         """What an instruction gives as one atom, for all who use it from now on."""
         if not self.is_atom(k):
             self.sums[k] = self.atom(self.value(k))

@@ -11,10 +11,10 @@ from typing import TypeVar
 
 from shipid.engine.adjoint import Adjoint, Loss, gradient_native
 from shipid.engine.casadi import run_casadi
-from shipid.engine.integrate import Array, Batch, Job
+from shipid.engine.integrate import Array, RolloutBatch, RolloutJob
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import compiler, measure_native, measure_single, refuse, run_native, run_single
-from shipid.errors import ShipidError, choices
+from shipid.engine.native import find_compiler, measure_native, measure_single, refuse_compiling, run_native, run_single
+from shipid.errors import ShipidError, suggest_name
 from shipid.vessel.dynamics import Dynamics
 
 AUTO, REPEATED = "auto", "repeated"  # `repeated`: as `auto`, where so many calls follow that compiling pays
@@ -39,7 +39,7 @@ class Load:
     device: str
 
 
-def _never(_: Load) -> bool:
+def _is_never_preferred(_: Load) -> bool:
     return False
 
 
@@ -57,52 +57,54 @@ class Engine:
     checks : whether the greatest speed is no number wherever an input is none.
     """
 
-    run: Callable[[Dynamics, Batch, Job], tuple[Array, Array]]
-    preferred: Callable[[Load], bool] = _never
+    run: Callable[[Dynamics, RolloutBatch, RolloutJob], tuple[Array, Array]]
+    preferred: Callable[[Load], bool] = _is_never_preferred
     available: Callable[[], bool] = lambda: True
-    measure: Callable[[Dynamics, Batch, Job, Array], tuple[Array, Array, Array]] | None = None
-    gradient: Callable[[Dynamics, Batch, Job, tuple[int, ...], Loss], Adjoint] | None = None
+    measure: Callable[[Dynamics, RolloutBatch, RolloutJob, Array], tuple[Array, Array, Array]] | None = None
+    gradient: Callable[[Dynamics, RolloutBatch, RolloutJob, tuple[int, ...], Loss], Adjoint] | None = None
     any_device: bool = False
     checks: bool = False
 
 
-def _torch(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def _run_eager(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
     from shipid.engine.torch import run_torch  # PyTorch takes a second to import
 
     return run_torch(model, batch, job, compiled=False)
 
 
-def _compiled(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def _run_compiled(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
     from shipid.engine.torch import run_torch
 
     return run_torch(model, batch, job, compiled=True)
 
 
-def _torch_gradient(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
+def _torch_gradient(
+    model: Dynamics, batch: RolloutBatch, job: RolloutJob, wanted: tuple[int, ...], loss: Loss
+) -> Adjoint:
     from shipid.engine.torch import gradient_torch
 
     return gradient_torch(model, batch, job, wanted, loss)
 
 
-def _has_compiler() -> bool:
-    return compiler() is not None
+def _is_compiler_available() -> bool:
+    return find_compiler() is not None
 
 
 ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
     "native": Engine(
         run_native,
         preferred=lambda load: load.device == "cpu" and load.work > NATIVE_FROM,
-        available=_has_compiler,
+        available=_is_compiler_available,
         measure=measure_native,
         gradient=gradient_native,
         checks=True,
     ),
-    "single": Engine(run_single, available=_has_compiler, measure=measure_single, checks=True),
+    "single": Engine(run_single, available=_is_compiler_available, measure=measure_single, checks=True),
     "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
     "compiled": Engine(
-        _compiled, preferred=lambda load: load.device != "cpu" and load.work > KERNEL_FROM, any_device=True
+        _run_compiled, preferred=lambda load: load.device != "cpu" and load.work > KERNEL_FROM, any_device=True
     ),
-    "torch": Engine(_torch, preferred=lambda _: True, gradient=_torch_gradient, any_device=True),
+    "torch": Engine(_run_eager, preferred=lambda _: True, gradient=_torch_gradient, any_device=True),
 }
 
 
@@ -110,16 +112,16 @@ def check_device(device: str) -> None:
     """Raise ShipidError unless PyTorch can compute on the device, such as `cpu` or `cuda:0`."""
     if device == "cpu":
         return
-    from shipid.engine.torch import is_device
+    from shipid.engine.torch import is_torch_device
 
-    if not is_device(device):
+    if not is_torch_device(device):
         raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}")
 
 
-def named(name: str, device: str) -> Engine | None:
+def engine_by_name(name: str, device: str) -> Engine | None:
     """The engine with a name; None for `auto`, `repeated`. ShipidError for an unknown name or an unsupported device."""
     if not isinstance(name, str) or name not in (AUTO, REPEATED, *ENGINES):
-        raise ShipidError(f"there is no engine {name!r}: {choices(name, [AUTO, *ENGINES])}")
+        raise ShipidError(f"there is no engine {name!r}: {suggest_name(name, [AUTO, *ENGINES])}")
     engine = ENGINES.get(name)
     if device != "cpu" and engine is not None and not engine.any_device:
         others = " or ".join(repr(other) for other, entry in ENGINES.items() if entry.any_device)
@@ -128,7 +130,7 @@ def named(name: str, device: str) -> Engine | None:
     return engine
 
 
-def chosen(batch: Batch, job: Job, repeated: bool = False) -> Engine:
+def choose_engine(batch: RolloutBatch, job: RolloutJob, repeated: bool = False) -> Engine:
     """The engine that `auto` selects for a rollout, by its size and the available engines; or that `repeated` does."""
     weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
     width = batch.state.shape[1] * len(batch.parameters)
@@ -137,20 +139,20 @@ def chosen(batch: Batch, job: Job, repeated: bool = False) -> Engine:
     return next(engine for engine in ENGINES.values() if engine.preferred(load) and engine.available())
 
 
-def done_by(asked: Engine | None, choose: Callable[[], Engine], work: Callable[[Engine], Result]) -> Result:
+def run_with_fallback(asked: Engine | None, choose: Callable[[], Engine], work: Callable[[Engine], Result]) -> Result:
     """Result of the engine that was asked for; else of the chosen one, or of another where it cannot compile here."""
     if asked is not None:
         return work(asked)
     try:
         return work(choose())
     except NoLibrary as error:
-        refuse(error.message)
+        refuse_compiling(error.message)
         return work(choose())
 
 
-def differentiable(name: str, device: str) -> Callable[[], Engine]:
+def choose_gradient_engine(name: str, device: str) -> Callable[[], Engine]:
     """Give the engine with a name, for gradients; for `auto` the first available. ShipidError if it has no gradient."""
-    engine = named(name, device)
+    engine = engine_by_name(name, device)
     able = {key: entry for key, entry in ENGINES.items() if entry.gradient is not None}
     if engine is None:
         fit = [entry for entry in able.values() if device == "cpu" or entry.any_device]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.engine.adjoint import Adjoint, Loss
-from shipid.engine.engines import AUTO, Engine, differentiable, done_by
-from shipid.engine.integrate import Array, Job, Method
-from shipid.engine.rollout import SPEED_LIMIT, channels, finite, places, prepared
-from shipid.errors import ShipidError, choices
+from shipid.engine.engines import AUTO, Engine, choose_gradient_engine, run_with_fallback
+from shipid.engine.integrate import Array, Method, RolloutJob
+from shipid.engine.rollout import SPEED_LIMIT, channel_names, channel_places, finite_samples, prepare_batch
+from shipid.errors import ShipidError, suggest_name
 from shipid.vessel.load import Vessel
 
 PATH = ("north", "east")
@@ -66,7 +66,7 @@ def rollout_gradient(
     ----------
     start, commands, environment, memory, tau_extra, step, num_steps, method : as in `rollout`.
     loss : path (num_steps + 1, S, C) of the channels `keep` -> (loss (S,), slope d(loss)/d(path), shaped as the path);
-        such as `squared_distance(goal)`.
+        such as `squared_distance_loss(goal)`.
     names : dotted paths of the parameters to differentiate by; ShipidError for one that the vessel does not have.
     keep : states and memories that are the input of the loss.
     parameters : (P,) in the order of `vessel.parameters`; default: those of the vessel.
@@ -75,19 +75,19 @@ def rollout_gradient(
     The initial memories are constants: they do not depend on parameters. ShipidError for a vessel with terms whose
     components are drawn (waves), unless they are switched off.
     """
-    way = differentiable(engine, device)
+    way = choose_gradient_engine(engine, device)
     if num_steps < 1:
         raise ShipidError(f"num_steps must be 1 or more, not {num_steps}")
     values = None if parameters is None else np.asarray(parameters, dtype=float).reshape(1, -1)
     weather = environment or {}
-    model, batch = prepared(vessel, start, commands, weather, {}, num_steps, values, memory, tau_extra, None)
+    model, batch = prepare_batch(vessel, start, commands, weather, {}, num_steps, values, memory, tau_extra, None)
     if model.drawn:
         raise ShipidError(f"{model.drawn[0].path} draws its components and has no gradient: switch it off")
     wrong = next((name for name in names if name not in model.parameters), None)
     if wrong is not None:
-        raise ShipidError(f"{vessel.name} has no parameter {wrong!r}: {choices(wrong, model.parameters)}")
+        raise ShipidError(f"{vessel.name} has no parameter {wrong!r}: {suggest_name(wrong, model.parameters)}")
     order = {name: place for place, name in enumerate(model.parameters)}
-    job = Job(step, num_steps, method, 1, places(keep, channels(model), vessel), device)
+    job = RolloutJob(step, num_steps, method, 1, channel_places(keep, channel_names(model), vessel), device)
     wanted = tuple(order[name] for name in names)
 
     def gradient(engine: Engine) -> Adjoint:
@@ -95,7 +95,7 @@ def rollout_gradient(
         return engine.gradient(model, batch, job, wanted, loss)
 
     with np.errstate(all="ignore"):
-        adjoint = done_by(None if engine == AUTO else way(), way, gradient)
+        adjoint = run_with_fallback(None if engine == AUTO else way(), way, gradient)
     return Gradient(
         loss=adjoint.loss,
         parameters=adjoint.parameters.T,
@@ -103,11 +103,11 @@ def rollout_gradient(
         tau_extra=adjoint.tau_extra.transpose(0, 2, 1),
         start=dict(zip((*model.state, *model.hidden), adjoint.state, strict=True)),
         path=adjoint.path,
-        diverged=(~(adjoint.worst <= SPEED_LIMIT) | ~finite(batch))[0],
+        diverged=(~(adjoint.worst <= SPEED_LIMIT) | ~finite_samples(batch))[0],
     )
 
 
-def squared_distance(goal: Array, weights: Array | float = 1.0) -> Loss:
+def squared_distance_loss(goal: Array, weights: Array | float = 1.0) -> Loss:
     """Mean over the steps of the weighted squared distance to `goal` (num_steps, S, C), the start left out.
 
     weights : broadcast against (num_steps, S, C); with the channels north and east and weight 1 the loss is in m^2.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 
-class Graph:
+class InstructionGraph:
     """Operation and operands of each instruction of a function, by its number.
 
     operation : of each, a number of CasADi's. operands : of each, the instructions that compute them.
@@ -25,6 +25,6 @@ class Graph:
                 slots[function.instruction_output(k)[0]] = k
 
 
-def operate(operation: int, operands: list[ca.SX]) -> ca.SX:
+def apply_operation(operation: int, operands: list[ca.SX]) -> ca.SX:
     """One operation of CasADi on one or two expressions."""
     return ca.SX.unary(operation, operands[0]) if len(operands) == 1 else ca.SX.binary(operation, *operands)

@@ -9,15 +9,15 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from shipid.arguments import one_of, positive
-from shipid.capacity import cores
+from shipid.arguments import check_choice, check_positive
+from shipid.capacity import usable_cores
 
 Array = np.ndarray
 Method = Literal["euler", "rk4"]
 
 
 @dataclass(frozen=True)
-class Batch:
+class RolloutBatch:
     """Inputs of a rollout as plain arrays, channel first: the layout that all engines share.
 
     state (nx, S), memory (nm, S), commands (T, nc, S), environment (T, ne, S), tau_extra (T, n_dof, S) with T = 1 when
@@ -35,7 +35,7 @@ class Batch:
 
 
 @dataclass(frozen=True)
-class Job:
+class RolloutJob:
     """Settings of a rollout.
 
     step : seconds of one step. num_steps : steps of the rollout. every : steps from record to record.
@@ -50,18 +50,18 @@ class Job:
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        one_of("method", self.method, get_args(Method))
-        object.__setattr__(self, "step", positive("step", self.step))  # engines write it into their code
+        check_choice("method", self.method, get_args(Method))
+        object.__setattr__(self, "step", check_positive("step", self.step))  # engines write it into their code
 
 
-def num_threads() -> int:
+def count_threads() -> int:
     """Number of threads of a rollout: of the cores that this process may use, at most `OMP_NUM_THREADS`."""
-    count = cores()
+    count = usable_cores()
     limit = os.environ.get("OMP_NUM_THREADS", "")
     return min(count, int(limit)) if limit.isdecimal() and int(limit) > 0 else count
 
 
-def integrate(
+def integrate_step(
     rates: Callable[[Any, Any], Any],
     advance: Callable[[Any, float], Any],
     add: Callable[[Any, float, Any], Any],

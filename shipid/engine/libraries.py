@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from shipid.errors import ShipidError, visible
+from shipid.errors import ShipidError, escape_unprintable
 from shipid.files import temporary_folder
 
 MOST_WORDS = 100_000  # characters of each output of a compiler
@@ -61,7 +61,7 @@ def run_compiler(arguments: Sequence[str], folder: Path | None = None, limit: fl
     return (texts[1].strip() or "it gave no reason") if process.returncode else None, texts[0]
 
 
-def build(command: Sequence[str], source: str, library: Path, limit: float = LIMIT) -> str | None:
+def build_library(command: Sequence[str], source: str, library: Path, limit: float = LIMIT) -> str | None:
     """Compile C source into a sealed library, which appears whole or not at all; the complaint if that fails.
 
     command : compiler and options, with `{source}` and `{library}` where the names of the files belong.
@@ -78,7 +78,7 @@ def build(command: Sequence[str], source: str, library: Path, limit: float = LIM
             if not fresh.is_file() or not fresh.stat().st_size:
                 return "it ended without an error and without a library"
             with fresh.open("ab") as stream:
-                stream.write(_seal(fresh.read_bytes(), library.name))
+                stream.write(_library_seal(fresh.read_bytes(), library.name))
             fresh.chmod(0o700)
             os.replace(fresh, library)
     except OSError as error:
@@ -86,15 +86,15 @@ def build(command: Sequence[str], source: str, library: Path, limit: float = LIM
     return None
 
 
-def load(library: Path) -> Any:
-    """The function `run` of a library that `build` made; FileNotFoundError if there is none, NoLibrary if not loadable.
+def load_library(library: Path) -> Any:
+    """The function `run` of a library that `build_library` made; FileNotFoundError if there is none, NoLibrary if not loadable.
 
     The file is read and compared with its seal before the system maps it: one that is truncated would end the process.
     """
-    reason = stranger(library)
+    reason = foreign_owner_words(library)
     if reason is None:
         content = library.read_bytes()
-        whole = content[-32:] == _seal(content[:-32], library.name)
+        whole = content[-32:] == _library_seal(content[:-32], library.name)
         reason = None if whole else f"{library} is damaged"
     if reason is not None:
         raise NoLibrary(reason)
@@ -106,11 +106,11 @@ def load(library: Path) -> Any:
     return run
 
 
-def _seal(content: bytes, name: str) -> bytes:
+def _library_seal(content: bytes, name: str) -> bytes:
     return hashlib.sha256(content + name.encode()).digest()
 
 
-def stranger(place: Path) -> str | None:
+def foreign_owner_words(place: Path) -> str | None:
     """Why a file may be the work of another user, in words; None if only this user or the system can have written it.
 
     The file and its folder must belong to this user and be writable by no other. The folders above must belong to this
@@ -131,7 +131,7 @@ def stranger(place: Path) -> str | None:
 
 
 @cache
-def folder(wanted: str, probe: bytes) -> Path | None:
+def library_folder(wanted: str, probe: bytes) -> Path | None:
     """Folder of libraries: `shipid` in the wanted one, else a temporary one of this process; None if neither serves.
 
     A folder serves if only this user can write there, and if a library written there can be loaded.
@@ -150,7 +150,7 @@ def folder(wanted: str, probe: bytes) -> Path | None:
                 trial = inside / "probe.so"
                 trial.write_bytes(probe)
                 trial.chmod(0o700)
-                reason = stranger(trial)
+                reason = foreign_owner_words(trial)
                 if reason is None:
                     ctypes.CDLL(str(trial))
         except OSError as error:
@@ -158,8 +158,8 @@ def folder(wanted: str, probe: bytes) -> Path | None:
             reason = f"{wanted}: {words}" if kept else f"a temporary folder: {words}: set TMPDIR to one that serves"
         if reason is None:
             if reasons:
-                log.warning("compiled equations are not kept for the next run: %s", visible(reasons[0]))
+                log.warning("compiled equations are not kept for the next run: %s", escape_unprintable(reasons[0]))
             return place
         reasons.append(reason)
-    log.warning("engine 'native' is not used, others are slower: %s", visible(reasons[-1]))
+    log.warning("engine 'native' is not used, others are slower: %s", escape_unprintable(reasons[-1]))
     return None

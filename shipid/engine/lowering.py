@@ -42,40 +42,40 @@ _BINARY: dict[int, str] = {
 }
 
 
-def _minimum(a: Any, b: Any) -> torch.Tensor:
+def _torch_minimum(a: Any, b: Any) -> torch.Tensor:
     if isinstance(b, float):
         return torch.clamp(a, max=b)
     return torch.clamp(b, max=a) if isinstance(a, float) else torch.minimum(a, b)
 
 
-def _maximum(a: Any, b: Any) -> torch.Tensor:
+def _torch_maximum(a: Any, b: Any) -> torch.Tensor:
     if isinstance(b, float):
         return torch.clamp(a, min=b)
     return torch.clamp(b, min=a) if isinstance(a, float) else torch.maximum(a, b)
 
 
-def _atan2(a: Any, b: Any) -> torch.Tensor:
+def _torch_atan2(a: Any, b: Any) -> torch.Tensor:
     like = b if isinstance(a, float) else a
     return torch.atan2(torch.as_tensor(a, dtype=like.dtype), torch.as_tensor(b, dtype=like.dtype))
 
 
-def _where(condition: Any, value: Any) -> torch.Tensor:
+def _torch_where(condition: Any, value: Any) -> torch.Tensor:
     if isinstance(value, float):  # two bare numbers would give single precision
         value = torch.full((), value, dtype=torch.float64, device=condition.device)
     return torch.where(condition != 0, value, 0.0)
 
 
-def _number(truth: torch.Tensor) -> torch.Tensor:
+def _truth_as_number(truth: torch.Tensor) -> torch.Tensor:
     return truth.to(torch.float64)  # arithmetic on booleans is logic in PyTorch, counting in CasADi
 
 
 _NAMES = {
     "torch": torch,
-    "_minimum": _minimum,
-    "_maximum": _maximum,
-    "_atan2": _atan2,
-    "_where": _where,
-    "_number": _number,
+    "_minimum": _torch_minimum,
+    "_maximum": _torch_maximum,
+    "_atan2": _torch_atan2,
+    "_where": _torch_where,
+    "_number": _truth_as_number,
     "inf": math.inf,
     "nan": math.nan,
 }
@@ -85,7 +85,7 @@ PYTORCH = Dialect(ARITHMETIC | _UNARY | _BINARY, "    {0} = {1}", repr, "_number
 
 
 @dataclass(frozen=True)
-class Lowered:
+class LoweredFunction:
     """A lowered function as PyTorch, in stages.
 
     early : one function a stage: (the stage's inputs, then what earlier stages saved) -> saved (num_saved, ...).
@@ -108,14 +108,14 @@ class Lowered:
         return list(saved[-1])
 
 
-def lower(function: ca.Function) -> Lowered:
+def lower_function(function: ca.Function) -> LoweredFunction:
     """Lower an SX function of dense vectors with one output; `STAGES` names the inputs that are known early.
 
     An instruction that has no PyTorch counterpart raises ValueError with its number.
     """
     printed = print_function(function, STAGES, PYTORCH)
     last = len(STAGES)
-    space: dict[str, Any] = {**_NAMES, "_stack": _stack, "_channels": _channels}
+    space: dict[str, Any] = {**_NAMES, "_stack": _stack_saved, "_channels": _split_saved}
     for number in range(last + 1):
         arguments = ", ".join([*printed.inputs(number), *(f"s{earlier}" for earlier in range(number))])
         saved = "" if number == last else ", ".join(printed.saved[number])
@@ -124,15 +124,15 @@ def lower(function: ca.Function) -> Lowered:
         source = [f"def stage{number}({arguments}):", *split, *printed.lines[number], f"    return {end}"]
         exec(compile("\n".join(source), f"<lowered {function.name()}>", "exec"), space)
     early = tuple(space[f"stage{number}"] for number in range(last))
-    return Lowered(early, space[f"stage{last}"], printed.stage_of, len(printed.lines[last]))
+    return LoweredFunction(early, space[f"stage{last}"], printed.stage_of, len(printed.lines[last]))
 
 
-def _channels(saved: torch.Tensor) -> Any:
+def _split_saved(saved: torch.Tensor) -> Any:
     """Saved channels, taken apart at once where they are differentiated: each index would make a gradient of all."""
     return saved.unbind(0) if saved.requires_grad else saved
 
 
-def _stack(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
+def _stack_saved(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
     """Saved values of a stage as one tensor (num_saved, ...), in the broadcast shape of the inputs."""
     shape = np.broadcast_shapes(*(channels.shape[1:] for channels in inputs))
     like = inputs[0]

@@ -24,13 +24,13 @@ import numpy as np
 
 from shipid.engine import libraries
 from shipid.engine.collect import collect_terms
-from shipid.engine.integrate import Array, Batch, Job, Method, integrate, num_threads
-from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build, load, run_compiler
-from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, Printed, print_function
-from shipid.engine.tables import Table, even_tables, find_tables
-from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import DOUBLE, SINGLE, Precision, Target, head
-from shipid.errors import visible
+from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, count_threads, integrate_step
+from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build_library, load_library, run_compiler
+from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, PrintedFunction, print_function
+from shipid.engine.tables import RampTable, even_tables, find_tables
+from shipid.engine.threads import run_tasks, threaded_source
+from shipid.engine.vectors import DOUBLE, SINGLE, CompilerTarget, Precision, vector_source
+from shipid.errors import escape_unprintable
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
@@ -51,13 +51,13 @@ _OPERATIONS = {
 }
 
 
-def _constant(value: float) -> str:
+def _constant_in_c(value: float) -> str:
     """A plain number as a vector; C has words for what is not finite."""
     word = "NAN" if math.isnan(value) else repr(value) if math.isfinite(value) else "INFINITY"
     return f"K(-{word})" if value == -math.inf else f"K({word})"
 
 
-C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", _constant, "NUMBER({0})")
+C = Dialect(ARITHMETIC | _OPERATIONS, "__auto_type {0} = {1};", _constant_in_c, "NUMBER({0})")
 _SUM_STAGES = (*STAGES, ("state", "memory"))  # what does not depend on the component is computed before the sum
 
 _SIZES = ("parts", "stride", "samples", "steps", "every", "num_rows")
@@ -81,7 +81,7 @@ BLOCK = 8  # groups that step together, so that records are written in runs; one
 
 
 @cache
-def _probed() -> tuple[str, bytes] | None:
+def _probe_compiler() -> tuple[str, bytes] | None:
     """Path of a C compiler that can build a shared library, and a library that it built; None if there is none."""
     trial = "#include <math.h>\ndouble run(double x) { return sin(x); }"
     tried: set[str] = set()
@@ -93,14 +93,18 @@ def _probed() -> tuple[str, bytes] | None:
         try:
             with tempfile.TemporaryDirectory() as folder:
                 library = Path(folder) / "probe.so"
-                failure = build(_command(command, Target(1)), trial, library, PROBE_LIMIT)
+                failure = build_library(_compiler_command(command, CompilerTarget(1)), trial, library, PROBE_LIMIT)
                 if failure is None:
                     return command, library.read_bytes()
         except OSError as error:
             place = f"no temporary folder can be made ({error.strerror}): set TMPDIR to a folder that can be written"
             log.warning("engine 'native' is not used, others are slower: %s", place)
             return None
-        log.warning("the C compiler %s cannot be used (%s)", visible(command), visible(failure.splitlines()[0]))
+        log.warning(
+            "the C compiler %s cannot be used (%s)",
+            escape_unprintable(command),
+            escape_unprintable(failure.splitlines()[0]),
+        )
     if not tried:
         log.warning("engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)")
     return None
@@ -110,59 +114,59 @@ _refused: list[str] = []  # why this process compiles no more, if so
 _interpreted: set[str] = set()  # functions that this process could not compile, while it goes on with others
 
 
-def compiler() -> str | None:
+def find_compiler() -> str | None:
     """Path of a C compiler whose libraries can be kept and loaded here; None if there is none."""
-    probed = None if _refused else _probed()
-    return None if probed is None or _folder() is None else probed[0]
+    probed = None if _refused else _probe_compiler()
+    return None if probed is None or _native_folder() is None else probed[0]
 
 
-def engine() -> str:
+def engine_description() -> str:
     """What computes rollouts on this machine: the native engine with its compiler and vectors, or CasADi."""
-    command = compiler()
+    command = find_compiler()
     if command is None:
         return "casadi"
     version = (compiler_version(command).splitlines() or ["?"])[0]
-    wanted = target()
+    wanted = compiler_target()
     missing = ", no libmvec" if wanted.fused and not wanted.prefix else ""  # other functions round otherwise
     apart = "".join(f", {name} by CasADi" for name in sorted(_interpreted))
-    return f"native, {visible(version)[:LONGEST_VERSION]}, {wanted.lanes} lanes{missing}{apart}"
+    return f"native, {escape_unprintable(version)[:LONGEST_VERSION]}, {wanted.lanes} lanes{missing}{apart}"
 
 
-def engine_so_far() -> str | None:
-    """What computes rollouts in this process by now, as `engine`: no longer the native one where a model was refused.
+def noted_engine() -> str | None:
+    """What computes rollouts in this process by now, as `engine_description`: no longer the native one where a model was refused.
 
     None where nothing has asked for a compiler yet; to look for one takes a moment.
     """
-    return engine() if _refused or _probed.cache_info().currsize else None
+    return engine_description() if _refused or _probe_compiler.cache_info().currsize else None
 
 
-def refuse(reason: str) -> None:
+def refuse_compiling(reason: str) -> None:
     """Say once that this process compiles no more, and why: from now on there is no compiler."""
     if not _refused:
-        log.warning("engine 'native' is not used, others are slower: %s", visible(reason))
+        log.warning("engine 'native' is not used, others are slower: %s", escape_unprintable(reason))
     _refused.append(reason)
 
 
-def interpret(name: str, reason: str) -> None:
+def note_interpretation(name: str, reason: str) -> None:
     """Say why this process does not compile a function: CasADi computes it, and rollouts keep their engine."""
-    log.warning("%s is not compiled (%s): slower", name, visible(reason))
+    log.warning("%s is not compiled (%s): slower", name, escape_unprintable(reason))
     _interpreted.add(name)
 
 
-def _cache() -> str:
+def _user_cache() -> str:
     """The user's folder for what can be made anew."""
     wanted = os.environ.get("XDG_CACHE_HOME", "")
     return wanted if os.path.isabs(wanted) else os.path.join(os.path.expanduser("~"), ".cache")  # as it is specified
 
 
-def _folder() -> Path | None:
+def _native_folder() -> Path | None:
     """Folder of compiled libraries in the user's cache; None if none can be loaded here."""
-    probed = _probed()
-    return None if probed is None else libraries.folder(_cache(), probed[1])
+    probed = _probe_compiler()
+    return None if probed is None else libraries.library_folder(_user_cache(), probed[1])
 
 
 @cache
-def _processor() -> frozenset[str]:
+def _processor_flags() -> frozenset[str]:
     """Feature flags of the processor; empty if the system does not report them."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
@@ -172,28 +176,28 @@ def _processor() -> frozenset[str]:
 
 
 @cache
-def target(precision: Precision = DOUBLE) -> Target:
+def compiler_target(precision: Precision = DOUBLE) -> CompilerTarget:
     """Widest vectors of this processor, with the vector functions of glibc if they can be linked."""
-    command, x86, wide = compiler(), platform.machine() in ("x86_64", "AMD64"), 64 // precision.bits
-    if x86 and "avx512f" in _processor():
+    command, x86, wide = find_compiler(), platform.machine() in ("x86_64", "AMD64"), 64 // precision.bits
+    if x86 and "avx512f" in _processor_flags():
         flags = ("-march=native", "-mprefer-vector-width=512")
-        best = Target(8 * wide, flags, f"_ZGVeN{8 * wide}", fused=True, precision=precision)
-    elif x86 and {"avx2", "fma"} <= _processor():
+        best = CompilerTarget(8 * wide, flags, f"_ZGVeN{8 * wide}", fused=True, precision=precision)
+    elif x86 and {"avx2", "fma"} <= _processor_flags():
         flags = ("-march=native", "-mtune=haswell")  # tuned for later AMD, GCC splits a * b + c: 12 % slower
-        best = Target(4 * wide, flags, f"_ZGVdN{4 * wide}", fused=True, precision=precision)
+        best = CompilerTarget(4 * wide, flags, f"_ZGVdN{4 * wide}", fused=True, precision=precision)
     else:
-        best = Target(2 * wide, precision=precision)
+        best = CompilerTarget(2 * wide, precision=precision)
     if command is None or not best.prefix:
         return best
     called = f"{best.prefix}v_tanh{precision.letter}"
     probe = f"typedef {precision.real} V __attribute__((vector_size({precision.bits // 8 * best.lanes}))); "
     probe += f"V {called}(V); V run(V x) {{ return {called}(x); }}"
     with tempfile.TemporaryDirectory() as folder:
-        failure = build(_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
+        failure = build_library(_compiler_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
     return best if failure is None else replace(best, prefix="")
 
 
-def _command(command: str, wanted: Target, further: Sequence[str] = ()) -> list[str]:
+def _compiler_command(command: str, wanted: CompilerTarget, further: Sequence[str] = ()) -> list[str]:
     """Command that compiles `{source}` into the shared library `{library}`; later options take precedence."""
     mvec = ["-Wl,--no-undefined", "-lmvec"] if wanted.prefix else []
     return [command, *OPTIONS, *further, *wanted.flags, "{source}", "-o", "{library}", *mvec, "-lm"]
@@ -205,7 +209,7 @@ def compiler_version(command: str) -> str:
     return run_compiler([command, "--version"], limit=PROBE_LIMIT)[1]
 
 
-def _measure(of: Precision) -> str:
+def _distance_source(of: Precision) -> str:
     """C functions: distances of a group, noted and later tallied. A number without its last bits is its bin's."""
     shift = SHIFT - DOUBLE.mantissa + of.mantissa
     first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * BINS_AN_OCTAVE
@@ -232,12 +236,12 @@ static inline V measured(V north, V east, long samples, Notes *notes, unsigned *
 """
 
 
-class Parts:
+class StagedSource:
     """Base of a C source: functions printed in stages, whose saved values share one array for each stage."""
 
-    all: Sequence[Printed]
+    all: Sequence[PrintedFunction]
 
-    def offset(self, stage: int, printed: Printed) -> int:
+    def offset(self, stage: int, printed: PrintedFunction) -> int:
         """Index of the first saved value of a function in the array of a stage."""
         before = self.all[: next(i for i, other in enumerate(self.all) if other is printed)]
         return sum(len(other.saved[stage]) for other in before)
@@ -255,18 +259,18 @@ class Parts:
             texts.append(self.block(printed, range(number), [*printed.lines[number], *saves]))
         return " ".join(texts)
 
-    def block(self, printed: Printed, stages: Sequence[int], lines: Sequence[str]) -> str:
+    def block(self, printed: PrintedFunction, stages: Sequence[int], lines: Sequence[str]) -> str:
         """A C block with `lines`, preceded by pointers to the values that the given stages saved."""
         heads = [f"const V *s{stage} = saved{stage} + {self.offset(stage, printed)};" for stage in stages]
         return "{ " + "\n".join([*heads, *lines]) + " }"
 
 
-def integrated(
+def step_statements(
     num_states: int, num_memory: int, rates: str, advance: str, step: float, method: Method
 ) -> tuple[list[str], str, str]:
     """C statements of one step from `x` and `m`, and the names of state and memory after it.
 
-    `integrate` runs on names of buffers, and each operation emits a line.
+    `integrate_step` runs on names of buffers, and each operation emits a line.
 
     rates : C call with places for state, memory and result. advance : the same for memory, time [s] and result.
     """
@@ -277,7 +281,7 @@ def integrated(
         lines.append(f"V {out}[{max(1, size)}]; " + line.format(*given, out))
         return out
 
-    after, later = integrate(
+    after, later = integrate_step(
         lambda x, m: named(num_states, rates, x, m),
         lambda m, dt: named(num_memory, advance, m, dt),
         lambda x, a, k: named(num_states, _ADD, num_states, x, a, k),
@@ -286,19 +290,19 @@ def integrated(
     return lines, after, later
 
 
-def _rates(model: Dynamics) -> ca.Function:
+def _collected_rates(model: Dynamics) -> ca.Function:
     """The rates of a model as the engine computes them."""
     return collect_terms(model.rates, frozenset(name for stage in STAGES for name in stage))
 
 
-class _Source(Parts):
+class _RolloutSource(StagedSource):
     """C source of one model: terms of parameters are computed once, terms of inputs once while they are constant."""
 
     def __init__(
-        self, model: Dynamics, step: float, method: Method, wanted: Target, tables: Mapping[int, Table]
+        self, model: Dynamics, step: float, method: Method, wanted: CompilerTarget, tables: Mapping[int, RampTable]
     ) -> None:
         self.model, self.step, self.method, self.wanted = model, step, method, wanted
-        rates = print_function(_rates(model), STAGES, replace(C, lookup=wanted.lookup), tables)
+        rates = print_function(_collected_rates(model), STAGES, replace(C, lookup=wanted.lookup), tables)
         self.equations = [rates, print_function(model.advance, STAGES, C)]
         self.sums = [print_function(term.function, _SUM_STAGES, C) for term in model.sums]
         self.all = [*self.equations, *self.sums]
@@ -346,7 +350,7 @@ const V dt[1] = {{ K(step) }};
         """C statements of one step."""
         nx, nm = len(self.model.state) + len(self.model.hidden), len(self.model.memory)
         rates = "rates({0}, {1}, tau, saved0, saved1, components, counts, {2});"
-        lines, after, later = integrated(
+        lines, after, later = step_statements(
             nx, nm, rates, "advance(x, {0}, {1!r}, saved0, saved1, {2});", self.step, self.method
         )
         copy = f"for (int i = 0; i < {nx}; ++i) x[i] = {after}[i];"
@@ -424,157 +428,176 @@ for (long front = groups * part / parts; front < last; front += {block}) {{
   }}
 }}
 if (tally) count(&notes, tally);"""
-        return f"""{_FOR_GCC}{head(wanted)}
+        return f"""{_FOR_GCC}{vector_source(wanted)}
 {wanted.lookup.head() if wanted.lookup else ""}
 {self.functions()}
-{_measure(wanted.precision)}
+{_distance_source(wanted.precision)}
 #define AT(array, row) ((U *)((array) + (row) * stride + g * W))
 #define NOW(series, k) ((k) < lengths[series] ? (k) : lengths[series] - 1)
 #define ROW(i) (rows[i] < {nx} ? x[rows[i]] : m[rows[i] - {nx}])
 #define NOTE(record) for (long i = 0; i < num_rows; ++i) *AT(records, (record) * num_rows + i) = ROW(i);
 #define EACH_GROUP(end) for (long g = front, j = 0; g < end; ++g, ++j)
 #define ONE_VARIANT(array, size) if (array) array += number / parts * (size);
-{threaded(_SIZES, _ARRAYS, task)}"""
+{threaded_source(_SIZES, _ARRAYS, task)}"""
 
 
 @lru_cache(maxsize=64)
-def _library(model: Dynamics, step: float, method: Method, precision: Precision, looked_up: Sequence[int]) -> Any:
+def _compile_rollout(
+    model: Dynamics, step: float, method: Method, precision: Precision, looked_up: Sequence[int]
+) -> Any:
     """The compiled function `run` of a model, from the cache if possible; some of its tables are looked up."""
-    tables = {k: find_tables(_rates(model))[k] for k in looked_up}
-    return compiled_for(lambda: _Source(model, step, method, target(precision), tables).text())
+    tables = {k: find_tables(_collected_rates(model))[k] for k in looked_up}
+    return compile_or_explain(lambda: _RolloutSource(model, step, method, compiler_target(precision), tables).text())
 
 
-def compiled_for(source: Callable[[], str]) -> Any:
+def compile_or_explain(source: Callable[[], str]) -> Any:
     """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
-    if compiler() is None:
+    if find_compiler() is None:
         raise NoLibrary(
             "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
         )
     try:
-        return compiled(source())
+        return compile_source(source())
     except NoLibrary as error:
         raise NoLibrary(f"{error.message}: use engine 'torch'") from None
 
 
-def compiled(source: str, further: Sequence[str] = ()) -> Any:
+def compile_source(source: str, further: Sequence[str] = ()) -> Any:
     """The compiled function `run` of C source, from the cache if possible; `further`: options of the compiler.
 
     A library in the cache that is damaged or may be another user's is not loaded but compiled anew. NoLibrary if the
     compiler fails or hangs, or where nothing can be written.
     """
-    command, folder = compiler(), _folder()
+    command, folder = find_compiler(), _native_folder()
     if command is None or folder is None:
         raise NoLibrary("there is no C compiler")
-    words = [source, *OPTIONS, *further, command, compiler_version(command), platform.machine(), *sorted(_processor())]
+    words = [
+        source,
+        *OPTIONS,
+        *further,
+        command,
+        compiler_version(command),
+        platform.machine(),
+        *sorted(_processor_flags()),
+    ]
     library = folder / f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
     try:
-        return load(library)
+        return load_library(library)
     except OSError:
         pass  # not there
     except NoLibrary as error:
-        log.warning("%s: compiled anew", visible(error.message))
-    failure = build(_command(command, target(), further), source, library)
+        log.warning("%s: compiled anew", escape_unprintable(error.message))
+    failure = build_library(_compiler_command(command, compiler_target(), further), source, library)
     if failure is not None:
         raise NoLibrary(f"the C compiler failed ({failure.splitlines()[0]})")
     try:
-        return load(library)
+        return load_library(library)
     except OSError as error:
         raise NoLibrary(f"{library} is gone ({error.strerror})") from None
 
 
-def padded(array: Array, wide: int, precision: Precision = DOUBLE) -> Array:
+def pad_samples(array: Array, wide: int, precision: Precision = DOUBLE) -> Array:
     """Pad samples to whole vectors: (..., S) -> (..., wide), the last sample repeated."""
     fill = wide - array.shape[-1]
     filled = np.concatenate([array, np.repeat(array[..., -1:], fill, axis=-1)], axis=-1) if fill else array
     return np.ascontiguousarray(filled, dtype=precision.dtype)
 
 
-def _packed(array: Array, lanes: int, precision: Precision) -> Array:
+def _pack_groups(array: Array, lanes: int, precision: Precision) -> Array:
     """(component, entry, S) -> (groups, component, entry, lanes): what one group reads at every step lies together."""
     count, entries, num_samples = array.shape
     groups = -(-num_samples // lanes)
-    filled = padded(array, groups * lanes, precision).reshape(count, entries, groups, lanes)
+    filled = pad_samples(array, groups * lanes, precision).reshape(count, entries, groups, lanes)
     return np.ascontiguousarray(filled.transpose(2, 0, 1, 3))
 
 
-def run_native(model: Dynamics, batch: Batch, job: Job, precision: Precision = DOUBLE) -> tuple[Array, Array]:
+def run_native(
+    model: Dynamics, batch: RolloutBatch, job: RolloutJob, precision: Precision = DOUBLE
+) -> tuple[Array, Array]:
     """Records (R, V, S, C) and the greatest speed (V, S)."""
     num_samples = batch.state.shape[1]
-    records, worst = packed_records(model, batch, job, precision)
+    records, worst = run_packed(model, batch, job, precision)
     return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
 
 
-def packed_records(model: Dynamics, batch: Batch, job: Job, precision: Precision = DOUBLE) -> tuple[Array, Array]:
+def run_packed(
+    model: Dynamics, batch: RolloutBatch, job: RolloutJob, precision: Precision = DOUBLE
+) -> tuple[Array, Array]:
     """Records (V, R, C, width) and the greatest speed (V, width) as C writes them, whole vectors of samples."""
-    num_variants, wide = len(batch.parameters), width(batch, precision)
+    num_variants, wide = len(batch.parameters), padded_width(batch, precision)
     records = np.empty((num_variants, job.num_steps // job.every + 1, len(job.rows), wide), precision.dtype)
     worst = np.empty((num_variants, wide), precision.dtype)
-    _run(model, batch, job, precision, worst=worst, records=records)
+    _run_job(model, batch, job, precision, worst=worst, records=records)
     return records, worst
 
 
 def measure_native(
-    model: Dynamics, batch: Batch, job: Job, goal: Array, precision: Precision = DOUBLE
+    model: Dynamics, batch: RolloutBatch, job: RolloutJob, goal: Array, precision: Precision = DOUBLE
 ) -> tuple[Array, Array, Array]:
     """Sum of distances (V, S), tally of distances (V, BINS) and the greatest speed (V, S), with no path kept.
 
     The distances are those of the job's two channels to `goal` (T, 2, S), after every step.
     """
-    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), width(batch, precision)
+    num_samples, num_variants, wide = batch.state.shape[1], len(batch.parameters), padded_width(batch, precision)
     sums, worst = (np.empty((num_variants, wide), precision.dtype) for _ in range(2))
-    tally = np.zeros((num_variants, num_parts(batch, precision), BINS), dtype=np.uint32)
-    there = _packed(goal, target(precision).lanes, precision)
-    _run(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
+    tally = np.zeros((num_variants, count_parts(batch, precision), BINS), dtype=np.uint32)
+    there = _pack_groups(goal, compiler_target(precision).lanes, precision)
+    _run_job(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
     whole = tally[:, 0] if tally.shape[1] == 1 else tally.sum(axis=1, dtype=np.uint32)
     return sums[:, :num_samples].astype(float, copy=False), whole, worst[:, :num_samples]
 
 
-def run_single(model: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def run_single(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
     """As `run_native`, in single precision."""
     records, worst = run_native(model, batch, job, SINGLE)
     return records.astype(float), worst
 
 
-def measure_single(model: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
+def measure_single(model: Dynamics, batch: RolloutBatch, job: RolloutJob, goal: Array) -> tuple[Array, Array, Array]:
     """As `measure_native`, in single precision."""
     return measure_native(model, batch, job, goal, SINGLE)
 
 
-def width(batch: Batch, precision: Precision = DOUBLE) -> int:
+def padded_width(batch: RolloutBatch, precision: Precision = DOUBLE) -> int:
     """Number of samples, rounded up to whole vectors."""
-    lanes = target(precision).lanes
+    lanes = compiler_target(precision).lanes
     return -(-int(batch.state.shape[1]) // lanes) * lanes
 
 
-def num_parts(batch: Batch, precision: Precision = DOUBLE) -> int:
+def count_parts(batch: RolloutBatch, precision: Precision = DOUBLE) -> int:
     """Number of parts of the samples of a variant, each a task: enough for an even load on all cores."""
-    return min(PARTS * num_threads() // len(batch.parameters) + 1, width(batch, precision) // target(precision).lanes)
+    return min(
+        PARTS * count_threads() // len(batch.parameters) + 1,
+        padded_width(batch, precision) // compiler_target(precision).lanes,
+    )
 
 
-def _run(model: Dynamics, batch: Batch, job: Job, precision: Precision, **wanted: Array) -> None:
+def _run_job(model: Dynamics, batch: RolloutBatch, job: RolloutJob, precision: Precision, **wanted: Array) -> None:
     """Run a job and fill the arrays in `wanted`: `worst`, and `records`, or `sums` and `tally` for a `goal`."""
-    lanes, wide, parts = target(precision).lanes, width(batch, precision), num_parts(batch, precision)
-    series = {name: padded(getattr(batch, name), wide, precision) for name in ("commands", "environment")}
-    series["extra"] = padded(batch.tau_extra, wide, precision)
-    drawn = [_packed(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
+    lanes, wide, parts = compiler_target(precision).lanes, padded_width(batch, precision), count_parts(batch, precision)
+    series = {name: pad_samples(getattr(batch, name), wide, precision) for name in ("commands", "environment")}
+    series["extra"] = pad_samples(batch.tau_extra, wide, precision)
+    drawn = [_pack_groups(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
     arrays: dict[str, Array] = {
-        "lengths": longs(len(part) for part in series.values()),
-        "counts": longs(part.shape[1] for part in drawn),
-        "rows": longs(job.rows),
+        "lengths": as_c_longs(len(part) for part in series.values()),
+        "counts": as_c_longs(part.shape[1] for part in drawn),
+        "rows": as_c_longs(job.rows),
         "drawn": np.array([part.ctypes.data for part in drawn], dtype=np.uintp),
         "values": np.ascontiguousarray(batch.parameters, dtype=precision.dtype),
-        "start": padded(batch.state, wide, precision),
-        "memory": padded(batch.memory, wide, precision),
+        "start": pad_samples(batch.state, wide, precision),
+        "memory": pad_samples(batch.memory, wide, precision),
         **series,
         **wanted,
     }
     sizes = (parts, wide, batch.state.shape[1], job.num_steps, job.every, len(job.rows))
     work = wide / lanes / parts * job.num_steps * (1 + sum(part.shape[1] for part in drawn))
-    looked_up = tuple(even_tables(_rates(model), batch.parameters)) if target(precision).lookup else ()
-    run = _library(model, job.step, job.method, precision, looked_up)
-    in_parallel(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
+    looked_up = (
+        tuple(even_tables(_collected_rates(model), batch.parameters)) if compiler_target(precision).lookup else ()
+    )
+    run = _compile_rollout(model, job.step, job.method, precision, looked_up)
+    run_tasks(run, sizes, (arrays.get(name) for name in _ARRAYS), parts * len(batch.parameters), work)
 
 
-def longs(numbers: Iterable[int]) -> Array:
+def as_c_longs(numbers: Iterable[int]) -> Array:
     """Integers as C `long`."""
     return np.array(list(numbers), dtype=np.dtype("l"))

@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 import casadi as ca
 
-from shipid.engine.graph import operate
-from shipid.engine.tables import Lookup, Table
+from shipid.engine.graph import apply_operation
+from shipid.engine.tables import RampTable, TableLookup
 
 ARITHMETIC = {  # the same in every dialect
     ca.OP_NEG: "(-{0})",
@@ -52,14 +52,14 @@ class Dialect:
     assignment: str
     constant: Callable[[float], str]
     number: str
-    lookup: Lookup | None = None
+    lookup: TableLookup | None = None
 
 
 STAGES = (("parameters",), ("commands", "environment"))  # once a rollout; once a window while commands are held
 
 
 @dataclass(frozen=True)
-class Printed:
+class PrintedFunction:
     """A function as text, in stages: what depends on early inputs alone is computed early, and once.
 
     lines : of each stage, then of main; a value `a7` of an earlier stage is read as `s0[3]`.
@@ -83,8 +83,8 @@ def print_function(
     function: ca.Function,
     stages: Sequence[Sequence[str]],
     dialect: Dialect,
-    tables: Mapping[int, Table] = MappingProxyType({}),
-) -> Printed:
+    tables: Mapping[int, RampTable] = MappingProxyType({}),
+) -> PrintedFunction:
     """Print an SX function of dense vectors with one output; ValueError for an instruction the dialect lacks.
 
     tables : those to be looked up, by the number of the instruction that gives them.
@@ -96,7 +96,7 @@ def print_function(
 
 
 @dataclass(frozen=True)
-class _Value:
+class _SlotValue:
     """What a work slot holds: its text, the stage that computes it (-1: a plain number), and if it is a boolean."""
 
     text: str
@@ -108,7 +108,7 @@ class _Printer:
     """Prints instructions as lines, each in the earliest stage that knows its operands."""
 
     def __init__(
-        self, function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect, tables: Mapping[int, Table]
+        self, function: ca.Function, stages: Sequence[Sequence[str]], dialect: Dialect, tables: Mapping[int, RampTable]
     ) -> None:
         self.function = function
         self.dialect = dialect
@@ -118,9 +118,9 @@ class _Printer:
         self.stage_of = [early.get(name, self.last) for name in self.names]
         self.lines: list[list[str]] = [[] for _ in range(self.last + 1)]
         self.saved: list[dict[str, int]] = [{} for _ in stages]
-        self.slot: dict[int, _Value] = {}
-        self.values: dict[int, _Value] = {}  # of instructions
-        self.outputs: dict[int, _Value] = {}
+        self.slot: dict[int, _SlotValue] = {}
+        self.values: dict[int, _SlotValue] = {}  # of instructions
+        self.outputs: dict[int, _SlotValue] = {}
         self.tables = tables if dialect.lookup else {}
         self.axes: dict[tuple[int, ...], str] = {}  # where x of tables on one axis lies
 
@@ -129,9 +129,9 @@ class _Printer:
         operation = self.function.instruction_id(k)
         source, target = self.function.instruction_input(k), self.function.instruction_output(k)
         if operation == ca.OP_CONST:
-            self.slot[target[0]] = _Value(repr(float(self.function.instruction_constant(k))), -1)
+            self.slot[target[0]] = _SlotValue(repr(float(self.function.instruction_constant(k))), -1)
         elif operation == ca.OP_INPUT:
-            self.slot[target[0]] = _Value(f"{self.names[source[0]]}[{source[1]}]", self.stage_of[source[0]])
+            self.slot[target[0]] = _SlotValue(f"{self.names[source[0]]}[{source[1]}]", self.stage_of[source[0]])
         elif operation == ca.OP_OUTPUT:
             self.outputs[target[1]] = self.slot[source[0]]
         else:
@@ -140,7 +140,7 @@ class _Printer:
         if operation != ca.OP_OUTPUT:
             self.values[k] = self.slot[target[0]]
 
-    def looked_up(self, k: int) -> _Value | None:
+    def looked_up(self, k: int) -> _SlotValue | None:
         """Print a lookup in a table whose numbers the first stage knows; None for another table."""
         table, lookup = self.tables[k], self.dialect.lookup
         x, size = self.values[table.x], len(table.knots)
@@ -156,30 +156,32 @@ class _Printer:
         rows = self.kept(*lookup.table(f"table{k}", axis, ordinate, slope, bends[: part - 1]))
         terms = [lookup.value(axis, rows), *(self.values[i].text for i in table.ramps[part - 1 :])]
         self.lines[-1].append(self.dialect.assignment.format(f"a{k}", " + ".join(terms)))
-        return _Value(f"a{k}", self.last)
+        return _SlotValue(f"a{k}", self.last)
 
     def kept(self, line: str, texts: Sequence[str]) -> list[str]:
         """Print a line into the first stage and save what it computes: the texts of it in main."""
         self.lines[0].append(line)
-        return [self.use(_Value(text, 0), self.last) for text in texts]
+        return [self.use(_SlotValue(text, 0), self.last) for text in texts]
 
-    def operation(self, k: int, operation: int, operands: list[_Value]) -> _Value:
+    def operation(self, k: int, operation: int, operands: list[_SlotValue]) -> _SlotValue:
         """Print an operation; one on numbers alone is done here and now."""
         template = self.dialect.operations.get(operation)
         if template is None:
             raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no counterpart")
         stage = max(operand.stage for operand in operands)
         if stage < 0:
-            return _Value(repr(float(ca.evalf(operate(operation, [ca.SX(float(o.text)) for o in operands])))), -1)
+            return _SlotValue(
+                repr(float(ca.evalf(apply_operation(operation, [ca.SX(float(o.text)) for o in operands])))), -1
+            )
         if operation == ca.OP_DIV and 0 <= operands[1].stage < stage:  # divide once, early; then multiply
             operands[1] = self.reciprocal(operands[1])
             template = self.dialect.operations[ca.OP_MUL]
         bare = _TAKES_TRUTH.get(operation, 0)
         texts = [self.use(operand, stage, place < bare) for place, operand in enumerate(operands)]
         self.lines[stage].append(self.dialect.assignment.format(f"a{k}", template.format(*texts)))
-        return _Value(f"a{k}", stage, operation in _TRUTH)
+        return _SlotValue(f"a{k}", stage, operation in _TRUTH)
 
-    def use(self, value: _Value, stage: int, truth_is_fine: bool = False) -> str:
+    def use(self, value: _SlotValue, stage: int, truth_is_fine: bool = False) -> str:
         """Text of a value inside a stage; one of an earlier stage is saved there, as a number."""
         if value.stage < 0:
             return self.dialect.constant(float(value.text))
@@ -189,13 +191,13 @@ class _Printer:
         saved = self.saved[value.stage]
         return f"s{value.stage}[{saved.setdefault(text, len(saved))}]"
 
-    def reciprocal(self, value: _Value) -> _Value:
+    def reciprocal(self, value: _SlotValue) -> _SlotValue:
         """One over a value, in the stage that computes it."""
         text = self.dialect.number.format(value.text) if value.truth else value.text
-        return _Value(self.dialect.operations[ca.OP_INV].format(text), value.stage)
+        return _SlotValue(self.dialect.operations[ca.OP_INV].format(text), value.stage)
 
-    def finish(self) -> Printed:
+    def finish(self) -> PrintedFunction:
         """The lines of all stages, what they save for later stages, and the expressions of the outputs."""
         outputs = tuple(self.use(self.outputs[i], self.last) for i in sorted(self.outputs))
         lines = tuple(tuple(stage) for stage in self.lines)
-        return Printed(lines, tuple(map(tuple, self.saved)), outputs, tuple(self.names), tuple(self.stage_of))
+        return PrintedFunction(lines, tuple(map(tuple, self.saved)), outputs, tuple(self.names), tuple(self.stage_of))

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import by_name, names_of, numbers, of_class, whole_number
-from shipid.engine.engines import REPEATED, Engine, chosen, done_by, named
-from shipid.engine.integrate import Array, Batch, Job, Method
-from shipid.errors import DataError, ShipidError, choices
-from shipid.metrics import position_error, tally
+from shipid.arguments import as_float_array, as_names, check_class, check_mapping, check_whole_number
+from shipid.engine.engines import REPEATED, Engine, choose_engine, engine_by_name, run_with_fallback
+from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob
+from shipid.errors import DataError, ShipidError, suggest_name
+from shipid.metrics import position_error, tally_errors
 from shipid.physics.helm import Helmsman
-from shipid.physics.signals import ACTUAL, is_command, row_of
-from shipid.vessel.dynamics import HELM, Dynamics, dynamics
+from shipid.physics.signals import ACTUAL, is_command, signal_row
+from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 MOST_STEPS = 10**12
@@ -33,7 +33,7 @@ class Trajectories:
     """Result of a rollout.
 
     u, v and r are along the axes of the ship; those of a log are horizontal, which differs where she heels or trims:
-    `shipid.simulation.log.horizontal` converts them.
+    `shipid.simulation.log.horizontal_velocities` converts them.
 
     states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
     diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
@@ -49,7 +49,7 @@ class Trajectories:
     def __getitem__(self, name: str) -> Array:
         """One channel, (num_records, num_variants, num_samples); ShipidError for one that was not recorded."""
         if not isinstance(name, str) or name not in self.names:
-            raise ShipidError(f"no channel {name!r} was recorded: {choices(name, self.names)}")
+            raise ShipidError(f"no channel {name!r} was recorded: {suggest_name(name, self.names)}")
         return self.states[..., self.names.index(name)]
 
 
@@ -101,50 +101,50 @@ def rollout(
     ShipidError : an array of another shape or without numbers, a step or number of steps that is not positive, an
         unknown method, engine, channel, parameter, component or signal of the environment.
     """
-    asked = named(engine, device)
-    num_steps, every = whole_number("num_steps", num_steps, 1), whole_number("every", every, 1)
+    asked = engine_by_name(engine, device)
+    num_steps, every = check_whole_number("num_steps", num_steps, 1), check_whole_number("every", every, 1)
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, not {num_steps} and {every}")
-    check_steps(num_steps)
+    check_step_count(num_steps)
     given = start, commands, {} if environment is None else environment, {} if components is None else components
-    model, batch = prepared(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
-    _check_names("environment", environment, model.environment, vessel)
-    _check_names("commands", commands, model.commands, vessel)
-    names = channels(model)
-    kept = names if keep is None else names_of("keep", keep)
-    job = Job(step, num_steps, method, every, places(kept, names, vessel), device)
+    model, batch = prepare_batch(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
+    _check_channel_names("environment", environment, model.environment, vessel)
+    _check_channel_names("commands", commands, model.commands, vessel)
+    names = channel_names(model)
+    kept = names if keep is None else as_names("keep", keep)
+    job = RolloutJob(step, num_steps, method, every, channel_places(kept, names, vessel), device)
     with np.errstate(all="ignore"):
-        records, diverged = done_by(
+        records, diverged = run_with_fallback(
             asked,
-            lambda: chosen(batch, job, engine == REPEATED),
-            lambda way: _judged(way, batch, *way.run(model, batch, job)),
+            lambda: choose_engine(batch, job, engine == REPEATED),
+            lambda way: _with_divergence(way, batch, *way.run(model, batch, job)),
         )
     return Trajectories(records, kept, diverged, step * every)
 
 
-def _judged(way: Engine, batch: Batch, *results: Array) -> tuple[Array, ...]:
+def _with_divergence(way: Engine, batch: RolloutBatch, *results: Array) -> tuple[Array, ...]:
     """Results of an engine, with whether each (variant, sample) has diverged in place of its greatest speed."""
     *kept, worst = results
     slow = worst <= SPEED_LIMIT
-    return *kept, ~(slow if way.checks else slow & finite(batch))
+    return *kept, ~(slow if way.checks else slow & finite_samples(batch))
 
 
-def check_steps(num_steps: int) -> None:
+def check_step_count(num_steps: int) -> None:
     """Raise ShipidError for more steps than any computer does."""
     if num_steps > MOST_STEPS:
         raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
 
 
-def _check_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:
+def _check_channel_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:
     """Raise ShipidError for a name in a dict that is neither of the vessel nor of any signal; a table may have more.
 
     A command belongs to a component of one vessel, so a command that this vessel lacks is an error, too.
     """
     odd = [] if not isinstance(given, Mapping) else [str(name) for name in given if name not in names]
     commands = what == "commands"
-    unknown = next((name for name in odd if row_of(name) is None or (commands and is_command(name))), None)
+    unknown = next((name for name in odd if signal_row(name) is None or (commands and is_command(name))), None)
     if unknown is not None:
-        raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {choices(unknown, names)}")
+        raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {suggest_name(unknown, names)}")
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class Distances:
     """Distances of variants to true paths, without the predicted paths.
 
     total : (V, S) sum [m] over the steps of the distance to the true path.
-    tally : (V, BINS) how often each distance occurs, see `shipid.metrics.tally`.
+    tally : (V, BINS) how often each distance occurs, see `shipid.metrics.tally_errors`.
     diverged : (V, S) as in `Trajectories`.
     """
 
@@ -161,7 +161,7 @@ class Distances:
     diverged: Array
 
 
-def distances(
+def rollout_distances(
     vessel: Vessel,
     start: Mapping[str, Array],
     commands: Mapping[str, Array],
@@ -181,35 +181,37 @@ def distances(
     does not grow with the horizon. Other engines keep the paths of a few variants at a time.
     """
     num_steps = len(goal)
-    asked = named(engine, device)
+    asked = engine_by_name(engine, device)
     if num_steps < 1:
         raise ShipidError("goal holds no step: give one position or more for each sample")
-    model, batch = prepared(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
+    model, batch = prepare_batch(vessel, start, commands, environment, {}, num_steps, parameters, memory, None, None)
     rows = model.state.index("north"), model.state.index("east")
-    job = Job(step, num_steps, method, 1, rows, device)
-    return done_by(
-        asked, lambda: chosen(batch, job, engine == REPEATED), lambda way: _distances(way, model, batch, job, goal)
+    job = RolloutJob(step, num_steps, method, 1, rows, device)
+    return run_with_fallback(
+        asked,
+        lambda: choose_engine(batch, job, engine == REPEATED),
+        lambda way: _distances_of_engine(way, model, batch, job, goal),
     )
 
 
-def _distances(way: Engine, model: Dynamics, batch: Batch, job: Job, goal: Array) -> Distances:
+def _distances_of_engine(way: Engine, model: Dynamics, batch: RolloutBatch, job: RolloutJob, goal: Array) -> Distances:
     """Distances by one engine."""
     if way.measure is not None:
-        return Distances(*_judged(way, batch, *way.measure(model, batch, job, goal.transpose(0, 2, 1))))
+        return Distances(*_with_divergence(way, batch, *way.measure(model, batch, job, goal.transpose(0, 2, 1))))
     few = max(1, PATHS_KEPT // goal.size)
     measured = []
     for first in range(0, len(batch.parameters), few):
         part = replace(batch, parameters=batch.parameters[first : first + few])
         with np.errstate(all="ignore"):
-            records, diverged = _judged(way, part, *way.run(model, part, job))
+            records, diverged = _with_divergence(way, part, *way.run(model, part, job))
             apart = [position_error(records[1:, v], goal) for v in range(records.shape[1])]
         measured.append(
-            (np.array([errors.sum(axis=0) for errors in apart]), np.array(list(map(tally, apart))), diverged)
+            (np.array([errors.sum(axis=0) for errors in apart]), np.array(list(map(tally_errors, apart))), diverged)
         )
     return Distances(*(np.concatenate(parts) for parts in zip(*measured, strict=True)))
 
 
-def prepared(
+def prepare_batch(
     vessel: Vessel,
     start: Mapping[str, Array],
     commands: Mapping[str, Array],
@@ -220,14 +222,14 @@ def prepared(
     memory: Mapping[str, Array] | None,
     tau_extra: Array | None,
     helmsman: Helmsman | None,
-) -> tuple[Dynamics, Batch]:
-    """Equations, and inputs as a `Batch`; DataError or ShipidError for a missing input or a wrong shape."""
+) -> tuple[Dynamics, RolloutBatch]:
+    """Equations, and inputs as a `RolloutBatch`; DataError or ShipidError for a missing input or a wrong shape."""
     given = {"start": start, "commands": commands, "environment": environment, "components": components}
     for name, value in (given if memory is None else {**given, "memory": memory}).items():
-        by_name(name, value, "a name to an array")
+        check_mapping(name, value, "a name to an array")
     if helmsman is not None:
-        of_class("helmsman", helmsman, Helmsman, "as of `Manoeuvre.helmsman`")
-    model = dynamics(vessel, helmsman)
+        check_class("helmsman", helmsman, Helmsman, "as of `Manoeuvre.helmsman`")
+    model = vessel_dynamics(vessel, helmsman)
     first = next((name for name in model.state if name in start), None)
     if first is None:
         raise DataError(f"start holds no state; {vessel.name} needs {', '.join(model.state)}")
@@ -237,34 +239,36 @@ def prepared(
     num_samples = shape[0]
     if num_samples == 0:
         raise ShipidError("a rollout needs at least one sample")
-    values = _variants(vessel, model.parameters, parameters)
+    values = _variant_numbers(vessel, model.parameters, parameters)
     begun = {**dict.fromkeys(model.hidden, np.zeros(num_samples)), **start}
-    batch = Batch(
-        state=_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel, held=True)[0],
+    batch = RolloutBatch(
+        state=_stack_channels((*model.state, *model.hidden), begun, num_samples, num_steps, "state", vessel, held=True)[
+            0
+        ],
         memory=np.zeros((0, num_samples)),
-        commands=_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
-        environment=_channels(model.environment, environment, num_samples, num_steps, "environment", vessel),
-        tau_extra=_tau(tau_extra, model.num_dof, num_samples, num_steps),
+        commands=_stack_channels(model.commands, commands, num_samples, num_steps, "command", vessel),
+        environment=_stack_channels(model.environment, environment, num_samples, num_steps, "environment", vessel),
+        tau_extra=_extra_force(tau_extra, model.num_dof, num_samples, num_steps),
         parameters=values,
-        components=_components(model, components, num_samples),
+        components=_drawn_components(model, components, num_samples),
     )
-    return model, replace(batch, memory=_memory(model, memory, batch, num_steps, vessel))
+    return model, replace(batch, memory=_initial_memory(model, memory, batch, num_steps, vessel))
 
 
-def channels(model: Dynamics) -> tuple[str, ...]:
+def channel_names(model: Dynamics) -> tuple[str, ...]:
     """Names of all channels that a rollout can record: states, states of terms, actuator states (`actual.port.n`)."""
     return (*model.state, *model.hidden, *(f"{ACTUAL}{name}" for name in model.memory))
 
 
-def places(kept: Sequence[str], names: Sequence[str], vessel: Vessel) -> tuple[int, ...]:
+def channel_places(kept: Sequence[str], names: Sequence[str], vessel: Vessel) -> tuple[int, ...]:
     """Indices of the channels to keep in `names`; ShipidError for an unknown channel."""
     unknown = next((name for name in kept if name not in names), None)
     if unknown is not None:
-        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {choices(unknown, names)}")
+        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {suggest_name(unknown, names)}")
     return tuple(names.index(name) for name in kept)
 
 
-def finite(batch: Batch) -> Array:
+def finite_samples(batch: RolloutBatch) -> Array:
     """Whether every input of a (variant, sample) is a number: fmin and fmax may hide a NaN in CasADi."""
     drawn = (part.swapaxes(1, 2) for part in batch.components)
     inputs = (batch.state, batch.memory, batch.commands, batch.environment, batch.tau_extra, *drawn)
@@ -272,7 +276,7 @@ def finite(batch: Batch) -> Array:
     return np.asarray(np.isfinite(batch.parameters).all(axis=1)[:, None] & samples)
 
 
-def _variants(vessel: Vessel, names: Sequence[str], parameters: Any) -> Array:
+def _variant_numbers(vessel: Vessel, names: Sequence[str], parameters: Any) -> Array:
     """Numbers (V, P) of the variants in the order of the names; what has labels is read by them."""
     if parameters is None:
         return np.array([list(vessel.parameters.values())])
@@ -283,16 +287,16 @@ def _variants(vessel: Vessel, names: Sequence[str], parameters: Any) -> Array:
         absent = next((name for name in names if name not in labels), None)
         odd = next((label for label in labels if label not in names), None)
         if absent is not None or odd is not None:
-            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {choices(odd, names)}"
+            what = f"lack {absent!r}" if odd is None else f"hold {odd!r}, {suggest_name(odd, names)}"
             raise ShipidError(f"parameters {what}: give every parameter of {vessel.name}, and no other")
-        parameters = np.stack([numbers(f"parameter {name!r}", parameters[name]) for name in names], axis=-1)
-    values = np.atleast_2d(numbers("parameters", parameters))
+        parameters = np.stack([as_float_array(f"parameter {name!r}", parameters[name]) for name in names], axis=-1)
+    values = np.atleast_2d(as_float_array("parameters", parameters))
     if values.ndim != 2 or values.shape[1] != len(names) or not len(values):
         raise ShipidError(f"parameters must be (variants, {len(names)}), not {values.shape}")
     return np.ascontiguousarray(values)
 
 
-def _channels(
+def _stack_channels(
     names: Sequence[str],
     given: Mapping[str, Array],
     num_samples: int,
@@ -310,7 +314,7 @@ def _channels(
             close = get_close_matches(name, [str(other) for other in given if other not in names], n=1)
             remedy = f"did you mean {close[0]!r}?" if close else f"give an array {shapes[0]}"
             raise DataError(f"{what} {name!r} is needed by {vessel.name} and missing: {remedy}", file=vessel.file)
-        column = numbers(f"{what} {name!r}", given[name])
+        column = as_float_array(f"{what} {name!r}", given[name])
         if column.shape not in shapes:
             raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")
         columns.append(column)
@@ -321,14 +325,18 @@ def _channels(
     return stacked
 
 
-def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, num_steps: int, vessel: Vessel) -> Array:
+def _initial_memory(
+    model: Dynamics, memory: Mapping[str, Array] | None, batch: RolloutBatch, num_steps: int, vessel: Vessel
+) -> Array:
     """Memories (nm, S) at the start: as given, or the initial values of the helmsman and the first orders."""
     num_samples = batch.state.shape[1]
     begun = model.helmsman.memory if model.helmsman else {}
     helm = {f"{HELM}.{name}": np.full(num_samples, float(value)) for name, value in begun.items()}
     if memory is not None:
         return np.asarray(
-            _channels(tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel, held=True)[0]
+            _stack_channels(
+                tuple(model.memory), {**helm, **memory}, num_samples, num_steps, "memory", vessel, held=True
+            )[0]
         )
     if model.helmsman is None:
         return np.asarray(batch.commands[0, [model.commands.index(name) for name in model.memory]])
@@ -339,17 +347,17 @@ def _memory(model: Dynamics, memory: Mapping[str, Array] | None, batch: Batch, n
     return np.array([helm[name] if name in helm else orders[name] for name in model.memory]).reshape(-1, num_samples)
 
 
-def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
+def _drawn_components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
     """Components (num_entries, S, num_components) of each sum with drawn components; zeros if none are given."""
     result, paths = [], [term.path for term in model.drawn]
     unknown = next((path for path in given if path not in paths), None)
     if unknown is not None:
         raise ShipidError(
-            f"components: the vessel has no term {unknown!r} whose components are drawn: {choices(unknown, paths)}"
+            f"components: the vessel has no term {unknown!r} whose components are drawn: {suggest_name(unknown, paths)}"
         )
     for term in model.drawn:
         entries = sum(term.widths.values())
-        values = numbers(f"components of {term.path}", given.get(term.path, np.zeros((num_samples, 1, entries))))
+        values = as_float_array(f"components of {term.path}", given.get(term.path, np.zeros((num_samples, 1, entries))))
         if values.ndim != 3 or values.shape[::2] != (num_samples, entries):
             raise ShipidError(
                 f"components of {term.path} must be ({num_samples}, count, {entries}), not {values.shape}"
@@ -358,10 +366,10 @@ def _components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -
     return tuple(result)
 
 
-def _tau(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int) -> Array:
+def _extra_force(tau_extra: Array | None, num_dof: int, num_samples: int, num_steps: int) -> Array:
     if tau_extra is None:
         return np.zeros((1, num_dof, num_samples))
-    tau = numbers("tau_extra", tau_extra)
+    tau = as_float_array("tau_extra", tau_extra)
     length = num_steps if tau.ndim == 3 else 1
     widest = (num_steps, num_samples, num_dof)[-tau.ndim :] if 1 <= tau.ndim <= 3 else ()
     if tau.shape[-1:] != (num_dof,) or any(size not in (1, most) for size, most in zip(tau.shape, widest, strict=True)):

@@ -16,11 +16,11 @@ import numpy as np
 
 from shipid.engine.integrate import Array
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import C, compiled, compiler, interpret, padded, target
+from shipid.engine.native import C, compile_source, compiler_target, find_compiler, note_interpretation, pad_samples
 from shipid.engine.printing import print_function
-from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import head
-from shipid.interrupts import uninterrupted
+from shipid.engine.threads import run_tasks, threaded_source
+from shipid.engine.vectors import vector_source
+from shipid.interrupts import hold_interrupts
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +29,9 @@ QUICKER = ("-O1", "-fno-schedule-insns")  # of the compiler; higher levels take 
 OPERATIONS_A_UNIT = 400.0  # of one vector, in a tenth of a microsecond
 
 
-def on_samples(function: ca.Function, num_samples: float, shared: Sequence[str] = ()) -> Callable[..., list[Array]]:
+def map_over_samples(
+    function: ca.Function, num_samples: float, shared: Sequence[str] = ()
+) -> Callable[..., list[Array]]:
     """The function over samples: takes each input as (entries, S), gives each output as (entries, S), S >= 1.
 
     Parameters
@@ -39,33 +41,33 @@ def on_samples(function: ca.Function, num_samples: float, shared: Sequence[str] 
     shared : names of inputs that all samples share, given as (entries,).
     """
     same = tuple(shared)
-    if num_samples * function.n_instructions() > COMPILE_FROM and compiler() is not None:
-        library = _library(function, same)
+    if num_samples * function.n_instructions() > COMPILE_FROM and find_compiler() is not None:
+        library = _compile_sample_function(function, same)
         if library is not None:
-            return _native(function, same, library)
-    return _interpreted(function, same)
+            return _map_by_library(function, same, library)
+    return _map_by_casadi(function, same)
 
 
-def _interpreted(function: ca.Function, shared: tuple[str, ...]) -> Callable[..., list[Array]]:
+def _map_by_casadi(function: ca.Function, shared: tuple[str, ...]) -> Callable[..., list[Array]]:
     """By the virtual machine, sample by sample."""
     repeated = [i for i in range(function.n_in()) if function.name_in(i) in shared]
 
     def run(*inputs: Array) -> list[Array]:
         count = next(part.shape[1] for i, part in enumerate(inputs) if i not in repeated)
-        with uninterrupted():
-            return [np.array(part) for part in _mapped(function, count, tuple(repeated)).call(list(inputs))]
+        with hold_interrupts():
+            return [np.array(part) for part in _map_serially(function, count, tuple(repeated)).call(list(inputs))]
 
     return run
 
 
 @lru_cache(maxsize=64)
-def _mapped(function: ca.Function, count: int, repeated: tuple[int, ...]) -> ca.Function:
+def _map_serially(function: ca.Function, count: int, repeated: tuple[int, ...]) -> ca.Function:
     return function.map("on_samples", "serial", count, list(repeated), [])
 
 
-def _native(function: ca.Function, shared: tuple[str, ...], library: Any) -> Callable[..., list[Array]]:
+def _map_by_library(function: ca.Function, shared: tuple[str, ...], library: Any) -> Callable[..., list[Array]]:
     """By a compiled library, a vector of samples at a time."""
-    lanes, common = target().lanes, [function.name_in(i) in shared for i in range(function.n_in())]
+    lanes, common = compiler_target().lanes, [function.name_in(i) in shared for i in range(function.n_in())]
     ends = np.cumsum([function.size1_out(i) for i in range(function.n_out())])
     work = function.n_instructions() / OPERATIONS_A_UNIT
 
@@ -73,27 +75,27 @@ def _native(function: ca.Function, shared: tuple[str, ...], library: Any) -> Cal
         given = list(zip(common, inputs, strict=True))
         count = next(part.shape[1] for same, part in given if not same)
         wide = -(-count // lanes) * lanes
-        arrays = [np.ascontiguousarray(part, dtype=float) if same else padded(part, wide) for same, part in given]
+        arrays = [np.ascontiguousarray(part, dtype=float) if same else pad_samples(part, wide) for same, part in given]
         results = np.empty((int(ends[-1]), wide))
-        in_parallel(library, (wide,), (*arrays, results), wide // lanes, work)
+        run_tasks(library, (wide,), (*arrays, results), wide // lanes, work)
         return np.split(results[:, :count], ends[:-1])
 
     return run
 
 
 @lru_cache(maxsize=32)
-def _library(function: ca.Function, shared: tuple[str, ...]) -> Any:
+def _compile_sample_function(function: ca.Function, shared: tuple[str, ...]) -> Any:
     """The compiled function `run`; None where it cannot be compiled, which is logged once."""
     try:
-        return compiled(_source(function, shared), QUICKER)
+        return compile_source(_sample_source(function, shared), QUICKER)
     except NoLibrary as error:
-        interpret(function.name(), error.message)
+        note_interpretation(function.name(), error.message)
     except ValueError as error:
         log.warning("%s is not compiled (%s): slower, with the same results", function.name(), error)
     return None
 
 
-def _source(function: ca.Function, shared: tuple[str, ...]) -> str:
+def _sample_source(function: ca.Function, shared: tuple[str, ...]) -> str:
     """C of the function; inputs are `in0`, `in1`, ... in their order."""
     names = [f"in{i}" for i in range(function.n_in())]
     inputs = [ca.SX.sym(name, function.size1_in(i)) for i, name in enumerate(names)]
@@ -107,4 +109,6 @@ def _source(function: ca.Function, shared: tuple[str, ...]) -> str:
         loads.append(f"for (long i = 0; i < {function.size1_in(i)}; ++i) {name}[i] = {read};")
     stores = [f"*(U *)(results + {i} * stride + number * W) = {text};" for i, text in enumerate(printed.outputs)]
     arrays = {f"all_{name}": "const REAL" for name in names} | {"results": "REAL"}
-    return head(target()) + threaded(("stride",), arrays, "\n".join([*loads, *printed.lines[0], *stores]))
+    return vector_source(compiler_target()) + threaded_source(
+        ("stride",), arrays, "\n".join([*loads, *printed.lines[0], *stores])
+    )

@@ -1,6 +1,6 @@
 """Tables in the equations: piecewise linear functions, recognised in a CasADi function and looked up by vectors of C.
 
-`shipid.physics.wind.interpolate` writes a table as a sum of ramps, which every engine can compute and differentiate:
+`shipid.physics.wind.interpolate_ramps` writes a table as a sum of ramps, which every engine can compute and differentiate:
 y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. In C the interval
 of x is computed once for all tables with the same knots. Then ordinate and slope are read: lane by lane, or, where a
 processor permutes vectors (AVX-512), by one instruction for each 16 intervals (32 in single precision). The values are
@@ -17,7 +17,7 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from shipid.engine.graph import Graph, operate
+from shipid.engine.graph import InstructionGraph, apply_operation
 from shipid.engine.integrate import Array
 
 LEAST = 6  # intervals: shorter tables are as fast as ramps
@@ -26,7 +26,7 @@ EVEN = 1e-15  # of the greatest knot: what rounding moves one
 
 
 @dataclass(frozen=True)
-class Table:
+class RampTable:
     """A sum of ramps in a function; each entry is the number of the instruction that computes it.
 
     x, ordinate, slope : argument, and value and slope at the first knot. knots (n,), bends (n - 1,) : where intervals
@@ -42,7 +42,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Lookup:
+class TableLookup:
     """C that looks up tables in vectors of `lanes` numbers, lane by lane: the processor has no gather that is faster.
 
     A table lies in memory as pairs of ordinate and slope.
@@ -112,7 +112,7 @@ static inline V v_value(const V *table, int rows, M place, V along) {
 
 
 @dataclass(frozen=True)
-class Permuted(Lookup):
+class PermutedLookup(TableLookup):
     """C that looks up all lanes at once, by the instructions `vpermt2{packed}` (AVX-512): each picks from two vectors.
 
     Ordinates of a table, then slopes, lie in an even number of vectors each.
@@ -150,15 +150,15 @@ static inline V v_value(const V *table, int rows, M place, V along) {{
 
 
 @lru_cache(maxsize=64)
-def find_tables(function: ca.Function) -> Mapping[int, Table]:
+def find_tables(function: ca.Function) -> Mapping[int, RampTable]:
     """Tables of an SX function with at least `LEAST` intervals, by the number of the instruction that gives them."""
-    return _Search(function).tables()
+    return _TableSearch(function).tables()
 
 
 @lru_cache(maxsize=64)
 def inside_tables(function: ca.Function) -> frozenset[int]:
     """Instructions that compute the tables of a function from arguments, knots, ordinates and slopes."""
-    operands = Graph(function).operands
+    operands = InstructionGraph(function).operands
     inside: set[int] = set()
     for end, table in find_tables(function).items():
         inside.add(end)
@@ -169,24 +169,26 @@ def inside_tables(function: ca.Function) -> frozenset[int]:
     return frozenset(inside)
 
 
-def even_tables(function: ca.Function, parameters: Array) -> Mapping[int, Table]:
+def even_tables(function: ca.Function, parameters: Array) -> Mapping[int, RampTable]:
     """Tables whose knots depend on the input `parameters` alone, and are evenly apart for all rows (V, P) of these."""
     tables = find_tables(function)
-    even = {knots for knots in {table.knots for table in tables.values()} if _are_even(function, knots, parameters)}
+    even = {
+        knots for knots in {table.knots for table in tables.values()} if _have_even_knots(function, knots, parameters)
+    }
     return {k: table for k, table in tables.items() if table.knots in even}
 
 
-def _are_even(function: ca.Function, wanted: tuple[int, ...], parameters: Array) -> bool:
-    known = _knots(function, wanted)
+def _have_even_knots(function: ca.Function, wanted: tuple[int, ...], parameters: Array) -> bool:
+    known = _knot_function(function, wanted)
     if known is None:
         return False
     rows = parameters[:, known[0]]
     alike = (rows == rows[0]).all()  # as a rule: angles of a table are not varied
-    return all(_is_even(known[1], row.tobytes()) for row in (rows[:1] if alike else np.unique(rows, axis=0)))
+    return all(_is_even_grid(known[1], row.tobytes()) for row in (rows[:1] if alike else np.unique(rows, axis=0)))
 
 
 @lru_cache(maxsize=1024)
-def _is_even(knots: ca.Function, numbers: bytes) -> bool:
+def _is_even_grid(knots: ca.Function, numbers: bytes) -> bool:
     """Whether the knots are evenly apart, and increase, for these parameters."""
     values = np.array(knots(np.frombuffer(numbers))).ravel()
     even = np.linspace(values[0], values[-1], len(values))
@@ -194,17 +196,17 @@ def _is_even(knots: ca.Function, numbers: bytes) -> bool:
 
 
 @lru_cache(maxsize=64)
-def _knots(function: ca.Function, wanted: tuple[int, ...]) -> tuple[list[int], ca.Function] | None:
+def _knot_function(function: ca.Function, wanted: tuple[int, ...]) -> tuple[list[int], ca.Function] | None:
     """Entries of `parameters` that give the knots, and their function; None if the knots depend on other inputs."""
-    return _Search(function).of_parameters(wanted)
+    return _TableSearch(function).of_parameters(wanted)
 
 
-class _Search(Graph):
+class _TableSearch(InstructionGraph):
     """Tables among the instructions of a function."""
 
-    def tables(self) -> dict[int, Table]:
+    def tables(self) -> dict[int, RampTable]:
         """All tables; one that is the beginning of a longer one is left out."""
-        found: dict[int, Table] = {}
+        found: dict[int, RampTable] = {}
         for k in range(len(self.operation)):
             table = self.extended(k, found) or self.begun(k)
             if table is not None:
@@ -212,7 +214,7 @@ class _Search(Graph):
         beginnings = {part for k in found for part in self.operands[k]}
         return {k: table for k, table in found.items() if k not in beginnings and len(table.knots) >= LEAST}
 
-    def extended(self, k: int, found: dict[int, Table]) -> Table | None:
+    def extended(self, k: int, found: dict[int, RampTable]) -> RampTable | None:
         """A table and one more ramp."""
         for before, ramp in self.pairs(k, ca.OP_ADD):
             table = found.get(before)
@@ -222,16 +224,16 @@ class _Search(Graph):
                         x, knot = self.operands[beyond]
                         if table is not None and x == table.x:
                             knots, bends, ramps = (*table.knots, knot), (*table.bends, bend), (*table.ramps, ramp)
-                            return Table(x, table.ordinate, table.slope, knots, bends, ramps)
+                            return RampTable(x, table.ordinate, table.slope, knots, bends, ramps)
         return None
 
-    def begun(self, k: int) -> Table | None:
+    def begun(self, k: int) -> RampTable | None:
         """The line before the second knot: ordinate + slope * (x - knot)."""
         for ordinate, line in self.pairs(k, ca.OP_ADD):
             for slope, beyond in self.pairs(line, ca.OP_MUL):
                 if self.operation[beyond] == ca.OP_SUB:
                     x, knot = self.operands[beyond]
-                    return Table(x, ordinate, slope, (knot,), (), ())
+                    return RampTable(x, ordinate, slope, (knot,), (), ())
         return None
 
     def pairs(self, k: int, operation: int) -> tuple[tuple[int, int], ...]:
@@ -259,7 +261,7 @@ class _Search(Graph):
                 if given != place:
                     raise LookupError
                 return entries.setdefault(entry, ca.SX.sym(f"p{entry}"))
-            return operate(operation, source)
+            return apply_operation(operation, source)
 
         try:
             knots = ca.vertcat(*map(value, wanted))

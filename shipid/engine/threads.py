@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from shipid.engine.integrate import num_threads
+from shipid.engine.integrate import count_threads
 
 STACK = 8 << 20  # bytes of a thread
 AT_ONCE = 2_000_000  # units of work in one call of C, a fraction of a second: an interrupt waits for its end
 
 
-def threaded(sizes: Iterable[str], arrays: Mapping[str, str], task: str) -> str:
-    """C function `run`: tasks `next` to `end` on threads, each taken by the first that is free; see `in_parallel`.
+def threaded_source(sizes: Iterable[str], arrays: Mapping[str, str], task: str) -> str:
+    """C function `run`: tasks `next` to `end` on threads, each taken by the first that is free; see `run_tasks`.
 
     sizes : names of whole numbers. arrays : name -> C type of an entry. task : C statements of the task `number`, which
     know these names.
@@ -48,15 +48,13 @@ void run(long next, long end, long threads, const long *sizes, void *const *arra
 """
 
 
-def in_parallel(
-    run: Any, sizes: Iterable[int], arrays: Iterable[np.ndarray | None], num_tasks: int, work: float
-) -> None:
-    """Do all tasks of a C function of `threaded`, on as many threads as cores, some in one call.
+def run_tasks(run: Any, sizes: Iterable[int], arrays: Iterable[np.ndarray | None], num_tasks: int, work: float) -> None:
+    """Do all tasks of a C function of `threaded_source`, on as many threads as cores, some in one call.
 
-    After an interrupt no further call is made. sizes, arrays : in the order of `threaded`; None is a null pointer.
+    After an interrupt no further call is made. sizes, arrays : in the order of `threaded_source`; None is a null pointer.
     work : of one task, in units of a tenth of a microsecond or so.
     """
-    held, threads = list(arrays), num_threads()
+    held, threads = list(arrays), count_threads()
     # as `array.ctypes.data`, in a quarter of the time
     pointers = [None if array is None else array.__array_interface__["data"][0] for array in held]
     numbers = list(sizes)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from shipid.engine.adjoint import Adjoint, Loss, checked_loss
-from shipid.engine.integrate import Batch, Job, Method, integrate
-from shipid.engine.lowering import lower
+from shipid.engine.adjoint import Adjoint, Loss, evaluate_loss
+from shipid.engine.integrate import Method, RolloutBatch, RolloutJob, integrate_step
+from shipid.engine.lowering import lower_function
 from shipid.vessel.dynamics import Dynamics
 
 EAGER_BLOCK = 16384  # samples x variants of one block
@@ -44,9 +44,9 @@ class Program:
 
 
 @lru_cache(maxsize=32)
-def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], varying: bool) -> Program:
+def _lower_step(model: Dynamics, method: Method, step: float, rows: tuple[int, ...], varying: bool) -> Program:
     """Lower the functions of a vessel structure to PyTorch, and build the integrator step from them."""
-    functions = [lower(f) for f in (model.rates, model.advance, *(term.function for term in model.sums))]
+    functions = [lower_function(f) for f in (model.rates, model.advance, *(term.function for term in model.sums))]
     num_drawn, speeds = len(model.drawn), slice(model.num_dof, 2 * model.num_dof)
     fixed = [None if term.arrays is None else torch.tensor(term.arrays.T) for term in model.sums]
 
@@ -70,11 +70,11 @@ def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...]
             wide = [[channel.unsqueeze(-1) for channel in group] for group in (state, memory)]
             entries = drawn.pop(0) if arrays is None else arrays.to(tau)
             wrench = function.main(*wide, entries, *(part.unsqueeze(-1) for part in early))
-            total = [a + _sum(b, entries.shape[-1]) for a, b in zip(total, wrench, strict=True)]
-        return _stacked(functions[0].main(state, memory, total, *saved[0]), state)
+            total = [a + _sum_components(b, entries.shape[-1]) for a, b in zip(total, wrench, strict=True)]
+        return _stack_tensors(functions[0].main(state, memory, total, *saved[0]), state)
 
     def advance(state: torch.Tensor, memory: torch.Tensor, dt: torch.Tensor, *known: torch.Tensor) -> torch.Tensor:
-        return _stacked(functions[1].main(state, memory, [dt], *saved_of(known)[1]), memory)
+        return _stack_tensors(functions[1].main(state, memory, [dt], *saved_of(known)[1]), memory)
 
     def one_step(
         rates: Callable[..., torch.Tensor],
@@ -85,7 +85,7 @@ def _program(model: Dynamics, method: Method, step: float, rows: tuple[int, ...]
         tau: torch.Tensor,
         *rest: torch.Tensor,
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-        after, memory_after = integrate(
+        after, memory_after = integrate_step(
             lambda state, memory: rates(state, memory, tau, *rest),
             lambda memory, dt: (
                 advance(x, memory, torch.full_like(greatest, dt), *rest[num_drawn:]) if len(memory) else memory
@@ -109,7 +109,7 @@ Key = tuple[Any, tuple[tuple[int, ...], ...], torch.device]
 kernels: dict[Key, Callable[..., Any]] = {}
 
 
-def _compiled(function: Callable[..., Any], inputs: Sequence[torch.Tensor]) -> Callable[..., Any]:
+def _compile_kernel(function: Callable[..., Any], inputs: Sequence[torch.Tensor]) -> Callable[..., Any]:
     """A function compiled to one kernel for the shapes of the inputs, from a cache.
 
     It is traced and compiled by TorchInductor directly: this takes less than half the time of `torch.compile`, and a
@@ -125,39 +125,41 @@ def _compiled(function: Callable[..., Any], inputs: Sequence[torch.Tensor]) -> C
 
 
 @lru_cache(maxsize=64)
-def _whole(program: Program) -> Callable[..., Any]:
+def _whole_step(program: Program) -> Callable[..., Any]:
     return partial(program.step, program.rates, program.advance)
 
 
-def _runner(program: Program, method: Method, inputs: Sequence[torch.Tensor], num_drawn: int) -> Callable[..., Any]:
+def _compile_step(
+    program: Program, method: Method, inputs: Sequence[torch.Tensor], num_drawn: int
+) -> Callable[..., Any]:
     """A compiled step: Euler as one kernel, so that nothing is written that is not kept; RK4 around two kernels.
 
     The four stages of RK4 in one kernel would take four times as long to compile and run no faster.
     """
-    whole = _whole(program)
+    whole = _whole_step(program)
     if method == "euler":
-        return _compiled(whole, inputs)
+        return _compile_kernel(whole, inputs)
     x, m, greatest, tau, *rest = inputs
-    rates = _compiled(program.rates, [x, m, tau, *rest])
-    advance = _compiled(program.advance, [x, m, greatest, *rest[num_drawn:]]) if len(m) else program.advance
+    rates = _compile_kernel(program.rates, [x, m, tau, *rest])
+    advance = _compile_kernel(program.advance, [x, m, greatest, *rest[num_drawn:]]) if len(m) else program.advance
     return partial(program.step, rates, advance)
 
 
-def _stacked(channels: Sequence[Any], like: torch.Tensor) -> torch.Tensor:
+def _stack_tensors(channels: Sequence[Any], like: torch.Tensor) -> torch.Tensor:
     """Channels as one tensor of the shape of `like`; numbers and smaller tensors are broadcast."""
     if not channels:
         return like
     return torch.stack([torch.as_tensor(channel, dtype=like.dtype).expand(like.shape[1:]) for channel in channels])
 
 
-def _sum(value: Any, count: int) -> Any:
+def _sum_components(value: Any, count: int) -> Any:
     """Sum over `count` components (last axis); a value without that axis is multiplied by `count`."""
     if not isinstance(value, torch.Tensor):
         return count * value
     return value.expand(*value.shape[:-1], count).sum(-1)
 
 
-def is_device(name: str) -> bool:
+def is_torch_device(name: str) -> bool:
     """Whether PyTorch can compute on a device here.
 
     Each kind of device that is not there fails in another way: RuntimeError (no such name; no numbers come back from
@@ -170,7 +172,7 @@ def is_device(name: str) -> bool:
     return True
 
 
-def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[np.ndarray, np.ndarray]:
+def run_torch(model: Dynamics, batch: RolloutBatch, job: RolloutJob, compiled: bool) -> tuple[np.ndarray, np.ndarray]:
     """Records (R, V, S, C) and the greatest speed (V, S), in blocks of one fixed shape, the last one padded.
 
     A block holds all variants, because each call costs as much as many samples. Compiled on the CPU it holds one
@@ -178,10 +180,10 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
     """
     num_steps, every, rows, device = job.num_steps, job.every, list(job.rows), job.device
     varying = len(batch.commands) > 1 or len(batch.environment) > 1
-    program = _program(model, job.method, job.step, job.rows, varying)
+    program = _lower_step(model, job.method, job.step, job.rows, varying)
     num_samples, num_variants = batch.state.shape[1], len(batch.parameters)
     most_components = max((part.shape[2] for part in batch.components), default=1)
-    width = _width(num_samples, num_variants, most_components, compiled, device)
+    width = _block_width(num_samples, num_variants, most_components, compiled, device)
     padded = -(-num_samples // width) * width
     place = torch.device(device)
 
@@ -212,13 +214,13 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
                 greatest = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)
                 drawn_here = [part[:, :, block].contiguous() for part in drawn]
                 known = saved if varying else program.held_stage(commands[0], environment[0], saved)
-                advance = _whole(program)
+                advance = _whole_step(program)
                 for k in range(num_steps):
                     if varying:
-                        known = [_at(commands, k), _at(environment, k), *saved]
-                    inputs = [x, m, greatest, _at(tau, k), *drawn_here, *known]
+                        known = [_series_at(commands, k), _series_at(environment, k), *saved]
+                    inputs = [x, m, greatest, _series_at(tau, k), *drawn_here, *known]
                     if compiled and k == 0:
-                        advance = _runner(program, job.method, inputs, len(drawn_here))
+                        advance = _compile_step(program, job.method, inputs, len(drawn_here))
                     x, m, greatest, record = advance(*inputs)
                     if (k + 1) % every == 0:
                         target[(k + 1) // every] = record
@@ -227,9 +229,11 @@ def run_torch(model: Dynamics, batch: Batch, job: Job, compiled: bool) -> tuple[
     return result.cpu().numpy(), worst[:, :num_samples].cpu().numpy()
 
 
-def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, ...], loss: Loss) -> Adjoint:
+def gradient_torch(
+    model: Dynamics, batch: RolloutBatch, job: RolloutJob, wanted: tuple[int, ...], loss: Loss
+) -> Adjoint:
     """A loss on the job's channels and its derivatives, by PyTorch's reverse mode; see `gradient_native`."""
-    program = _program(model, job.method, job.step, job.rows, True)
+    program = _lower_step(model, job.method, job.step, job.rows, True)
     place, num_samples = torch.device(job.device), batch.state.shape[1]
 
     def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, S)
@@ -244,12 +248,12 @@ def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, .
     worst = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)
     records = [both[list(job.rows)]]
     for k in range(job.num_steps):
-        known = [_at(commands, k), _at(environment, k), *saved]
-        x, m, worst, record = _whole(program)(x, m, worst.detach(), force[k], *known)
+        known = [_series_at(commands, k), _series_at(environment, k), *saved]
+        x, m, worst, record = _whole_step(program)(x, m, worst.detach(), force[k], *known)
         records.append(record)
     path = torch.stack(records)[:, :, 0].transpose(1, 2)  # (T + 1, S, C)
     numbers = path.detach().cpu().numpy()
-    losses, slopes = checked_loss(loss, numbers)
+    losses, slopes = evaluate_loss(loss, numbers)
     inputs = [start, values, force]
     gradients = torch.autograd.grad(path, inputs, torch.tensor(slopes, device=place), allow_unused=True)
     state, parameters, tau = (
@@ -259,12 +263,12 @@ def gradient_torch(model: Dynamics, batch: Batch, job: Job, wanted: tuple[int, .
     return Adjoint(losses, numbers, worst.detach().cpu().numpy()[0], parameters[list(wanted)], tau, state)
 
 
-def _at(series: torch.Tensor, k: int) -> torch.Tensor:
+def _series_at(series: torch.Tensor, k: int) -> torch.Tensor:
     """Entry k of a time series; the last entry if the series is shorter (constant input)."""
     return series[min(k, len(series) - 1)]
 
 
-def _width(num_samples: int, num_variants: int, num_components: int, compiled: bool, device: str) -> int:
+def _block_width(num_samples: int, num_variants: int, num_components: int, compiled: bool, device: str) -> int:
     """Number of samples in a block: equal blocks with little padding whose intermediate results fit in the cache."""
     if device != "cpu":
         most = max(GRAIN, DEVICE_BLOCK // num_variants)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.engine.tables import Lookup, Permuted
+from shipid.engine.tables import PermutedLookup, TableLookup
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ SINGLE = Precision(
 
 
 @dataclass(frozen=True)
-class Target:
+class CompilerTarget:
     """Target of the C compiler: lanes of a vector, compiler flags, prefix of glibc's vector functions (or empty).
 
     fused : the processor has one instruction for a * b + c. precision : of all numbers.
@@ -116,18 +116,18 @@ class Target:
     precision: Precision = DOUBLE
 
     @property
-    def lookup(self) -> Lookup | None:
+    def lookup(self) -> TableLookup | None:
         """How tables are looked up; None without the written-out functions."""
         if self.lanes * self.precision.bits == 512:
-            return Permuted(self.lanes, self.precision.packed)
-        return Lookup(self.lanes) if self.fused else None
+            return PermutedLookup(self.lanes, self.precision.packed)
+        return TableLookup(self.lanes) if self.fused else None
 
 
 _ONE, _TWO = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"), ("pow", "atan2")
 _WRITTEN_OUT = ("sin", "cos", "tanh", "atan2")
 
 
-def _types(of: Precision, lanes: int) -> str:
+def _vector_types(of: Precision, lanes: int) -> str:
     """The vector type V of REAL, the type M of its comparisons, U as it lies in memory, and their simple functions."""
     size = of.bits // 8
     return f"""
@@ -156,22 +156,22 @@ static inline V v_max(V x, V y) {{ PICK("vmax{of.packed}", >) }}
 """
 
 
-def _polynomial(variable: str, coefficients: Sequence[float]) -> str:
+def _polynomial_in_c(variable: str, coefficients: Sequence[float]) -> str:
     """A polynomial as C, the constant first, by Estrin's scheme: few of its operations wait for one another."""
     if len(coefficients) == 1:
         return f"K({coefficients[0]!r})"
     half = 1 << (len(coefficients) - 1).bit_length() - 1
-    low, high = (_polynomial(variable, part) for part in (coefficients[:half], coefficients[half:]))
-    return f"({low} + {_power(variable, half)} * {high})"
+    low, high = (_polynomial_in_c(variable, part) for part in (coefficients[:half], coefficients[half:]))
+    return f"({low} + {_power_in_c(variable, half)} * {high})"
 
 
-def _power(variable: str, exponent: int) -> str:
+def _power_in_c(variable: str, exponent: int) -> str:
     """A power of two of a variable as C."""
-    root = variable if exponent == 1 else _power(variable, exponent // 2)
+    root = variable if exponent == 1 else _power_in_c(variable, exponent // 2)
     return root if exponent == 1 else f"({root} * {root})"
 
 
-def _inline(of: Precision) -> str:
+def _written_functions(of: Precision) -> str:
     """The functions that are written out, as C.
 
     Adding 1.5 * 2^mantissa rounds to an integer, which is then in the low bits. sin and cos: what is left of whole
@@ -190,21 +190,21 @@ static inline V v_rest(V x, M *quarter) {{
   return ((x - n * K({first!r})) - n * K({second!r})) - n * K({third!r});
 }}
 static inline V v_wave(V x, M quarter) {{
-  V z = x * x, s = x + x * z * {_polynomial("z", of.sin)}, c = K(1) + z * {_polynomial("z", (-0.5, *of.cos))};
+  V z = x * x, s = x + x * z * {_polynomial_in_c("z", of.sin)}, c = K(1) + z * {_polynomial_in_c("z", (-0.5, *of.cos))};
   return (V)((M)v_pick((quarter & 1) != 0, c, s) ^ (quarter << {of.bits - 2} & SIGN));
 }}
 static inline V v_sin(V x) {{ M quarter; V rest = v_rest(x, &quarter); return v_wave(rest, quarter); }}
 static inline V v_cos(V x) {{ M quarter; V rest = v_rest(x, &quarter); return v_wave(rest, quarter + 1); }}
 static inline V v_tanh(V x) {{
   V size = v_min(K({of.one!r}), v_fabs(x)), doubled = size * K({1 / whole!r}) + K(ROUND), n = doubled - K(ROUND);
-  V r = (size - n * K({whole!r})) - n * K({rest!r}), p = r * {_polynomial("r", (2.0, *of.exp))};
+  V r = (size - n * K({whole!r})) - n * K({rest!r}), p = r * {_polynomial_in_c("r", (2.0, *of.exp))};
   V power = (V)((M)K(1) + ((M)doubled << {of.mantissa})), less = power * p + (power - K(1));
   return (V)((M)(less / (less + K(2))) | ((M)x & SIGN));
 }}
 static inline V v_atan2(V y, V x) {{
   V ahead = v_fabs(x), aside = v_fabs(y);
   V t = v_min(ahead, aside) / v_max(K({of.least!r}), v_max(aside, ahead)), z = t * t;
-  V a = t + t * z * {_polynomial("z", of.atan)};
+  V a = t + t * z * {_polynomial_in_c("z", of.atan)};
   a = v_pick(aside > ahead, K(1.5707963267948966) - a, a);
   a = v_pick((M)x < 0, K(3.141592653589793) - a, a);
   return (V)((M)a | ((M)y & SIGN));
@@ -212,9 +212,9 @@ static inline V v_atan2(V y, V x) {{
 """
 
 
-def head(wanted: Target) -> str:
+def vector_source(wanted: CompilerTarget) -> str:
     """Common beginning of all C sources: the vector type of the target and its functions."""
-    lines = [_types(wanted.precision, wanted.lanes)]
+    lines = [_vector_types(wanted.precision, wanted.lanes)]
     for name in (*_ONE, *_TWO):
         operands, letters, each = (1, "v", "EACH") if name in _ONE else (2, "vv", "EACH2")
         if wanted.fused and name in _WRITTEN_OUT:
@@ -225,4 +225,4 @@ def head(wanted: Target) -> str:
             lines.append(f"V {called}({', '.join(['V'] * operands)});\n#define v_{name} {called}")
         else:
             lines.append(f"static inline V v_{name}({', '.join(['V x', 'V y'][:operands])}) {{ {each}({scalar}) }}")
-    return "\n".join([*lines, _inline(wanted.precision) if wanted.fused else ""])
+    return "\n".join([*lines, _written_functions(wanted.precision) if wanted.fused else ""])

@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.errors import visible
+from shipid.errors import escape_unprintable
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
@@ -152,7 +152,7 @@ def _escaped(byte: int) -> str:
 
 def comment(lines: Sequence[str]) -> str:
     """A C comment; what is not printable is written out: compilers refuse letters that turn the direction of a line."""
-    kept = [visible(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
+    kept = [escape_unprintable(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in kept), " */"])
 
 

@@ -26,8 +26,8 @@ from shipid.export.c import (
 )
 from shipid.export.equations import Equations, named_function, symbols_of
 from shipid.physics.grammar import AXES
-from shipid.physics.signals import ACTUAL, SIGNALS, row_of, signal_of
-from shipid.simulation.log import column_of
+from shipid.physics.signals import ACTUAL, SIGNALS, signal_of, signal_row
+from shipid.simulation.log import state_column
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
@@ -64,7 +64,7 @@ class VesselParts:
             return self.vessel.units[name]
         if group == "loads":
             return "N" if name in "XYZ" else "N m"
-        row = row_of(column_of(name))
+        row = signal_row(state_column(name))
         return _kept_unit(name) if row is None else row.unit
 
     @cached_property

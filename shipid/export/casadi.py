@@ -14,7 +14,7 @@ from shipid.export.band import CHOICE, COLUMNS
 from shipid.export.c import renamed
 from shipid.export.c_vessel import VesselParts
 from shipid.export.model import Model
-from shipid.files import json_text, write_together
+from shipid.files import json_text, write_set
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
@@ -66,7 +66,7 @@ def write_function(function: ca.Function, names: Mapping[str, Any], file: Path) 
     packed.pack(function)
     described = json.loads(json.dumps(names, default=str))
     listing = {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **described}
-    return write_together({file: packed.encode(), listing_of(file): json_text(listing)})
+    return write_set({file: packed.encode(), listing_of(file): json_text(listing)})
 
 
 def listing_of(file: Path) -> Path:

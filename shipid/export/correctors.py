@@ -27,7 +27,7 @@ from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector
 from shipid.hybrid.stepping import LIMIT
 from shipid.hybrid.units import Units
-from shipid.physics.signals import measurable, plain_inputs
+from shipid.physics.signals import direct_inputs, measurable_signals
 
 Array = np.ndarray
 Expressions = Mapping[str, MX]
@@ -44,7 +44,7 @@ class Taken:
     def environment(self) -> tuple[str, ...]:
         """Channels of the environment that it takes: those of the relative wind, and others as they are."""
         wind = ("V_w", "beta_w") if any(name.endswith("_rw") for name in self.names) else ()
-        return (*wind, *plain_inputs(self.names))
+        return (*wind, *direct_inputs(self.names))
 
 
 def layer(x: MX, weight: Array, bias: Array) -> MX:
@@ -199,7 +199,7 @@ Added = Callable[[Start, MX, MX], tuple[MX, MX]]
 def stepped(known: Known, added: Added, kept: MX | None = None) -> MX:
     """Path of the physics with an acceleration added at each step, as `shipid.hybrid.stepping.stepped_paths`."""
     names, kept = known.names, MX(0, 1) if kept is None else kept
-    start, weather = stacked(known.now, (*MOTIONS, "psi")), measurable(names.now)
+    start, weather = stacked(known.now, (*MOTIONS, "psi")), measurable_signals(names.now)
     step = corrected_step(known, kept.numel(), added)
     carry, path = ca.vertcat(start, MX(np.zeros(2)), kept), []
     commands = known.commands(names.commands)
@@ -223,7 +223,7 @@ def reached_at_starts(known: Known, first: MX, records: MX | None) -> list[MX]:
 def corrected_step(known: Known, num_kept: int, added: Added) -> ca.Function:
     """(carry, commands, reached, weather, psi at the instant, parameters) -> carry."""
     names, h = known.names, known.physics.step
-    weather = measurable(names.now)
+    weather = measurable_signals(names.now)
     sizes = {"carry": 6 + num_kept, "commands": len(names.commands), "reached": len(names.reached)}
     sizes |= {"weather": len(weather), "psi0": 1, "parameters": len(names.parameters)}
     symbols = symbols_of(sizes)
@@ -341,7 +341,7 @@ def missed_before(known: Known, delays: int) -> list[MX]:
         reached = reached_at_starts(known, stacked(rows[0], tuple(model.memory)), known.past_records(delays))
     missed = []
     for row, at, later in zip(rows, reached, [*rows[1:], known.now], strict=True):
-        held = {name: rows[0][name] for name in measurable(known.names.now)}
+        held = {name: rows[0][name] for name in measurable_signals(known.names.now)}
         taken_ = {name: row[name] for name in (*MOTIONS, "psi", *known.names.commands)}
         alone_, _ = free(known, known.equations, Start(held | taken_, at, known.inputs["parameters"]),
                          known.inputs["parameters"])  # fmt: skip

@@ -11,9 +11,9 @@ import casadi as ca
 from casadi import MX, SX
 
 from shipid.engine.casadi import summed_rates
-from shipid.engine.integrate import Method, integrate
-from shipid.simulation.log import LEANING, aboard, horizontal
-from shipid.vessel.dynamics import INPUTS, Dynamics, dynamics
+from shipid.engine.integrate import Method, integrate_step
+from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities
+from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 
@@ -45,7 +45,7 @@ class Equations:
     @cached_property
     def model(self) -> Dynamics:
         """Symbolic equations of motion of the vessel."""
-        return dynamics(self.vessel)
+        return vessel_dynamics(self.vessel)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -93,7 +93,9 @@ class Equations:
             return self.advance(m, commands, parameters, after) if model.memory else m
 
         length: Any = step or inputs["dt"]
-        after = integrate(rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method)
+        after = integrate_step(
+            rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method
+        )
         return named_function("step", inputs, {"after": ca.vertcat(*after)})
 
     def begun(self, commands: MX, parameters: MX) -> MX:
@@ -106,11 +108,11 @@ class Equations:
         if set(self.model.state).isdisjoint(LEANING):
             return state
         now = by_name(self.states, state)
-        return MX(ca.vertcat(*(now | aboard(now, ca)).values()))
+        return MX(ca.vertcat(*(now | body_velocities(now, ca)).values()))
 
     def horizontal(self, carries: MX) -> MX:
         """u, v, r in the horizontal plane of one carry, or of a column for each step."""
-        return MX(ca.vertcat(*horizontal(by_name((*self.states, *self.model.memory), carries), ca).values()))
+        return MX(ca.vertcat(*horizontal_velocities(by_name((*self.states, *self.model.memory), carries), ca).values()))
 
 
 def rolled_out(step: ca.Function, carry: MX, inputs: Sequence[MX], parameters: MX, count: int) -> MX:

@@ -19,17 +19,17 @@ import numpy as np
 
 from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
-from shipid.engine.native import compiler
+from shipid.engine.native import find_compiler
 from shipid.errors import ShipidError
 from shipid.export.c import Files, Precision
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.fmu_c import Variable, predictor_wrapper, vessel_wrapper
 from shipid.export.model import Model
-from shipid.files import whole
-from shipid.physics.signals import ACTUAL, SIGNALS, neutral
+from shipid.files import replace_whole
+from shipid.physics.signals import ACTUAL, SIGNALS, neutral_value
 from shipid.version import __version__
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
@@ -105,13 +105,13 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
         text = f"reached: {described(order)}{begins}" if lags else described(order)
         variables.append(Variable(key, "output", "continuous", unit, text, 0.0, lags))
     variables += _inputs(
-        {key: (unit, f"order: {described(key)}", neutral(key)) for key, unit in units["commands"].items()}
+        {key: (unit, f"order: {described(key)}", neutral_value(key)) for key, unit in units["commands"].items()}
         | {key: (unit, described(key), 0.0) for key, unit in units["environment"].items()}
         | {f"load.{key}": (unit, f"added {key}, such as waves or a tug", 0.0) for key, unit in units["loads"].items()}
     )
     solver = Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest)
     variables += [*_numbers(vessel), solver]
-    sizes, num_reached = {group: len(names) for group, names in units.items()}, len(dynamics(vessel).memory)
+    sizes, num_reached = {group: len(names) for group, names in units.items()}, len(vessel_dynamics(vessel).memory)
     return Packed(
         name, vessel.name, tuple(variables), vessel_files(vessel, name, method, Precision()),
         vessel_wrapper(name, sizes, sizes["carry"] - num_reached, variables), None,
@@ -171,8 +171,8 @@ def write_fmu(unit: Packed, file: Path) -> list[str]:
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(texts.values()))}}}"
     texts["modelDescription.xml"] = description(unit, guid)
     texts[f"sources/{name}.c"] = sources[f"{name}.c"].replace("@GUID@", guid)
-    place = BINARIES.get((platform.system(), platform.machine())) if compiler() is not None else None
-    with whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    place = BINARIES.get((platform.system(), platform.machine())) if find_compiler() is not None else None
+    with replace_whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for key, text in texts.items():
             archive.writestr(_entry(key), text)
         if place is not None:
@@ -191,7 +191,7 @@ def _entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
 
 
 def _compiled(folder: Path, name: str) -> Path:
-    command = compiler()
+    command = find_compiler()
     assert command is not None
     options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s"]
     built = folder / f"{name}.so"

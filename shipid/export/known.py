@@ -16,7 +16,7 @@ from shipid.export.equations import Equations, by_name, rolled_out, symbols_of
 from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, bank, moves_start
-from shipid.physics.signals import plain_inputs
+from shipid.physics.signals import direct_inputs
 
 Expressions = Mapping[str, MX]
 TRACE = 1e-12  # m/s: of a wind that is exactly 0, so that its direction has a derivative
@@ -291,4 +291,4 @@ def feature_table(now: Expressions, commands: Sequence[str]) -> dict[str, MX]:
         angle = now["beta_w"] - now["psi"]
         table["u_rw"] = now["u"] - now["V_w"] * ca.cos(angle)
         table["v_rw"] = now["v"] - now["V_w"] * ca.sin(angle)
-    return table | {name: now[name] for name in plain_inputs(now)}
+    return table | {name: now[name] for name in direct_inputs(now)}

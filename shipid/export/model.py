@@ -21,8 +21,8 @@ from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.method import Corrector, widened
 from shipid.hybrid.physics import Physics
-from shipid.physics.signals import row_of, signal_of
-from shipid.simulation.log import column_of
+from shipid.physics.signals import signal_of, signal_row
+from shipid.simulation.log import state_column
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
@@ -134,7 +134,7 @@ class Model:
         """SI unit of an entry of an input."""
         if self.vessel is not None and name in self.vessel.units:
             return self.vessel.units[name]
-        row = row_of(column_of(name))
+        row = signal_row(state_column(name))
         return ESTIMATES.get(signal_of(name), "m/s") if row is None else row.unit
 
     def inputs(self, instants: Instants) -> dict[str, Array]:

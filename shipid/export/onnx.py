@@ -11,7 +11,7 @@ import numpy as np
 
 from shipid.errors import ShipidError
 from shipid.export.model import Model
-from shipid.files import whole
+from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.units import Units
@@ -97,7 +97,7 @@ def write_onnx(model: Model, name: str, file: Path, *, single: bool) -> Path:
         {"inputs": json.dumps(names), "provenance": json.dumps(dict(model.predictor.provenance), default=str)},
     )
     checker.check_model(made)
-    with whole(file) as temporary:
+    with replace_whole(file) as temporary:
         save(made, str(temporary))
     return file
 

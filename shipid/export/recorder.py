@@ -13,7 +13,7 @@ from shipid.export.equations import Equations, by_name, named_function, symbols_
 from shipid.export.known import PLACE, stacked, turned
 from shipid.export.model import Model
 from shipid.observer import LOW, MEASURED, Bank, bank, begin, filters_function, observer_function, sizes
-from shipid.physics.signals import SIGNALS, row_of, turns_round
+from shipid.physics.signals import SIGNALS, is_all_round, signal_row
 
 TURN = 2 * np.pi
 KEPT = ("way_north", "way_east", "rate_north", "rate_east")
@@ -48,7 +48,7 @@ def kept_names(model: Model) -> tuple[str, ...]:
 
 def angles_of(names: Sequence[str]) -> list[str]:
     """Angles of thrusters and rudders: they may come by any turn, 350 deg for -10 deg."""
-    rows = ((name, row_of(name)) for name in names if "." in name)
+    rows = ((name, signal_row(name)) for name in names if "." in name)
     return [name for name, row in rows if row is not None and row.angle]
 
 
@@ -222,7 +222,7 @@ def same_turn(
         lifted = angle + TURN * ca.ceil((least - angle) / TURN)
         jump = ca.if_else(lifted <= most, lifted, jump)
     jump = ca.if_else(ca.logic_and(stopped, _between(middle, low, high)), middle, jump)
-    if not turns_round(name):
+    if not is_all_round(name):
         return jump, MX(0)
     on = nearest_turn(angle, last)
     up, down = TURN * ca.ceil((least - on) / TURN), TURN * ca.ceil((on - most) / TURN)

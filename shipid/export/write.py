@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
-from shipid.arguments import of_class, one_of, path_of
+from shipid.arguments import as_path, check_choice, check_class
 from shipid.engine.integrate import Method
-from shipid.errors import DocumentError, ShipidError, choices, visible
+from shipid.errors import DocumentError, ShipidError, escape_unprintable, suggest_name
 from shipid.export.c import Files, Precision, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
@@ -20,7 +20,7 @@ from shipid.export.casadi import predictor_function, vessel_function, write_func
 from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import Exportable, Model, model
 from shipid.export.onnx import write_onnx
-from shipid.files import write_together
+from shipid.files import write_set
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
@@ -82,7 +82,7 @@ def export_vessel(
     Raises ShipidError as there, and for an unknown integrator.
     """
     target, file, title = _checked(to, out, single, name)
-    one_of("integrator", integrator, get_args(Method))
+    check_choice("integrator", integrator, get_args(Method))
     if target.vessel is None:
         *others, last = (other for other, one in TARGETS.items() if one.vessel is not None)
         remedy = f"export it to {', '.join(others)} or {last}"
@@ -93,10 +93,10 @@ def export_vessel(
 def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | None) -> tuple[Target, Path, str]:
     """The target, the file or folder, and the name that begins every public name."""
     if name is not None:
-        of_class("name", name, str, "such as 'gunnerus'", DocumentError)
-    target, file = TARGETS.get(str(to)), path_of("out", out)
+        check_class("name", name, str, "such as 'gunnerus'", DocumentError)
+    target, file = TARGETS.get(str(to)), as_path("out", out)
     if target is None:
-        raise DocumentError(f"no such target: {choices(str(to), TARGETS)}", path="--to")
+        raise DocumentError(f"no such target: {suggest_name(str(to), TARGETS)}", path="--to")
     if single and not target.single:
         raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
     if not target.ending and file.exists() and not file.is_dir():
@@ -111,7 +111,7 @@ def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | Non
 def _folder(files: Files, folder: Path) -> list[Path]:
     """Write the files; an example that is there is kept, because it may have become the user's program."""
     texts = {folder / name: text for name, text in files.texts.items()}
-    return write_together({file: text for file, text in texts.items() if file.name != EXAMPLE or not file.exists()})
+    return write_set({file: text for file, text in texts.items() if file.name != EXAMPLE or not file.exists()})
 
 
 def _fmu(unit: Packed, file: Path) -> list[Path]:
@@ -122,7 +122,9 @@ def _fmu(unit: Packed, file: Path) -> list[Path]:
     if not platforms:
         here = f"{platform.system()} {platform.machine()}"
         log.warning(
-            "%s has no binary for %s: the tool that imports it must compile its sources", visible(str(file)), here
+            "%s has no binary for %s: the tool that imports it must compile its sources",
+            escape_unprintable(str(file)),
+            here,
         )
     return [file]
 

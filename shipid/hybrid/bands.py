@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, suggest_name
 from shipid.hybrid.stored import Stored
-from shipid.metrics import lengths
+from shipid.metrics import vector_lengths
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -59,7 +59,7 @@ class Region:
         along, across = turned(errors, self.ahead)
         with np.errstate(divide="ignore", invalid="ignore"):
             parts = np.stack([along / self.along, across / self.across], axis=-1)
-        return lengths(np.where(np.stack([along, across], axis=-1) == 0, 0.0, parts))
+        return vector_lengths(np.where(np.stack([along, across], axis=-1) == 0, 0.0, parts))
 
     def holds(self, errors: Array) -> NDArray[np.bool_]:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
@@ -168,7 +168,7 @@ class Bands(Stored):
             shown = f"{level:g}" if number else repr(level)
             raise DataError(f"{shown} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
         if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
-            raise DataError(f"no run of the kind {kind!r} calibrated this band: {choices(kind, self.kinds)}")
+            raise DataError(f"no run of the kind {kind!r} calibrated this band: {suggest_name(kind, self.kinds)}")
         if not self.promises(level, kind):
             raise DataError(too_few(level, self.runs if kind is None else self.kinds[kind], kind))
 
@@ -210,7 +210,7 @@ def track(paths: Array) -> Array:
     """Unit vectors (T, S, 2) along paths (T, S, 2) that start at the origin; ahead where a path does not move."""
     first = np.concatenate([np.zeros_like(paths[:1]), paths[:-1]])
     chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
-    size = lengths(chords)
+    size = vector_lengths(chords)
     moves = size > 1e-12 * np.max(size, axis=0, initial=0.0)
     ahead: Array = np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0])
     return ahead
@@ -237,7 +237,7 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     distance : logarithm of 1 + the distance from the windows of training.
     """
     chords = chords_of(paths)
-    size = lengths(chords)
+    size = vector_lengths(chords)
     cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
     dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
     angles = np.arctan2(cross, dot)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shipid.data.windows import evenly
 from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, chords_of, nearest, track, traits, turned
-from shipid.metrics import lengths
+from shipid.metrics import vector_lengths
 
 Array = NDArray[np.float64]
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
@@ -92,7 +92,7 @@ def calibrated(
     columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r"}}
     centres, spread, away = _from_training(runs, np.stack([columns[name] for name in names], axis=1))
     far = max(float(away.max()), 1e-9)
-    length = max(float(lengths(chords_of(paths)).sum(axis=0) @ runs.weight), 1e-9)
+    length = max(float(vector_lengths(chords_of(paths)).sum(axis=0) @ runs.weight), 1e-9)
     seen = traits(paths, columns, step, away, length)
     middle = runs.weight @ seen
     deviation = np.sqrt(runs.weight @ (seen - middle) ** 2)
@@ -202,12 +202,12 @@ class _Fit:
 def _fitted(runs: _Runs, apart: Array, normal: Array, circle: bool) -> _Fit:
     """Scale and growth from all runs, and scores of each run by those of the others."""
     if circle:
-        apart = np.broadcast_to(lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
+        apart = np.broadcast_to(vector_lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
     means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
     total = means.sum(axis=0)
     scale = _floored(total / runs.count)
     others = _floored((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
-    plain = lengths(apart / others)
+    plain = vector_lengths(apart / others)
     slopes, without = _slopes(runs, normal, plain.max(axis=0))
     return _Fit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from shipid.users import file_of
+from shipid.users import definition_file
 
 PREDICT = ("physics", "instants", "paths")  # what a corrector is called with
 KEPT = ("header", "arrays", "from_arrays")  # functions of a corrector by which it is saved and read back
@@ -76,4 +76,4 @@ def _uncallable(kind: type, name: str, taken: Sequence[str]) -> str:
 
 def named(kind: type) -> str:
     """The name of a class, and its file where it has one."""
-    return f"{kind.__name__} in {file}" if (file := file_of(kind)) else kind.__name__
+    return f"{kind.__name__} in {file}" if (file := definition_file(kind)) else kind.__name__

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat, field_validator
 
-from shipid.checked import Checked
+from shipid.checked import CheckedModel
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
-from shipid.physics.signals import measurable, plain_inputs
+from shipid.physics.signals import direct_inputs, measurable_signals
 
 Array = NDArray[np.float64]
 MOTIONS = ("u", "v", "r")
@@ -59,7 +59,7 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
         angle = np.asarray(columns["beta_w"]) - np.asarray(columns["psi"])
         table["u_rw"] = table["u"] - np.asarray(columns["V_w"]) * np.cos(angle)
         table["v_rw"] = table["v"] - np.asarray(columns["V_w"]) * np.sin(angle)
-    return table | {name: np.asarray(columns[name], dtype=float) for name in plain_inputs(columns)}
+    return table | {name: np.asarray(columns[name], dtype=float) for name in direct_inputs(columns)}
 
 
 def rows_of(table: Mapping[str, Array], names: Sequence[str]) -> Array:
@@ -74,7 +74,7 @@ def rows_of(table: Mapping[str, Array], names: Sequence[str]) -> Array:
 OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
 
 
-class Memory(Checked, BaseModel):
+class Memory(CheckedModel, BaseModel):
     """What a method takes from the past: all in seconds before the instant; nothing by default.
 
     Times are rounded to whole steps of the prediction, one at least.
@@ -172,7 +172,7 @@ def group_of(name: str) -> str:
     """
     if name in MOTIONS:
         return "motion"
-    if name.endswith("_rw") or measurable([name]):
+    if name.endswith("_rw") or measurable_signals([name]):
         return "wind"
     kind = re.match(r"(?:.*\.)?(past|turned|error|observer|physics)-", name)
     if kind is None:

@@ -23,7 +23,7 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from shipid.errors import ResultError
-from shipid.files import whole
+from shipid.files import replace_whole
 from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
@@ -177,7 +177,7 @@ def _row(number: int, trial: FrozenTrial) -> Row:
 
 def merge(files: Iterable[Path], target: Path) -> None:
     """Write one journal that holds the studies of all; it appears whole. ResultError for a file that is damaged."""
-    with whole(target) as temporary:
+    with replace_whole(target) as temporary:
         into = JournalStorage(_Lines(str(temporary)))
         for file in files:
             storage = Journal(file).storage

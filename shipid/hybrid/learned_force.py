@@ -28,7 +28,7 @@ from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import Stored
 from shipid.hybrid.trials import ridges_of
 from shipid.hybrid.units import solve
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -137,7 +137,7 @@ class LearnedForce(SearchedAlone):
             return "the vessel has no particulars.L_pp, which scales the learned force: give it"
         if "learned" in vessel.document.get("hull", {}):
             return f"the vessel has a learned force already: take the block {BLOCK} out"
-        if drawn := dynamics(vessel).drawn:
+        if drawn := vessel_dynamics(vessel).drawn:
             remedy = "take a base that extends the vessel, with `off = true` in that block"
             return f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}"
         return ""

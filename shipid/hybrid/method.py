@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, model_validator
 
-from shipid.arguments import by_name, number, numbers
-from shipid.checked import Checked
+from shipid.arguments import as_float_array, check_mapping, check_number
+from shipid.checked import CheckedModel
 from shipid.data.windows import Instants, Windows, locked
-from shipid.document import parse
+from shipid.document import parse_model
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.features import NOTHING, Inputs, Memory
 from shipid.hybrid.physics import Physics
-from shipid.users import placed
+from shipid.users import locate_errors
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -174,7 +174,7 @@ class Traits:
     terms: int | None = None
 
 
-class Method(Checked, BaseModel, ABC):
+class Method(CheckedModel, BaseModel, ABC):
     """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
 
     What a study asks of a method is below; all but `fit` and `corrector` have a default.
@@ -265,7 +265,7 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
     for vessel in (case.physics.vessel for case in task.cases.values()):
         if vessel is not None and (words := method.unfit(vessel)):
             raise DataError(words)
-    with placed(f"{name}.fit", type(method)):
+    with locate_errors(f"{name}.fit", type(method)):
         given = method.fit(task)
     if not isinstance(given, Mapping):
         raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
@@ -280,13 +280,15 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
 def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool) -> None:
     """DataError where the parts of a result are not what a study stores: it could not be read back."""
     try:
-        rows: list[TrialRow] = [parse(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)]
+        rows: list[TrialRow] = [
+            parse_model(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)
+        ]
     except (DocumentError, TypeError) as error:
         raise DataError(f"{where}: {error}: make trials by shipid.hybrid.trials.row_of") from None
-    number(f"{where}: seconds", one.seconds, DataError)
+    check_number(f"{where}: seconds", one.seconds, DataError)
     if not isinstance(one.sentence, str):
         raise DataError(f"{where}: sentence must be a text, not {type(one.sentence).__name__}")
-    if one.left_out is not None and np.shape(numbers(f"{where}: left_out", one.left_out, DataError)) != shape:
+    if one.left_out is not None and np.shape(as_float_array(f"{where}: left_out", one.left_out, DataError)) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
     if one.corrector is None:
         return
@@ -297,14 +299,14 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool)
 
 def _check_corrector(where: str, corrector: Corrector) -> None:
     """ShipidError where an object lacks what a corrector has, DataError for numbers that are none."""
-    with placed(where, type(corrector)):
+    with locate_errors(where, type(corrector)):
         if fault := fault_of_corrector(corrector):
             raise ShipidError(f"{where}: {fault}")
         chosen, past = corrector.hyperparameters, corrector.past
-    by_name(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
+    check_mapping(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
     for key, value in chosen.items():
-        number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
-    if not 0 <= number(f"{where}: past of the corrector", past, DataError) < np.inf:
+        check_number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
+    if not 0 <= check_number(f"{where}: past of the corrector", past, DataError) < np.inf:
         raise DataError(f"{where}: past of the corrector must be seconds, from 0 on, not {past!r}")
 
 

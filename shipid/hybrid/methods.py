@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from shipid.document import parse
-from shipid.errors import DataError, DocumentError, choices
+from shipid.document import parse_model
+from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.calibrator import Calibrator
 from shipid.hybrid.contract import fault_of_method
@@ -20,7 +20,7 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
-from shipid.users import placed
+from shipid.users import locate_errors
 
 METHODS: dict[str, type[Method]] = {
     "alone": Alone,
@@ -46,8 +46,8 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
         raise DocumentError(f"METHODS[{kind!r}] {what}, such as shipid.hybrid.alone.Alone", path=f"{path}.kind")
     if fault := fault_of_method(known):
         raise DocumentError(f"METHODS[{kind!r}]: {fault}", path=f"{path}.kind")
-    method: Method = parse(known, dict(settings), None, path)
-    with placed(f"{known.__name__}.past", known):
+    method: Method = parse_model(known, dict(settings), None, path)
+    with locate_errors(f"{known.__name__}.past", known):
         past = method.past
     if not isinstance(past, (int, float)) or not 0 <= past < math.inf:
         raise DocumentError(f"{known.__name__}.past must be seconds, from 0 on, not {past!r}", path=f"{path}.kind")
@@ -56,7 +56,7 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
 
 def listed(kind: str) -> str:
     """Return the names of the methods that there are, as the remedy where `kind` is none of them."""
-    return f"{choices(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
+    return f"{suggest_name(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
 
 
 def kind_of(method: Method) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.logs.guess.words import words_of_side
-from shipid.physics.signals import is_command, mirror_sign, orders_thrust, steers
+from shipid.physics.signals import is_command, is_steering, is_thrust_order, mirror_sign
 
 Array = NDArray[np.float64]
 OTHER = {"port": "starboard", "starboard": "port"}
@@ -35,8 +35,8 @@ def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...
     middle: dict[str, set[str | float]] = {}  # signal -> inputs and constants of the commands that name no side
     for column, values in table.items():
         component, _, signal = column.rpartition(".")
-        turns = any(steers(other) for other in table if other.startswith(f"{component}."))
-        if orders_thrust(column) and values.any() and ACROSS.search(component.lower()) and not turns:
+        turns = any(is_steering(other) for other in table if other.startswith(f"{component}."))
+        if is_thrust_order(column) and values.any() and ACROSS.search(component.lower()) and not turns:
             return None
         sides = [SIDES.get(word, word) for word in words[column]]
         partner = called.get(_name(column, [OTHER.get(side, side) for side in sides]), "")

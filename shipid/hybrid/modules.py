@@ -33,7 +33,7 @@ from shipid.hybrid.stored import Stored
 from shipid.hybrid.units import Seen, Units, solve
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
-from shipid.vessel.schema import behind, term_blocks
+from shipid.vessel.schema import term_blocks, upstream_signals
 
 Array = NDArray[np.float64]
 MOST = 2000  # moments from which the radius of the alarm is taken, about
@@ -47,7 +47,7 @@ def modules_of(vessel: Vessel | None) -> dict[str, tuple[str, ...]]:
         if key.startswith("hull."):
             modules["hull"].append(path)
         elif key.startswith("thruster."):
-            rudder = key.startswith("thruster.rudder") or bool(behind(TERMS[key]))
+            rudder = key.startswith("thruster.rudder") or bool(upstream_signals(TERMS[key]))
             modules["rudders" if rudder else "thrusters"].append(path)
     return {name: tuple(paths) for name, paths in modules.items() if paths}
 

@@ -8,17 +8,24 @@ from typing import Any, get_args
 
 import numpy as np
 
-from shipid.arguments import by_name, numbers, of_class, one_of, positive, whole_number
+from shipid.arguments import (
+    as_float_array,
+    check_choice,
+    check_class,
+    check_mapping,
+    check_positive,
+    check_whole_number,
+)
 from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
-from shipid.engine.gradient import rollout_gradient, squared_distance
+from shipid.engine.gradient import rollout_gradient, squared_distance_loss
 from shipid.engine.integrate import Method as Integrator
-from shipid.engine.rollout import Distances, Trajectories, distances, rollout
+from shipid.engine.rollout import Distances, Trajectories, rollout, rollout_distances
 from shipid.errors import DataError, ShipidError
 from shipid.observer import COLUMNS, Observer, bank, observed_start
 from shipid.physics.signals import ACTUAL
-from shipid.simulation.log import LEANING, aboard, column_of, horizontal
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
@@ -51,13 +58,13 @@ class Physics:
 
     def __post_init__(self) -> None:
         if self.vessel is not None:
-            of_class("vessel", self.vessel, Vessel, "as of `load_vessel`, or None")
-        object.__setattr__(self, "horizon", whole_number("horizon", self.horizon, 1))
-        object.__setattr__(self, "step", positive("step", self.step))
-        one_of("integrator", self.integrator, get_args(Integrator))
+            check_class("vessel", self.vessel, Vessel, "as of `load_vessel`, or None")
+        object.__setattr__(self, "horizon", check_whole_number("horizon", self.horizon, 1))
+        object.__setattr__(self, "step", check_positive("step", self.step))
+        check_choice("integrator", self.integrator, get_args(Integrator))
         if self.observer is not None:
-            of_class("observer", self.observer, Observer, "such as Observer(), or None")
-        one_of("path", self.path, get_args(PathSource))
+            check_class("observer", self.observer, Observer, "such as Observer(), or None")
+        check_choice("path", self.path, get_args(PathSource))
 
     def with_values(self, values: Mapping[str, Any]) -> Physics:
         """Return the same physics with other numbers, dotted path -> value."""
@@ -97,19 +104,19 @@ class Physics:
         With an observer u and v are those through the water.
         engine : as in `rollout`; `auto` takes C from `REPEATED_FROM` steps on.
         """
-        leaning = tuple(name for name in LEANING if name in dynamics(self.ship).state)
+        leaning = tuple(name for name in LEANING if name in vessel_dynamics(self.ship).state)
         kept = ("north", "east", *MOTION, *leaning)
         result, (north, east) = self._rollout(instants, kept, None, "cpu", engine)
         x, y = _in_frame(instants, north[:, 0], east[:, 0])
         motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
         if leaning:
             with np.errstate(all="ignore"):  # a path that diverged
-                motion |= horizontal(motion)
+                motion |= horizontal_velocities(motion)
         return {"x": x, "y": y, **{name: motion[name] for name in MOTION}}
 
     def reached(self, instants: Instants) -> dict[str, Array]:
         """What the actuators have reached after 0..T steps, name -> (T + 1, S); none where orders act at once."""
-        names = () if self.vessel is None else tuple(dynamics(self.vessel).memory)
+        names = () if self.vessel is None else tuple(vessel_dynamics(self.vessel).memory)
         if not names:
             return {}
         kept = ("north", "east", *(f"{ACTUAL}{name}" for name in names))
@@ -130,7 +137,7 @@ class Physics:
             start,
             commands,
             environment,
-            squared_distance(self._north_east(instants, future, drift)),
+            squared_distance_loss(self._north_east(instants, future, drift)),
             step=self.step,
             num_steps=self.horizon,
             method=self.integrator,
@@ -145,7 +152,7 @@ class Physics:
 
     def _north_east(self, instants: Instants, future: Array, drift: Array | None) -> Array:
         """Paths (T, S, 2) [m] in the frame (11) as north and east, less the drift of the water."""
-        future = numbers("future", future, DataError)
+        future = as_float_array("future", future, DataError)
         if future.shape != (self.horizon, len(instants), 2):
             raise DataError(f"future must be {(self.horizon, len(instants), 2)}, not {future.shape}")
         goal = np.stack(from_frame(future[..., 0], future[..., 1], *_origin(instants)), axis=-1)
@@ -166,7 +173,7 @@ class Physics:
         if self.observer is not None:
             raise ShipidError("screening takes no observer: screen the family that it extends", path="observer")
         start, commands, environment, _, _ = self._inputs(instants)
-        return distances(
+        return rollout_distances(
             self.ship,
             start,
             commands,
@@ -217,7 +224,7 @@ class Physics:
     def _inputs(self, instants: Instants) -> RolloutInputs:
         """Start, commands, environment, slow force and drift of a rollout; what has no column is zero."""
         check_instants(instants)
-        model = dynamics(self.ship)
+        model = vessel_dynamics(self.ship)
         zero = np.zeros(len(instants))
         columns: Mapping[str, Array] = {"down": instants.columns.get("z", zero), **instants.columns}
         given = {**columns, **(instants.planned or {})}
@@ -236,7 +243,7 @@ class Physics:
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
         start = {name: columns.get(name, zero) for name in model.state}
         if not start.keys().isdisjoint(LEANING):
-            start |= aboard(start)  # columns are horizontal
+            start |= body_velocities(start)  # columns are horizontal
         return start, commands, environment, slow, drift
 
 
@@ -255,22 +262,22 @@ def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Arr
 
 def check_instants(instants: Instants) -> None:
     """Raise DataError for what are no instants, such as windows, or for instants without columns."""
-    of_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
-    by_name("columns of the instants", instants.columns, "a name to an array", DataError)
+    check_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
+    check_mapping("columns of the instants", instants.columns, "a name to an array", DataError)
     if "u" not in instants.columns:  # which says how many instants there are
         raise DataError("the instants lack this column", path="u")
 
 
 def assumed(vessel: Vessel, columns: Collection[str]) -> list[str]:
     """Columns of states and weather that a vessel has and the columns lack: taken as zero, and named in the report."""
-    model = dynamics(vessel)
-    needed = (column_of(name) for name in (*model.state, *model.environment))
+    model = vessel_dynamics(vessel)
+    needed = (state_column(name) for name in (*model.state, *model.environment))
     return [name for name in needed if name not in columns]
 
 
 def check_columns(vessel: Vessel, columns: Collection[str], file: str) -> None:
     """Raise DataError if a command of the vessel is not among the columns."""
-    missing = [name for name in dynamics(vessel).commands if name not in columns]
+    missing = [name for name in vessel_dynamics(vessel).commands if name not in columns]
     if missing:
         commands = sorted(name for name in columns if "." in name)
         raise DataError(

@@ -27,7 +27,7 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import Judged, Problem, SearchedAlone
 from shipid.hybrid.settings import Point, Scale
 from shipid.hybrid.trials import ridge_trial, ridges_of
-from shipid.physics.signals import measurable
+from shipid.physics.signals import measurable_signals
 
 Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
@@ -52,7 +52,7 @@ class Stepper:
         if physics.observer is not None:
             raise DataError("steps start from measured states: physics with an observer cannot be corrected by step")
         self.instants = instants
-        kept = {"psi", *measurable(instants.columns)}  # what a step needs beside u, v, r and the commands
+        kept = {"psi", *measurable_signals(instants.columns)}  # what a step needs beside u, v, r and the commands
         self.columns = {name: values for name, values in instants.columns.items() if name in kept or "." in name}
         self.reached = physics.reached(instants)
 

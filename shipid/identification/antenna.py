@@ -15,7 +15,7 @@ from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution, by_log, identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
 from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
-from shipid.units import digits, listed, percent
+from shipid.units import join_names, percent_text, significant_digits
 
 Array = NDArray[np.float64]
 AHEAD, ABEAM = ("antenna.x", "antenna.y")  # unknowns beside the factors, in lengths of the ship
@@ -153,18 +153,18 @@ def antenna_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
     if share[worst] >= OUTSIDE and size > 0:
         name = short_names(unknowns(solution.vessel, solution.settings).paths)[worst]
         change, width = 100 * changes[worst] / size, 100 * half[worst] / size
-        moves = f" and moves {name} by {digits(change, 2, '+')} %, its interval is +-{digits(width, 2)} %"
+        moves = f" and moves {name} by {significant_digits(change, 2, '+')} %, its interval is +-{significant_digits(width, 2)} %"
     ways = ((seen.x, "ahead", "astern"), (seen.y, "to starboard", "to port"))
     parts = [
-        f"{digits(abs(size), 2)} m {there if size > 0 else back}"
+        f"{significant_digits(abs(size), 2)} m {there if size > 0 else back}"
         for size, there, back in ways
         if abs(size) >= NEGLIGIBLE * length
     ]
     remedy = "if so,"
     if abs(seen.x) > abs(seen.y):
-        remedy = f"compare with --nuisance lever_arm={digits(abs(seen.x), 2)}, or"
+        remedy = f"compare with --nuisance lever_arm={significant_digits(abs(seen.x), 2)}, or"
     return (
-        f"the log looks like that of an antenna about {listed(parts)} of the vessel's origin: that takes "
-        f"{percent(seen.explained)} of the squares of the residuals away{moves}; {remedy} give the place as a "
+        f"the log looks like that of an antenna about {join_names(parts)} of the vessel's origin: that takes "
+        f"{percent_text(seen.explained)} of the squares of the residuals away{moves}; {remedy} give the place as a "
         "lever_arm in the mapping, and import again"
     )

@@ -24,7 +24,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
-from shipid.units import digits, listed
+from shipid.units import join_names, significant_digits
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str
     if not 0 < horizon < LONG * longest:
         return ""
     return (
-        f"the horizon of {horizon:g} s is short against residuals that are correlated over {digits(longest)} s: "
+        f"the horizon of {horizon:g} s is short against residuals that are correlated over {significant_digits(longest)} s: "
         "estimates may be biased beyond any interval; fit whole runs (horizon 0)"
     )
 
@@ -67,7 +67,7 @@ def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
         return f"the standard errors are not to be trusted: {best.reason}"
     open_ = [path for path, error in zip(solution.paths, judged.errors, strict=True) if np.isinf(error)]
     if open_:
-        return f"the data do not determine {listed(short_names(open_))}: give priors, or fix some"
+        return f"the data do not determine {join_names(short_names(open_))}: give priors, or fix some"
     return ""
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.document import short_names
-from shipid.units import digits, listed
+from shipid.units import join_names, significant_digits
 
 Array = NDArray[np.float64]
 
@@ -46,8 +46,11 @@ class Combination:
         """One sentence that names the parameters and the unidentified direction."""
         if len(self.names) == 1:
             return f"{self.names[0]} has no effect on these data"
-        moves = [f"{digits(10 * w, 2, '+')} % of {name}" for w, name in zip(self.weights, self.names, strict=True)]
-        return f"only {listed(self.names)} together; {' with '.join(moves)} has no effect on these data"
+        moves = [
+            f"{significant_digits(10 * w, 2, '+')} % of {name}"
+            for w, name in zip(self.weights, self.names, strict=True)
+        ]
+        return f"only {join_names(self.names)} together; {' with '.join(moves)} has no effect on these data"
 
 
 def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:

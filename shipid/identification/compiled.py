@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.engine.native import C, Parts, compiled, integrated, target
+from shipid.engine.native import C, StagedSource, compile_source, compiler_target, step_statements
 from shipid.engine.printing import print_function
-from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import Target, head
+from shipid.engine.threads import run_tasks, threaded_source
+from shipid.engine.vectors import CompilerTarget, vector_source
 from shipid.identification.sensitivities import Layout, Variation, variation
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ STAGES = (("fixed",), ("known",))  # once an interval; once a step
 _ARRAYS = dict.fromkeys(("numbers", "inputs", "signals", "state", "records"), "double")
 
 
-class _Source(Parts):
+class _Source(StagedSource):
     """C source of one variation: terms of parameters alone are computed once, terms of the inputs once per step."""
 
     def __init__(self, model: Variation) -> None:
@@ -36,7 +36,7 @@ class _Source(Parts):
         """C statements of one step, with the outputs after it."""
         num_z, num_m = self.model.rates.size1_in(0), self.model.rates.size1_in(1)
         layout, ends = self.model.layout, "saved0, saved1, {2});"
-        lines, after, later = integrated(
+        lines, after, later = step_statements(
             num_z, num_m, f"rates({{0}}, {{1}}, {ends}", f"advance({{0}}, {{1!r}}, {ends}", layout.step, layout.method
         )
         lines.append(f"outputs({after}, {later}, saved0, saved1, seen, record);")
@@ -45,7 +45,7 @@ class _Source(Parts):
             lines.append(f"for (int i = 0; i < {num_m}; ++i) m[i] = {later}[i];")
         return "\n".join(lines)
 
-    def text(self, wanted: Target) -> str:
+    def text(self, wanted: CompilerTarget) -> str:
         """The complete C source for the target processor."""
         model = self.model
         num_z, num_m = model.rates.size1_in(0), model.rates.size1_in(1)
@@ -68,7 +68,7 @@ for (long k = number * steps; k < (number + 1) * steps; ++k) {{
   {{ {self.one_step()} }}
   for (int i = 0; i < {record}; ++i) note[i] = record[i];
 }}"""
-        return f"""{head(wanted)}
+        return f"""{vector_source(wanted)}
 static void stage0(const V *fixed, V *saved) {{ {self.stage(0)} }}
 static void stage1(const V *known, const V *saved0, V *saved) {{ {self.stage(1)} }}
 static void rates(const V *z, const V *m, const V *saved0, const V *saved1, V *out) {{ {self.main(0)} }}
@@ -76,17 +76,17 @@ static void advance(const V *m, double step, const V *saved0, const V *saved1, V
 const V dt[1] = {{ K(step) }}; {self.main(1)} }}
 static void outputs(const V *z, const V *m, const V *saved0, const V *saved1, const U *seen, V *out) {{
 {self.main(2)} }}
-{threaded(("steps",), _ARRAYS, task)}"""
+{threaded_source(("steps",), _ARRAYS, task)}"""
 
 
 @lru_cache(maxsize=32)
 def _library(layout: Layout) -> Any:
-    return compiled(_Source(variation(layout)).text(target()))
+    return compile_source(_Source(variation(layout)).text(compiler_target()))
 
 
 def pack(array: Array) -> Array:
     """Group predictions by SIMD lanes: (K, ..., entries) -> (groups, ..., entries, lanes); the last one is repeated."""
-    lanes, count = target().lanes, len(array)
+    lanes, count = compiler_target().lanes, len(array)
     filled = np.concatenate([array, np.repeat(array[-1:], -count % lanes, axis=0)])
     return np.ascontiguousarray(np.moveaxis(filled.reshape(-1, lanes, *array.shape[1:]), 1, -1), dtype=float)
 
@@ -100,7 +100,7 @@ def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arr
     run, model = _library(layout), variation(layout)
     state, numbers = pack(x), pack(fixed)
     groups, num_steps = known.shape[:2]
-    records = np.empty((groups, num_steps, model.outputs.size1_out(0), target().lanes))
+    records = np.empty((groups, num_steps, model.outputs.size1_out(0), compiler_target().lanes))
     work = num_steps * model.size  # of one group
-    in_parallel(run, (num_steps,), (numbers, known, seen, state, records), groups, work)
+    run_tasks(run, (num_steps,), (numbers, known, seen, state, records), groups, work)
     return np.moveaxis(records, -1, 1)

@@ -29,7 +29,7 @@ from shipid.identification.fit import beside
 from shipid.identification.residuals import build
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
-from shipid.units import listed
+from shipid.units import join_names
 
 Array = NDArray[np.float64]
 Beside = Callable[[Array], tuple[Array, Array]]
@@ -94,7 +94,7 @@ def sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str
         return ""
     return (
         "the fit is not linear, and these intervals end too early; their ends are at least so many times as far from "
-        f"the estimates: {listed([words for _, _, words in short])}; compare with --profile {max(short)[1]}, or fit "
+        f"the estimates: {join_names([words for _, _, words in short])}; compare with --profile {max(short)[1]}, or fit "
         "runs whose commands vary more"
     )
 

@@ -27,16 +27,16 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
-from shipid.errors import ShipidError, choices
+from shipid.errors import ShipidError, suggest_name
 from shipid.identification.settings import WEIGHTED
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import FROUDE, Controls, NotStraight
-from shipid.simulation.log import aboard, horizontal
-from shipid.simulation.manoeuvre import Approached, Excitation
-from shipid.simulation.perform import perform
-from shipid.simulation.standard import shaft_speed, standard
-from shipid.units import GRAVITY, RPM, percent
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.log import body_velocities, horizontal_velocities
+from shipid.simulation.manoeuvre import ApproachedManoeuvre, Excitation
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.standard import define_standard, shaft_speed
+from shipid.units import GRAVITY, RPM, percent_text
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ class Candidate:
     """A manoeuvre that could be run."""
 
     title: str
-    manoeuvre: Approached
+    manoeuvre: ApproachedManoeuvre
 
     @property
     def hours(self) -> float:
@@ -111,7 +111,7 @@ def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | No
     for speed in speeds or asked:
         for kind, angles in ANGLES.items():
             for angle in angles:
-                one = standard(vessel, kind, angle, speed=speed)
+                one = define_standard(vessel, kind, angle, speed=speed)
                 result.append(Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre))
         result += _excitations(vessel, speed, length, bounds)
     return [candidate for candidate in result if allowed(candidate.manoeuvre, bounds)]
@@ -132,7 +132,7 @@ def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) ->
     yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} rpm, {speed:.2g} m/s", waves)
 
 
-def allowed(manoeuvre: Approached, limits: Limits) -> bool:
+def allowed(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
     """Whether all orders of a manoeuvre are within the limits of helm and shaft.
 
     The rate limits apply to excitations only: in other manoeuvres the actuator model limits the rates.
@@ -168,7 +168,7 @@ def informed(
     """
     unknown = next((name for name in weights if name not in WEIGHTED), None)
     if unknown is not None:
-        raise ShipidError(f"no signal {unknown!r}: {choices(unknown, WEIGHTED)}", path="weights")
+        raise ShipidError(f"no signal {unknown!r}: {suggest_name(unknown, WEIGHTED)}", path="weights")
     if not choice:
         raise ShipidError("no manoeuvre is within the limits of the actuators")
     every = steps_between(vessel, interval) if step is None else max(round(interval / step), 1)
@@ -210,10 +210,10 @@ def performed(
     """Log of all candidates, `run` 0000, 0001, ...; by a helmsman's approach where the ship does not go straight."""
     named = [one.manoeuvre.model_copy(update={"name": f"{number:04d}"}) for number, one in enumerate(choice)]
     try:
-        return perform(vessel, named, step=step, interval=interval)
+        return perform_manoeuvres(vessel, named, step=step, interval=interval)
     except NotStraight:
         held = [one.model_copy(update={"approach": "helmsman"}) for one in named]
-        return perform(vessel, held, step=step, interval=interval)
+        return perform_manoeuvres(vessel, held, step=step, interval=interval)
 
 
 def steps_between(vessel: Vessel, interval: float) -> int:
@@ -240,7 +240,7 @@ class _Cut:
 
 def _cut(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
     """Cut logs into predictions of `steps` steps (0: whole runs); the last, shorter one of each run is kept."""
-    model, names = dynamics(vessel), log["run"].to_numpy()
+    model, names = vessel_dynamics(vessel), log["run"].to_numpy()
     bounds = [(np.flatnonzero(names == run)[0], int((names == run).sum())) for run in dict.fromkeys(names)]
     whole = max(count - 1 for _, count in bounds)
     most = steps or -(-whole // every) * every
@@ -253,7 +253,7 @@ def _cut(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
     rows = np.minimum(np.array(firsts) + np.arange(most)[:, None], np.array(lasts))  # (T, S)
     records = np.array(firsts) + np.arange(0, most + 1, every)[:, None]
     columns = {str(name): log[name].to_numpy() for name in log.columns if name != "run"}
-    columns |= {**aboard(columns), "down": columns.get("z", np.zeros(len(log)))}
+    columns |= {**body_velocities(columns), "down": columns.get("z", np.zeros(len(log)))}
     still = np.zeros(len(log))
     return _Cut(
         {name: columns.get(name, still)[rows[0]] for name in (*model.state, *model.hidden)},
@@ -301,10 +301,10 @@ def _sensitivities(
         )  # fmt: skip
         if path.diverged.any():
             raise ShipidError(
-                f"{vessel.name} diverges with a factor changed by {percent(PERTURBED)}: take a shorter step"
+                f"{vessel.name} diverges with a factor changed by {percent_text(PERTURBED)}: take a shorter step"
             )
-        states = {name: path[name] for name in dynamics(vessel).state}
-        seen = states | horizontal(states)
+        states = {name: path[name] for name in vessel_dynamics(vessel).state}
+        seen = states | horizontal_velocities(states)
         return np.stack([seen[name] / width for name, width in signals.items()], axis=-1)
 
     def rows(values: Array) -> Array:  # (R, k, S, signals) -> (S, R * signals, k)

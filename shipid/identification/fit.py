@@ -24,7 +24,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from shipid.identification.residuals import Prediction, Problem, predict
 from shipid.identification.settings import NUISANCES
-from shipid.interrupts import uninterrupted
+from shipid.interrupts import hold_interrupts
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, float], object]
@@ -107,7 +107,7 @@ def search(
     KeyboardInterrupt : Ctrl-C, after the current iteration. Errors raised by `progress` are passed on.
     """
     free = problem.unknown.low < problem.unknown.high
-    with uninterrupted() as held, np.errstate(all="ignore"):
+    with hold_interrupts() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
         watch = _Watch(progress, held, before)
         run = _Search(problem, evaluate(problem, begin, deepest(problem, begin, point) or point), free, watch)
@@ -178,7 +178,7 @@ class _Value:
 
 @dataclass
 class _Watch:
-    """Reports iterations to `progress`. held : Ctrl-C deferred by `uninterrupted`. iterations : count so far."""
+    """Reports iterations to `progress`. held : Ctrl-C deferred by `hold_interrupts`. iterations : count so far."""
 
     progress: Progress | None
     held: list[int]

@@ -16,8 +16,8 @@ from shipid.errors import DataError
 from shipid.identification.residuals import CURRENT, build
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
 from shipid.identification.settings import ENVIRONMENT, Identify, overrides, overrides_of
-from shipid.simulation.log import LEANING, aboard, column_of, horizontal
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -43,9 +43,9 @@ class FreeRuns:
 
 def unfelt(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str]) -> list[str]:
     """Columns of states and weather of the vessel that neither dataset, settings nor nuisances give: they are 0."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     given = {*map(str, dataset.frame), *(CURRENT if "current" in settings.widths else ())}
-    needed = [column_of(name) for name in (*model.state, *model.environment)]
+    needed = [state_column(name) for name in (*model.state, *model.environment)]
     overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
     return [
         name
@@ -112,11 +112,11 @@ def _predicted(
     vessel: Vessel, segments: Sequence[ShootingSegment], values: Array, settings: Identify
 ) -> dict[tuple[int, int], Array]:
     """(model, piece) -> states (N + 1, channels); model 0 is the log, model i > 0 has the parameters values[i - 1]."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     longest = max(segment.num_steps for segment in segments)
 
     def column(segment: ShootingSegment, name: str) -> Array:
-        return segment.columns.get(column_of(name), np.zeros(segment.num_steps + 1))
+        return segment.columns.get(state_column(name), np.zeros(segment.num_steps + 1))
 
     def held(name: str) -> Array:  # (longest, S): the last one where a piece is shorter
         rows = [np.minimum(np.arange(longest), segment.num_steps - 1) for segment in segments]
@@ -128,7 +128,7 @@ def _predicted(
     beside = tuple(name for name in LEANING if name in model.state)
     path = rollout(
         vessel,
-        start | aboard(start),
+        start | body_velocities(start),
         {name: held(name) for name in model.commands},
         {name: held(name) for name in model.environment},
         step=settings.step,
@@ -140,7 +140,7 @@ def _predicted(
     )
     channels = {name: path[name] for name in (*CHANNELS, *beside)}
     with np.errstate(all="ignore"):  # a path that diverges
-        channels |= horizontal(channels)
+        channels |= horizontal_velocities(channels)
     moved = np.stack([channels[name] for name in CHANNELS], axis=-1)  # (N + 1, models, S, channels), as a log has them
     result = {}
     for piece, segment in enumerate(segments):

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, pieces
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
-from shipid.physics.signals import wraps
-from shipid.simulation.log import aboard
-from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.physics.signals import is_wrapped_angle
+from shipid.simulation.log import body_velocities
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ def inverse_dynamics(
     centre = np.array([0.0 if base[path] == 0 else 1.0 for path in paths])
     given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
     widths = np.minimum(given, LOOSE)
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     problem = _Problem(vessel, model, tied, sizes, _runs(vessel, model, dataset, runs, environment or {}))
     linear = problem.linear(centre)
     factors, levels, settled = _solved(problem, centre, widths, bool(linear.all()))
@@ -286,14 +286,14 @@ def _stretch(
     """One stretch with its weights; None if it is shorter than a test function."""
     t = rows["t"].to_numpy(dtype=float)
     columns = {str(name): rows[name].to_numpy() for name in rows.columns if name not in ("run", "t", "flags")}
-    columns |= {name: np.unwrap(columns[name]) for name in columns if wraps(name)}
+    columns |= {name: np.unwrap(columns[name]) for name in columns if is_wrapped_angle(name)}
     absent = next((name for name in model.commands if name not in columns), None)
     if absent is not None:
         raise DataError(
             f"command {absent!r} is missing in the log, and {vessel.name} needs it", path=str(rows["run"].iloc[0])
         )
     zero = np.zeros(len(t))
-    columns |= {**aboard(columns), "down": columns.get("z", zero)}
+    columns |= {**body_velocities(columns), "down": columns.get("z", zero)}
     state = np.array([columns.get(name, zero) for name in (*model.state, *model.hidden)])
     commands = np.array([columns[name] for name in model.commands]).reshape(-1, len(t))
     reached = memory_along(vessel, {name: columns[name] for name in model.commands}, t) or {}

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, in_force, sample
-from shipid.physics.signals import steers
-from shipid.vessel.dynamics import dynamics
+from shipid.physics.signals import is_steering
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Changes = Literal["held", "between"]
@@ -51,7 +51,7 @@ def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late
     """
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     by_run = rows.groupby("run", sort=False)
-    steering = [name for name in dynamics(vessel).commands if steers(name) and name in rows]
+    steering = [name for name in vessel_dynamics(vessel).commands if is_steering(name) and name in rows]
     steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
     if not steering or vessel.length is None:
         return None
@@ -67,7 +67,7 @@ def between_rows(
     An order to an actuator changes in the middle between the row that has it and the row before. A command without an
     actuator is a measured angle or speed, or acts at once: it goes on evenly from row to row.
     """
-    t, model = np.asarray(rows["t"]), dynamics(vessel)
+    t, model = np.asarray(rows["t"]), vessel_dynamics(vessel)
     nearest = np.searchsorted((t[1:] + t[:-1]) / 2, instants, side="right")
     return {
         name: np.asarray(rows[name])[nearest] if name in model.memory else np.interp(instants, t, rows[name])
@@ -83,6 +83,6 @@ def held_over_steps(
     A row may lie within a step. An order to an actuator then counts from the beginning of the step that is nearest, any
     other command with its mean over the step: else it would come late by up to a step.
     """
-    model, edges = dynamics(vessel), np.append(instants, instants[-1] + step)
+    model, edges = vessel_dynamics(vessel), np.append(instants, instants[-1] + step)
     nearest, mean = sample(rows, instants + step / 2), in_force(rows, edges)
     return {name: np.asarray((nearest if name in model.memory else mean)[name]) for name in model.commands}

@@ -15,8 +15,8 @@ from shipid.identification.late import COARSE, interval_of
 from shipid.identification.settings import unknowns
 from shipid.identification.solve import Solution, by_log
 from shipid.identification.statistics import Statistics
-from shipid.units import digits
-from shipid.vessel.dynamics import dynamics
+from shipid.units import significant_digits
+from shipid.vessel.dynamics import vessel_dynamics
 
 Array = NDArray[np.float64]
 HALF = 0.5  # rows by which commands that change between rows and are held from their row are late on average
@@ -93,20 +93,20 @@ def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     moves = f"moves {name} by {change:+.2g} %, its interval is +-{width:.2g} %"
     gear = _geared(solution, dataset)
     if apart:
-        rows, seconds = abs(late.rows), digits(abs(late.rows) * late.between)
+        rows, seconds = abs(late.rows), significant_digits(abs(late.rows) * late.between)
         when = f"{seconds} s ({rows:.2g} rows) {'earlier' if late.rows > 0 else 'later'} than in the log: that {moves}"
         return f"the fit is better with commands {when}; {_causes(late.rows > 0, gear)}"
     remedy = f"--set commands=between{f' --set step={late.between / 2:.3g}' if gear else ''}"
     remedy = f"compare with {remedy}" if not solution.settings.outputs else "log faster"
     return (
-        f"commands count from their row, on average {digits(late.between / 2)} s late, and the fit is better with "
+        f"commands count from their row, on average {significant_digits(late.between / 2)} s late, and the fit is better with "
         f"commands {late.rows:.2g} rows earlier: half a row {moves}; {remedy}"
     )
 
 
 def _geared(solution: Solution, dataset: Dataset) -> list[str]:
     """Commands to actuators of the vessel that change in the fitted runs."""
-    model, fitted = dynamics(solution.vessel), dataset.select(solution.runs)
+    model, fitted = vessel_dynamics(solution.vessel), dataset.select(solution.runs)
     return [name for name in model.commands if name in model.memory and fitted.frame[name].nunique() > 1]
 
 

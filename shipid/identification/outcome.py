@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
-from shipid.arguments import function_or_none, names_of, number, of_class
+from shipid.arguments import as_names, check_class, check_function_or_none, check_number
 from shipid.data.dataset import Dataset, apart_from
 from shipid.data.held import held_commands, nothing_varies
 from shipid.data.outputs import common_outputs, compare_outputs
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
 from shipid.engine.engines import REPEATED
-from shipid.errors import DataError, DocumentError, ShipidError, choices
+from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.antenna import antenna_fit
@@ -48,14 +48,14 @@ from shipid.identification.statistics import (
 )
 from shipid.identification.stream import current_fit
 from shipid.identification.unstable import grows, growth_in
-from shipid.interrupts import uninterrupted
+from shipid.interrupts import hold_interrupts
 from shipid.simulation.measured import TRIALS, measure_standard
-from shipid.units import digits, listed, percent, plural
+from shipid.units import join_names, percent_text, plural_word, significant_digits
 from shipid.version import __version__
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import patch_text
-from shipid.vessel.ranges import contradictions
+from shipid.vessel.ranges import find_contradictions
 
 Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
@@ -140,10 +140,10 @@ class Identified:
         ShipidError where more than numbers were changed: no patch holds that.
         """
         vessel, solution = self.vessel, self.solution
-        bundled = documents.bundled("models").get(vessel.key)
+        bundled = documents.bundled_documents("models").get(vessel.key)
         is_bundled = bundled is not None and bundled.resolve() == Path(vessel.file).resolve()
         base = vessel.key if is_bundled else os.path.relpath(vessel.file, file.parent)
-        count = f"{len(self.runs)} {plural(len(self.runs), 'run')}"
+        count = f"{len(self.runs)} {plural_word(len(self.runs), 'run')}"
         digest, changed = _as_read(vessel)
         return patch_text(
             name=f"{vessel.name}, identified",
@@ -186,12 +186,12 @@ def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = 
 
     changes : dotted path in the table -> value that replaces the file's.
     """
-    document = {BLOCK: {}} if file is None else documents.read(file)
+    document = {BLOCK: {}} if file is None else documents.read_document(file)
     if not isinstance(document.get(BLOCK, {}), dict):
         raise DocumentError("must be a table", file=file, path=BLOCK)
     inside = {f"{BLOCK}.{path}": value for path, value in (changes or {}).items()}
-    block = documents.replace({BLOCK: {}, **document}, inside, file)
-    return cast(Settings, documents.parse(Settings, block, file)).identify
+    block = documents.replace_values({BLOCK: {}, **document}, inside, file)
+    return cast(Settings, documents.parse_model(Settings, block, file)).identify
 
 
 def pick_runs(
@@ -204,10 +204,10 @@ def pick_runs(
 
     def chosen(patterns: Sequence[str] | str, option: str) -> list[str]:
         selected: set[str] = set()
-        for pattern in names_of(option, () if patterns is None else patterns, DataError):
-            names = documents.match(pattern, dataset.runs)
+        for pattern in as_names(option, () if patterns is None else patterns, DataError):
+            names = documents.match_paths(pattern, dataset.runs)
             if not names:
-                raise DataError(f"{pattern!r} is no run: {choices(pattern, dataset.runs)}", path=option)
+                raise DataError(f"{pattern!r} is no run: {suggest_name(pattern, dataset.runs)}", path=option)
             selected.update(names)
         return [run for run in dataset.runs if run in selected]
 
@@ -235,7 +235,7 @@ def without_shared(
         clocks = "where every run has its clock, metadata['clock'] must be 'run'"
         raise DataError(f"every run shares its moments with the runs held out: hold out others ({clocks})", path="runs")
     warnings = tuple(
-        f"run {run} shares {'less than 1 %' if share < 0.01 else percent(share)} of its rows in time with the runs "
+        f"run {run} shares {'less than 1 %' if share < 0.01 else percent_text(share)} of its rows in time with the runs "
         "held out: " + ("they take no part in the fit" if run in left else "it takes no part in the fit")
         for run, share in lost.items()
         if share > 0
@@ -273,16 +273,16 @@ def run_identification(
     DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
     ShipidError : the fit did not converge; the message says why.
     """
-    of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
-    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    profiles, ahead = names_of("profiles", profiles, DataError), number("ahead", ahead, DataError)
-    function_or_none("progress", progress)
+    check_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    profiles, ahead = as_names("profiles", profiles, DataError), check_number("ahead", ahead, DataError)
+    check_function_or_none("progress", progress)
     check_level(band)
     fitted, tested = check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
     digest = dataset.digest
     dataset, fitted, shared = without_shared(dataset, fitted, tested)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
-    with uninterrupted() as held:  # an interrupted library call raises an unrelated error
+    with hold_interrupts() as held:  # an interrupted library call raises an unrelated error
 
         def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
             return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
@@ -393,7 +393,7 @@ def _implausible(vessel: Vessel, identified: Vessel, values: Mapping[str, float]
 
 def _odd(vessel: Vessel) -> dict[str, str]:
     """Numbers that a document is refused for unless they are `unusual` in it: dotted path -> a sentence."""
-    return contradictions(vessel.document, vessel.parameters)
+    return find_contradictions(vessel.document, vessel.parameters)
 
 
 def _nothing_free(solution: Solution) -> str:
@@ -471,11 +471,11 @@ def check(
     """
     fitted, tested = pick_runs(dataset, runs, held_out)
     check_length(settings, ahead)
-    overrides(settings, (*fitted, *tested), vessel, dynamics(vessel).environment, known=dataset.runs)
+    overrides(settings, (*fitted, *tested), vessel, vessel_dynamics(vessel).environment, known=dataset.runs)
     known = unknowns(vessel, settings).paths
     wrong = next((path for path in profiles if path not in known), None)
     if wrong is not None:
-        raise DataError(f"{wrong!r} is not free in the fit: {choices(wrong, known)}", path="profile")
+        raise DataError(f"{wrong!r} is not free in the fit: {suggest_name(wrong, known)}", path="profile")
     return fitted, tested
 
 
@@ -691,8 +691,8 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
     held = [name for name in held_commands(dataset, runs) if name.rpartition(".")[0] in components]
     if said or not held:
         return said
-    are = plural(len(held), "is", "are")
-    return [f"{listed(held)} {are} the same in all runs to fit: what other orders do there is not learnt"]
+    are = plural_word(len(held), "is", "are")
+    return [f"{join_names(held)} {are} the same in all runs to fit: what other orders do there is not learnt"]
 
 
 def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
@@ -722,12 +722,12 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         begun = "initial_state" in solution.settings.widths
         starts = "" if begun else ", or predictions begin at noisy rows (compare with --nuisance initial_state)"
         warnings.append(
-            f"residuals of {listed(list(coloured))} are correlated over {digits(longest)} s: the model, or "
+            f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the model, or "
             f"the wind and current data, are incomplete{starts}"
         )
         grown = grows(rate, _longest(solution), longest)
         if 0 < horizon < LONG * longest:
-            longer = [f"{digits(LONG * longest)} s"] if LONG * longest < _longest(solution) else []
+            longer = [f"{significant_digits(LONG * longest)} s"] if LONG * longest < _longest(solution) else []
             longer += [] if grown else ["whole runs (horizon 0)"]
             warnings.append(
                 f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals"
@@ -751,42 +751,44 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         ]
         warnings.append(
             "so few runs may hide a slow drift of sensors, wind or current, which makes errors larger than their "
-            f"intervals say, by these factors: {listed(said)}; fit more runs"
+            f"intervals say, by these factors: {join_names(said)}; fit more runs"
         )
     contrary = against_priors(judged.fit)
     if contrary:
         of_path = dict(zip(solution.paths, short_names(solution.paths), strict=True))
         said = [
-            f"{of_path[path]} would be {digits(factor)} +- {digits(half, 2)} (prior {width:g})"
+            f"{of_path[path]} would be {significant_digits(factor)} +- {significant_digits(half, 2)} (prior {width:g})"
             for path, (width, factor, half) in contrary.items()
         ]
         warnings.append(
-            f"the runs contradict the priors: by the runs alone the factor of {listed(said)}; base, log or priors are "
+            f"the runs contradict the priors: by the runs alone the factor of {join_names(said)}; base, log or priors are "
             "wrong, and the intervals take the priors for true"
         )
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:
         others = "the intervals of the others hold if the bound is the true value"
-        warnings.append(f"at a bound, so without an interval: {listed(bound)}; {others}")
+        warnings.append(f"at a bound, so without an interval: {join_names(bound)}; {others}")
     if "test" not in free:
         warnings.append("no run was held out: the accuracy on other runs is not known")
     left_out = [name for name in solution.settings.widths if name != "initial_state"]  # a new run has none
-    without = f", which leave out {listed(left_out)}," if left_out else ""
+    without = f", which leave out {join_names(left_out)}," if left_out else ""
     for name, runs in free.items():
         every = runs.errors[runs.errors["run"] == ALL].set_index("model")
         diverged = [str(model) for model in every.index if not np.isfinite(every["u"][model])]
         if diverged:
-            warnings.append(f"free runs of the {name} runs diverge {listed(diverged)} identification")
+            warnings.append(f"free runs of the {name} runs diverge {join_names(diverged)} identification")
         worse = [] if diverged else _worse(every)
         if worse:
-            warnings.append(f"free runs of the {name} runs{without} are worse than before in {listed(worse)}")
+            warnings.append(f"free runs of the {name} runs{without} are worse than before in {join_names(worse)}")
     return warnings
 
 
 def _worse(errors: pd.DataFrame) -> list[str]:
     """Signals with more error after the fit than before, and by how much; errors : by model."""
     ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in ERRORS_OF}
-    return [f"{name} by {digits(100 * (ratio - 1), 2)} %" for name, ratio in ratios.items() if ratio > 1 + WORSE]
+    return [
+        f"{name} by {significant_digits(100 * (ratio - 1), 2)} %" for name, ratio in ratios.items() if ratio > 1 + WORSE
+    ]
 
 
 def _rounded(value: float) -> float:

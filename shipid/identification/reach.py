@@ -10,9 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
-from shipid.physics.signals import steers
-from shipid.units import DEGREE, listed
-from shipid.vessel.dynamics import dynamics
+from shipid.physics.signals import is_steering
+from shipid.units import DEGREE, join_names
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class Reach:
         speed = np.hypot(u, v)
         moving = speed >= SLOW * np.quantile(speed, share)
         length = vessel.length or 1.0
-        helms = [np.abs(columns[name]) for name in dynamics(vessel).commands if steers(name)]
+        helms = [np.abs(columns[name]) for name in vessel_dynamics(vessel).commands if is_steering(name)]
         return cls(
             float(np.quantile(np.abs(np.arctan2(v, np.abs(u)))[moving], share)) / DEGREE,
             float(np.quantile((np.abs(r) * length / np.maximum(speed, 1e-9))[moving], share)),
@@ -52,7 +52,7 @@ class Reach:
 def reach_of(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Reach:
     """Reach of the runs of a dataset."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
-    names = ["u", "v", "r", *dynamics(vessel).commands]
+    names = ["u", "v", "r", *vessel_dynamics(vessel).commands]
     rows = rows[names].dropna()
     return Reach.of(vessel, {name: rows[name].to_numpy() for name in names}, ORDINARY)
 
@@ -68,7 +68,7 @@ def beyond(title: str, one: Reach, data: Reach) -> str:
     far = [(there, here) for there, here, yes in parts if yes]
     if not far:
         return ""
-    return f"{title} reaches {listed([a for a, _ in far])}; the data reach {listed([b for _, b in far])}"
+    return f"{title} reaches {join_names([a for a, _ in far])}; the data reach {join_names([b for _, b in far])}"
 
 
 def of_log(vessel: Vessel, frame: pd.DataFrame) -> Reach:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import compiler, refuse
-from shipid.errors import DataError, DocumentError, choices
+from shipid.engine.native import find_compiler, refuse_compiling
+from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
 from shipid.identification.sensitivities import Layout, Variation, is_thrust, run_machine, variation
@@ -31,8 +31,8 @@ from shipid.identification.settings import (
     overrides,
     unknowns,
 )
-from shipid.simulation.log import column_of
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.log import state_column
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     if "thrust_scale" in widths and not any(map(is_thrust, vessel.parameters)):
         message = f"{vessel.name} has no thrust coefficient: leave it out"
         raise DocumentError(message, path=f"{BLOCK}.nuisance.thrust_scale")
-    model, unknown = dynamics(vessel), unknowns(vessel, settings)
+    model, unknown = vessel_dynamics(vessel), unknowns(vessel, settings)
     _check_outputs(vessel, dataset, settings)
     overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
@@ -143,10 +143,10 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
 def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None:
     """Raise DocumentError for an output that is fitted and that the vessel or the data lack."""
     for name in settings.outputs:
-        predicted, path = dynamics(vessel).outputs, f"{BLOCK}.weights.{name}"
+        predicted, path = vessel_dynamics(vessel).outputs, f"{BLOCK}.weights.{name}"
         if name not in predicted:
             lacks = "; a torque needs K_Q of the propeller" if name.endswith(".torque") else ""
-            message = f"{vessel.name} predicts no {name}: {choices(name, predicted)}{lacks}"
+            message = f"{vessel.name} predicts no {name}: {suggest_name(name, predicted)}{lacks}"
             raise DocumentError(message, path=path)
         if name not in dataset.outputs:
             message = f"was not measured; the data have {', '.join(dataset.outputs) or 'no output of a component'}"
@@ -220,7 +220,7 @@ class Predictions:
         seen, self.weight, self.time = (
             np.array(list(each)) for each in zip(*map(self._seen, problem.segments), strict=True)
         )
-        compiled = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and compiler() is not None
+        compiled = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and find_compiler() is not None
         self.steps = known, seen
         self.packed = (pack(known), pack(seen)) if compiled else None
 
@@ -228,7 +228,7 @@ class Predictions:
         return len(self.run)
 
     def _log(self, segment: ShootingSegment) -> list[float]:
-        columns = (segment.columns.get(column_of(name)) for name in self.problem.model.entries)
+        columns = (segment.columns.get(state_column(name)) for name in self.problem.model.entries)
         values = [0.0 if column is None else float(column[0]) for column in columns]
         if self.problem.layout.carried:
             values += [float(segment.memory[name][0]) for name in self.problem.layout.model.memory]
@@ -270,7 +270,7 @@ class Predictions:
             try:
                 return run_compiled(self.problem.layout, x, fixed, *self.packed)
             except NoLibrary as error:
-                refuse(error.message)
+                refuse_compiling(error.message)
                 self.packed = None
         return run_machine(self.problem.layout, x, fixed, *self.steps)
 

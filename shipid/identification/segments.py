@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, clock_slack, pieces, sample, stretches
 from shipid.data.windows import without_rows
 from shipid.engine.casadi import memory_along
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, suggest_name
 from shipid.identification.late import COARSE, Changes, between_rows, held_over_steps
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -74,8 +74,8 @@ def cut_segments(
     """
     unknown = next((run for run in runs if run not in dataset.runs), None)
     if unknown is not None:
-        raise DataError(f"there is no run {unknown!r}: {choices(unknown, dataset.runs)}", path="runs")
-    model = dynamics(vessel)
+        raise DataError(f"there is no run {unknown!r}: {suggest_name(unknown, dataset.runs)}", path="runs")
+    model = vessel_dynamics(vessel)
     missing = next((name for name in model.commands if name not in dataset.commands), None)
     if missing is not None:
         recorded = ", ".join(dataset.commands) or "none"
@@ -151,7 +151,7 @@ def _cut(
         columns |= between_rows(vessel, rows, grid + step / 2)  # as they are in the middle of each step
     elif step <= COARSE * float(np.median(np.diff(t))):
         columns |= held_over_steps(vessel, rows, grid, step)
-    commands = {name: columns[name] for name in dynamics(vessel).commands}
+    commands = {name: columns[name] for name in vessel_dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result, begin = [], 0
     beginnings = measured & ~without_rows(t, grid, step)  # a state between two rows is no beginning
@@ -182,7 +182,7 @@ def _check_step(vessel: Vessel, rows: Mapping[str, NDArray[Any]], step: float) -
     interval = float(np.median(np.diff(rows["t"])))
     if step <= interval / 2 + clock_slack(rows["t"]):
         return
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     name = next((name for name in model.commands if name in model.memory and np.ptp(rows[name]) > 0), None)
     if name is not None:
         message = f"{step:g} s: orders to the actuator of {name} change in the middle between rows, which are"

@@ -19,11 +19,11 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from shipid.engine.casadi import summed_rates
-from shipid.engine.integrate import Method, integrate
+from shipid.engine.integrate import Method, integrate_step
 from shipid.identification.settings import MOVING
-from shipid.interrupts import uninterrupted
+from shipid.interrupts import hold_interrupts
 from shipid.physics.signals import is_output
-from shipid.simulation.log import aboard, horizontal
+from shipid.simulation.log import body_velocities, horizontal_velocities
 from shipid.vessel.dynamics import Dynamics
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ class Variation:
         known, seen = SX.sym("known", self.rates.size1_in(3)), SX.sym("seen", layout.num_seen)
         count = len(layout.model.memory)
         memory = x[num:] if layout.carried else known[known.shape[0] - count :]
-        after, later = integrate(
+        after, later = integrate_step(
             lambda z, m: self.rates(z, m, fixed, known),
             lambda m, dt: self.advance(m, fixed, known, dt),
             lambda z, a, k: z + a * k,
@@ -293,7 +293,7 @@ def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[
     """
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
-    u, v, r = map(SX, horizontal({**dict.fromkeys(("u", "v", "r"), zero), **state}, ca).values())
+    u, v, r = map(SX, horizontal_velocities({**dict.fromkeys(("u", "v", "r"), zero), **state}, ca).values())
     psi = state.get("psi", zero)
     across = v + x * r
     read = {
@@ -316,7 +316,7 @@ def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     psi = entry["psi"] - b
     true = dict(entry)
     true |= {"u": ca.cos(b) * u - ca.sin(b) * v, "v": ca.sin(b) * u + ca.cos(b) * v - x * entry["r"], "psi": psi}
-    true |= aboard(true, ca)
+    true |= body_velocities(true, ca)
     true |= {"north": entry["north"] - x * ca.cos(psi), "east": entry["east"] - x * ca.sin(psi)}
     return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))
 
@@ -355,7 +355,7 @@ def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arra
     known, seen : (K, N, .) inputs, and measured signals with their weights.
     """
     count, num_steps = known.shape[:2]
-    with uninterrupted():
+    with hold_interrupts():
         record = scan(layout, num_steps).map(count)(
             x.T, fixed.T, known.reshape(count * num_steps, -1).T, seen.reshape(count * num_steps, -1).T
         )

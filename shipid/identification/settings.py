@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
 
 from shipid import document as documents
-from shipid.checked import Checked
+from shipid.checked import CheckedModel
 from shipid.engine.integrate import Method
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.identification.late import Changes
 from shipid.identification.plausible import within
-from shipid.physics.signals import is_output, named
+from shipid.physics.signals import is_output, rows_of_role
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import select
+from shipid.vessel.perturb import select_paths
 from shipid.vessel.schema import SHARED
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.
 }
 
 
-class Identify(Checked, BaseModel):
+class Identify(CheckedModel, BaseModel):
     """The `[identify]` table. The unknowns are factors on the base values of the vessel's parameters (dotted paths).
 
     weights : standard deviations of the signals [m/s, rad/s, rad, m], and of measured outputs by the names of their
@@ -106,17 +106,19 @@ class Identify(Checked, BaseModel):
     @classmethod
     def _by_column(cls, given: Any) -> Any:
         """The nested table `propeller = { thrust = 500 }` as the column `propeller.thrust`."""
-        return dict(documents.leaves(given, lists=False)) if isinstance(given, dict) else given
+        return dict(documents.document_leaves(given, lists=False)) if isinstance(given, dict) else given
 
     @model_validator(mode="after")
     def _known(self) -> Identify:
         for name in self.weights:
             if name not in WEIGHTED and not is_output(name):
-                outputs = f"or a measured output, <component>.<signal> with a signal of {', '.join(named('output'))}"
-                raise ValueError(f"weights.{name} is no valid name: {choices(name, WEIGHTED)} ({outputs})")
+                outputs = (
+                    f"or a measured output, <component>.<signal> with a signal of {', '.join(rows_of_role('output'))}"
+                )
+                raise ValueError(f"weights.{name} is no valid name: {suggest_name(name, WEIGHTED)} ({outputs})")
         unknown = next((name for name in self.nuisance if name not in NUISANCES), None)
         if unknown is not None:
-            raise ValueError(f"nuisance.{unknown} is no valid name: {choices(unknown, NUISANCES)}")
+            raise ValueError(f"nuisance.{unknown} is no valid name: {suggest_name(unknown, NUISANCES)}")
         for path, (low, high) in self.bounds.items():
             if math.isnan(low) or math.isnan(high):
                 raise ValueError(f"bounds.{path}: [{low:g}, {high:g}] lacks a number: give [low, high], or inf")
@@ -194,7 +196,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
 
     def chosen(patterns: Sequence[str], key: str) -> list[str]:
         try:
-            return select(patterns, base, None, f"{BLOCK}.{key}")
+            return select_paths(patterns, base, None, f"{BLOCK}.{key}")
         except DocumentError as error:
             message = f"{error.message}{_left_out(vessel, patterns)}"
             raise DocumentError(message, path=error.path) from None
@@ -220,7 +222,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
         )
     unknown = next((path for path in settings.scale if base.get(path, 1.0) != 0), None)
     if unknown is not None:
-        hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else choices(unknown, base)
+        hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else suggest_name(unknown, base)
         raise DocumentError(f"{unknown!r}: {hint}", path=f"{BLOCK}.scale")
     groups = [without_zeros(group, settings, base) for group in _groups(settings, free, chosen)]
     scales = []
@@ -339,7 +341,7 @@ def without_zeros(group: Sequence[str], settings: Identify, base: Mapping[str, f
 
 def overrides_of(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
     """The overrides `<run>.<path>` -> value in the settings that belong to some runs."""
-    given = documents.leaves(settings.runs, lists=False)
+    given = documents.document_leaves(settings.runs, lists=False)
     return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
 
 
@@ -353,15 +355,15 @@ def overrides(
     """
     result: dict[str, dict[str, float]] = {run: {} for run in (*runs, *known)}
     valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]
-    for key, value in documents.leaves(settings.runs, lists=False):
+    for key, value in documents.document_leaves(settings.runs, lists=False):
         run = next((name for name in sorted(result, key=len, reverse=True) if key.startswith(f"{name}.")), None)
         where = f"{BLOCK}.runs.{key}"
         if run is None:
-            hint = choices(key.split(".", 1)[0], result)
+            hint = suggest_name(key.split(".", 1)[0], result)
             raise DocumentError(f"does not begin with the name of a run: {hint}", path=where)
         path = key[len(run) + 1 :]
         if path not in valid:
-            raise DocumentError(f"{path!r} cannot be set for a run: {choices(path, valid)}", path=where)
+            raise DocumentError(f"{path!r} cannot be set for a run: {suggest_name(path, valid)}", path=where)
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise DocumentError(f"{value!r} is not a number", path=where)
         result[run][path] = float(value)

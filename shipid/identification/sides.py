@@ -19,9 +19,9 @@ from scipy.special import stdtr
 from shipid.data.dataset import Dataset
 from shipid.identification.free_run import MEASURED
 from shipid.identification.segments import near_a_row
-from shipid.physics.signals import steers
-from shipid.units import DEGREE, percent
-from shipid.vessel.dynamics import dynamics
+from shipid.physics.signals import is_steering
+from shipid.units import DEGREE, percent_text
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ def _ratio(a: Array, b: Array) -> tuple[float, float]:
 
 def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array | None:
     """Mean magnitude (N,) [rad] of the angles that steer, at the rows of the free runs; None where no angle steers."""
-    names = [name for name in dynamics(vessel).commands if steers(name)]
+    names = [name for name in vessel_dynamics(vessel).commands if is_steering(name)]
     if not names:
         return None
     helm = np.zeros(len(log))
@@ -151,8 +151,8 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         chance = _chance(apart, float(np.hypot(worse["error"], better["error"])), freedom)
         if chance <= level and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             sentences.append(
-                f"the error of the turning{where} is {percent(worse['turning'], signed=True)} to {worse['side']} and "
-                f"{percent(better['turning'], signed=True)} to {better['side']}: the model lacks what "
+                f"the error of the turning{where} is {percent_text(worse['turning'], signed=True)} to {worse['side']} and "
+                f"{percent_text(better['turning'], signed=True)} to {better['side']}: the model lacks what "
                 f"makes the sides differ; to run next: turns to both sides{where}"
             )
             continue

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.arguments import by_name, function_or_none, names_of, numbers, of_class
+from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
 from shipid.data.dataset import Dataset
-from shipid.errors import DataError, DocumentError, choices
+from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.identification.covariance import inverted
 from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
 from shipid.identification.late import COARSE, interval_of
@@ -115,12 +115,12 @@ def identify(
     ------
     DocumentError, DataError : the settings, the vessel and the data do not fit together.
     """
-    of_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    of_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
+    check_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
     if start is not None and not isinstance(start, Solution):
-        by_name("start", start, "a path to a factor, or a Solution", DocumentError)
-    function_or_none("progress", progress)
-    runs = names_of("runs", () if runs is None else runs, DataError)
+        check_mapping("start", start, "a path to a factor, or a Solution", DocumentError)
+    check_function_or_none("progress", progress)
+    runs = as_names("runs", () if runs is None else runs, DataError)
     plain = settings.model_copy(update={"discount": False})
     solution = _identified(vessel, dataset, runs, plain, start, progress)
     if not settings.discount:
@@ -276,9 +276,9 @@ def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
     factors = unknown.centre.copy()
     for path, factor in start.items():
         if path not in unknown.paths:
-            message = f"{path!r} is not free in the fit: {choices(path, unknown.paths)}"
+            message = f"{path!r} is not free in the fit: {suggest_name(path, unknown.paths)}"
             raise DocumentError(message, path=f"{BLOCK}.start")
-        factors[unknown.paths.index(path)] = float(numbers(f"start of {path}", factor, DocumentError))
+        factors[unknown.paths.index(path)] = float(as_float_array(f"start of {path}", factor, DocumentError))
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
 
 

@@ -42,7 +42,7 @@ from shipid.document import short_names
 from shipid.errors import ShipidError
 from shipid.identification.collinearity import Combination, combinations
 from shipid.identification.covariance import inverted
-from shipid.units import digits, listed
+from shipid.units import join_names, significant_digits
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -689,7 +689,7 @@ def _sentences(
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in sets if path in combination.paths), None)
         of_what = "its base value" if fit.centre is None or fit.centre[j] else "its scale"
-        known = f"{name} is known to +-{digits(100 * half[j], 2)} % of {of_what}"
+        known = f"{name} is known to +-{significant_digits(100 * half[j], 2)} % of {of_what}"
         if path in fit.dropped:
             sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
         elif fit.held is not None and fit.held[j]:
@@ -700,14 +700,16 @@ def _sentences(
             sentences.append(known)
         elif identifiable[j]:
             assert together is not None
-            others = listed([other for other in together.names if other != name])
+            others = join_names([other for other in together.names if other != name])
             index = f"collinearity index {together.gamma:.0f}"
             sentences.append(f"{known}, if the model is right: {others} do nearly the same ({index})")
         elif together is not None:
             sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
             why = "hardly excited" if alone[j] > WIDEST * shared[j] else "others do a part of the same"
-            sentences.append(f"{name} is not identified: +-{digits(100 * alone[j], 2)} % of {of_what}, {why}")
+            sentences.append(
+                f"{name} is not identified: +-{significant_digits(100 * alone[j], 2)} % of {of_what}, {why}"
+            )
         else:
             sentences.append(f"{name} is not identified: no independent effect on these data")
     return tuple(sentences)

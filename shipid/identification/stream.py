@@ -13,7 +13,7 @@ from shipid.identification.residuals import CURRENT, build, predict
 from shipid.identification.settings import ENVIRONMENT, overrides_of
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
-from shipid.units import digits, percent
+from shipid.units import percent_text, significant_digits
 
 Array = NDArray[np.float64]
 TRIAL = 0.05  # m/s of the derivatives
@@ -77,9 +77,9 @@ def current_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
     which = "a current, about the same in all runs" if seen.same else "another current in each run"
     wind = ", or of wind that the log lacks" if solution.vessel.document.get("wind") else ""
     return (
-        f"residuals look like those of {which}, {digits(seen.size, 2)} m/s, which takes "
-        f"{percent(seen.explained)} of their squares away{wind}: estimates make up for it and may be far outside of "
-        f"their intervals; identify again with --nuisance current={digits(seen.size, 1)}"
+        f"residuals look like those of {which}, {significant_digits(seen.size, 2)} m/s, which takes "
+        f"{percent_text(seen.explained)} of their squares away{wind}: estimates make up for it and may be far outside of "
+        f"their intervals; identify again with --nuisance current={significant_digits(seen.size, 1)}"
     )
 
 

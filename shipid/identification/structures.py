@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.data.dataset import Dataset
-from shipid.errors import DataError, DocumentError, ShipidError, choices
+from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.identification.inverse import equations
 from shipid.identification.settings import Identify, dimensions_of, without_zeros
-from shipid.physics.signals import steers
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel
-from shipid.vessel.perturb import select
+from shipid.physics.signals import is_steering
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document
+from shipid.vessel.perturb import select_paths
 
 Array = NDArray[np.float64]
 PRESENT = "present"
@@ -108,7 +108,7 @@ def check_structures(names: Sequence[str]) -> None:
     valid = (PRESENT, *STRUCTURES)
     for number, name in enumerate(names):
         if name not in valid:
-            raise ShipidError(f"{name!r} is no structure: {choices(name, valid)}", path="structures")
+            raise ShipidError(f"{name!r} is no structure: {suggest_name(name, valid)}", path="structures")
         if name in names[:number]:
             raise ShipidError(f"{name!r} is named twice", path="structures")
 
@@ -176,7 +176,7 @@ def _bare(
         document["particulars"] = {**sizes, "U_0": speed}
     small = {path: NOTHING if path == "hull.mmg.R_0" else 0.0 for path in paths}
     document["name"] = f"{vessel.name}, hull of {structure.words}"
-    return check_vessel(documents.replace(document, small), vessel.file)
+    return check_document(documents.replace_values(document, small), vessel.file)
 
 
 def _stays(key: str, block: Mapping[str, Any], blocks: Collection[str]) -> bool:
@@ -194,7 +194,7 @@ def _left(block: Mapping[str, Any]) -> dict[str, Any]:
 
 def _states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, Array]:
     """u, v, r and commands (N,): rows of the runs, and as many drawn from ranges; those of v, r and helm are wider."""
-    names = ("u", "v", "r", *dynamics(vessel).commands)
+    names = ("u", "v", "r", *vessel_dynamics(vessel).commands)
     missing = next((name for name in names if name not in dataset.frame), None)
     if missing is not None:
         raise DataError(f"{vessel.name} needs this command; the data have {', '.join(dataset.commands)}", path=missing)
@@ -206,7 +206,7 @@ def _states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, 
     result = {}
     for name in names:
         low, high = float(rows[name].min()), float(rows[name].max())
-        if name in ("v", "r") or steers(name):
+        if name in ("v", "r") or is_steering(name):
             high = BEYOND * max(-low, high, 1e-6)
             low = -high
         result[name] = np.concatenate([some[name].to_numpy(dtype=float), rng.uniform(low, high, SAMPLES)])
@@ -218,7 +218,7 @@ def _forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], ze
 
     zero : with 0 for all of `free`.
     """
-    model, count = dynamics(vessel), len(states["u"])
+    model, count = vessel_dynamics(vessel), len(states["u"])
     names = list(vessel.parameters)
     values = np.array([0.0 if zero and name in free else value for name, value in vessel.parameters.items()])
     function = equations(model, tuple(names.index(path) for path in free))
@@ -266,7 +266,7 @@ def _settings(
     """The settings for the exchanged vessel: its coefficients are free, other numbers as the settings say."""
 
     def kept(patterns: Sequence[str]) -> list[str]:
-        chosen = select(patterns, vessel.parameters, vessel.file, "identify.parameters") if patterns else []
+        chosen = select_paths(patterns, vessel.parameters, vessel.file, "identify.parameters") if patterns else []
         gone = tuple(f"{path}." for path in (*(f"hull.{block}" for block in REPLACED), *rudders))
         return [
             path

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from shipid.data.dataset import Dataset
-from shipid.units import digits
-from shipid.vessel.dynamics import dynamics
+from shipid.units import significant_digits
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import growth
+from shipid.vessel.stability import yaw_growth
 
 GROWN = 3.0  # times e-fold within a prediction: from there on random forces count
 SHORTER = 3.0  # correlation times of the residuals of whole runs, that a prediction should last instead
@@ -25,7 +25,7 @@ def growth_in(dataset: Dataset, runs: Sequence[str], vessel: Vessel) -> float:
     """Growth rate [1/s] of a small yaw at the median speed and orders of runs, see `shipid.vessel.stability`."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = max(float(np.median(np.hypot(rows["u"], rows["v"]))), SLOWEST)
-    return growth(vessel, speed, {name: float(rows[name].median()) for name in dynamics(vessel).commands})
+    return yaw_growth(vessel, speed, {name: float(rows[name].median()) for name in vessel_dynamics(vessel).commands})
 
 
 def grows(rate: float, longest: float, memory: float) -> str:
@@ -36,7 +36,7 @@ def grows(rate: float, longest: float, memory: float) -> str:
     if rate * longest < GROWN or SHORTER * memory >= longest:
         return ""
     return (
-        f"the identified ship is course-unstable: a small yaw grows e-fold in {digits(1 / rate)} s, and random forces "
+        f"the identified ship is course-unstable: a small yaw grows e-fold in {significant_digits(1 / rate)} s, and random forces "
         f"with it over whole runs, so estimates may be several times worse than need be, and intervals too narrow; "
-        f"compare with --horizon {digits(SHORTER * memory, 2)}"
+        f"compare with --horizon {significant_digits(SHORTER * memory, 2)}"
     )

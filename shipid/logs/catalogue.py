@@ -15,7 +15,7 @@ FOLDER_VARIABLE = "SHIPID_DATA"
 
 def available() -> list[str]:
     """Return the names of the bundled mappings; `fetch` takes each of them."""
-    return list(document.bundled("studies/mappings"))
+    return list(document.bundled_documents("studies/mappings"))
 
 
 def fetch(name: str) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, suggest_name
 from shipid.logs.amounts import is_unit, north_of, parted
 from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
@@ -98,7 +98,7 @@ def column_of(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Serie
         raise DataError(f"{source!r} is {log.attrs['other'][source]}", file=file, path=path)
     if source not in names:
         alone = f"the header is one column, {names[0]!r}: is the separator right?" if names else "there is none"
-        remedy = alone if len(names) <= 1 else choices(source, names)
+        remedy = alone if len(names) <= 1 else suggest_name(source, names)
         raise DataError(f"column {source!r} is not in the log: {remedy}", file=file, path=path)
     return log.iloc[:, names.index(source)]
 

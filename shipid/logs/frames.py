@@ -13,7 +13,7 @@ from shipid.errors import DataError
 from shipid.logs.dates import moment_of
 from shipid.logs.mapping import Column, Mapping
 from shipid.logs.repairs import Despike, Records, despike, interpolate_at
-from shipid.physics.signals import is_command, row_of, turns_round, wraps
+from shipid.physics.signals import is_all_round, is_command, is_wrapped_angle, signal_row
 
 BLOCK = 200_000  # rows that are projected at once
 JUMP, JUMPY = np.radians(1.0), 20.0  # rad of a meridian; s, for half of which positions may jump: repairs come later
@@ -50,11 +50,11 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
     It does so from row to row, or over a gap of at most `max_gap` [s], which will be interpolated. An order is not
     interpolated, but a gear that follows it would go the whole turn back.
     """
-    row = row_of(name)
+    row = signal_row(name)
     ordered = row is not None and row.angle and is_command(name)
-    if column.wrap and ordered and not turns_round(name) and not begins_again(values[np.isfinite(values)], name):
+    if column.wrap and ordered and not is_all_round(name) and not begins_again(values[np.isfinite(values)], name):
         raise DataError(f"{column.source!r} {_not_of_turns(values)}", file=file, path=f"columns.{name}")
-    if column.wrap or not (wraps(name) or name == "course" or ordered):
+    if column.wrap or not (is_wrapped_angle(name) or name == "course" or ordered):
         return
     if not np.nanmax(values, initial=-np.inf) - np.nanmin(values, initial=np.inf) > TURN - ABOUT:
         return  # none can: of a large log there is no room for what follows
@@ -69,7 +69,7 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
         remedy = "write wrap = true"
         if ordered and not begins_again(values[known], name):
             remedy = f"it {_not_of_turns(values)}"
-        elif ordered and not turns_round(name):
+        elif ordered and not is_all_round(name):
             remedy = "is the unit right? If it counts from 0 to 360 deg, write wrap = true"
         raise DataError(f"{sentence}: {remedy}", file=file, path=f"columns.{name}")
 
@@ -81,7 +81,7 @@ def _not_of_turns(values: Array) -> str:
 
 def begins_again(values: Array, command: str) -> bool:
     """Whether angles (N,) [rad] of a command may begin again after a whole turn; a rudder does so about amidships."""
-    near = turns_round(command) or bool(np.all(np.cos(values) > 0.0))
+    near = is_all_round(command) or bool(np.all(np.cos(values) > 0.0))
     return near and bool(np.max(values, initial=-np.inf) - np.min(values, initial=np.inf) < 1.02 * TURN)
 
 

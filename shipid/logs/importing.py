@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import of_class, path_of
+from shipid.arguments import as_path, check_class
 from shipid.data.dataset import (
     BREAK,
     STANDARD_DEVIATIONS,
@@ -30,7 +30,7 @@ from shipid.data.dataset import (
     units_of,
 )
 from shipid.data.kinematics import Noise, smooth
-from shipid.errors import DataError, choices, is_utf_8
+from shipid.errors import DataError, is_utf_8, suggest_name
 from shipid.logs.cells import column_of, numbers_of, of_ais, of_minutes, of_parts, of_quaternion
 from shipid.logs.channels import Channel, at_instants, close_gaps, common_instants, even_instants, interpolation_of
 from shipid.logs.dates import ZONE_REMEDY, moment_of, other_zone, span_of
@@ -95,11 +95,11 @@ def import_log(
     ------
     DataError : with the log, the row or the key of the mapping, and what would be right.
     """
-    of_class("mapping", mapping, Mapping, "as of `read_mapping`", DataError)
-    source, off = path_of("file", file, DataError), tuple(without)
+    check_class("mapping", mapping, Mapping, "as of `read_mapping`", DataError)
+    source, off = as_path("file", file, DataError), tuple(without)
     for kind in off:
         if kind not in REPAIRS:
-            raise DataError(f"no repair of this kind: {choices(kind, REPAIRS)}", path=kind)
+            raise DataError(f"no repair of this kind: {suggest_name(kind, REPAIRS)}", path=kind)
     digest = digest_of(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(

@@ -13,7 +13,7 @@ import pandas as pd
 from shipid.data.dataset import DATED, Dataset, units_of
 from shipid.errors import DataError
 from shipid.logs.frames import PARALLEL, convergence
-from shipid.units import percent
+from shipid.units import percent_text
 
 FARTHEST = 1e5  # m between origins
 COPIED = 0.3  # share of the rows of a run from which on it is a copy: manoeuvres of a simulator may begin alike
@@ -84,7 +84,7 @@ def _check_copies(datasets: Mapping[Path, Dataset]) -> None:
             run = datasets[file].frame["run"]
             shares = rows[file].isin(rows[other]).groupby(run).sum() / run.groupby(run).size()
             if shares.max() > COPIED:
-                copied = f"run {shares.idxmax()!r} has {percent(shares.max())} of its rows from {other.name}"
+                copied = f"run {shares.idxmax()!r} has {percent_text(shares.max())} of its rows from {other.name}"
                 raise DataError(f"{copied}: a copy would train on what it tests; leave one of them out", file=file)
 
 

@@ -14,7 +14,7 @@ from pydantic import Field, SerializeAsAny
 
 from shipid import document
 from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.logs.dates import DAY, EXCEL, LAST_DATE, NEXT_DAY, over_midnights
 from shipid.logs.formats import Format, TextFormat
 from shipid.logs.readers import READERS
@@ -30,7 +30,7 @@ from shipid.logs.repairs import (
     Strict,
     WrapInterpolation,
 )
-from shipid.physics.signals import is_command, is_output, named, row_of
+from shipid.physics.signals import is_command, is_output, rows_of_role, signal_row
 from shipid.units import DEGREE, KNOT, MINUTE, RPM
 
 UNITS: dict[str, dict[str, float]] = {
@@ -268,21 +268,25 @@ class Mapping(Strict):
 
 def read_mapping(name: str | Path) -> Mapping:
     """Read a mapping: a bundled one by name, any other by path; raises DocumentError with file, path and remedy."""
-    file = document.find(str(name), "studies/mappings")
-    return parse_mapping(document.read(file), file)
+    file = document.find_document(str(name), "studies/mappings")
+    return parse_mapping(document.read_document(file), file)
 
 
 def parse_mapping(raw: document.Document, file: Path) -> Mapping:
     """Make a mapping of the content of a document; `file` is what errors name."""
     if "digest" in raw:
         raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
-    parts: dict[str, Any] = {"repair": list(_repairs(raw.get("repair", []), file)), "digest": document.digest(raw)}
+    parts: dict[str, Any] = {
+        "repair": list(_repairs(raw.get("repair", []), file)),
+        "digest": document.digest_document(raw),
+    }
     parts |= _formats(raw, file)
     if isinstance(raw.get("columns"), dict):
         parts["columns"] = {
-            key: document.parse(Column, entry, file, prefix=f"columns.{key}") for key, entry in raw["columns"].items()
+            key: document.parse_model(Column, entry, file, prefix=f"columns.{key}")
+            for key, entry in raw["columns"].items()
         }
-    mapping: Mapping = document.parse(Mapping, {**raw, **parts}, file)
+    mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
     _check_columns(mapping, file)
     _check_missing(mapping, file)
     _check_instants(mapping, file)
@@ -293,7 +297,7 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
             if column not in repairable:
                 raise DocumentError(
-                    f"no column {column!r} to repair: {choices(column, repairable)}",
+                    f"no column {column!r} to repair: {suggest_name(column, repairable)}",
                     file=file,
                     path=f"repair.{index}.columns",
                 )
@@ -419,7 +423,7 @@ def is_position(text: str) -> bool:
 
 def sides_of(name: str) -> str:
     """Letters of the sides that an angle may have in a text, by its column of the dataset; empty where it has none."""
-    row = row_of(name)
+    row = signal_row(name)
     sided = name == "phi" or (row is not None and row.angle and is_command(name))
     return SIDES.get(name, OF_SHIP if sided else "")
 
@@ -460,15 +464,15 @@ def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
             inner = {} if not isinstance(entry, dict) else entry
             form = _format(inner.get("format", {}), file, f"file.{key}.format")
             read = {**inner, "format": form} if isinstance(entry, dict) else entry
-            parts["file"][key] = document.parse(File, read, file, prefix=f"file.{key}")
+            parts["file"][key] = document.parse_model(File, read, file, prefix=f"file.{key}")
     return parts
 
 
 def _format(raw: Any, file: Path, path: str) -> Format:
     kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
     if kind not in READERS:
-        raise DocumentError(f"unknown kind {kind!r}: {choices(kind, READERS)}", file=file, path=f"{path}.kind")
-    form: Format = document.parse(READERS[kind].options, raw, file, prefix=path)
+        raise DocumentError(f"unknown kind {kind!r}: {suggest_name(kind, READERS)}", file=file, path=f"{path}.kind")
+    form: Format = document.parse_model(READERS[kind].options, raw, file, prefix=path)
     return form
 
 
@@ -479,8 +483,10 @@ def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
     for index, entry in enumerate(raw):
         kind = str(entry.get("kind", ""))
         if kind not in REPAIRS:
-            raise DocumentError(f"unknown kind {kind!r}: {choices(kind, REPAIRS)}", file=file, path=f"repair.{index}")
-        yield document.parse(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
+            raise DocumentError(
+                f"unknown kind {kind!r}: {suggest_name(kind, REPAIRS)}", file=file, path=f"repair.{index}"
+            )
+        yield document.parse_model(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
 
 
 def _check_columns(mapping: Mapping, file: Path) -> None:
@@ -490,8 +496,8 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
     for name, column in columns.items():
         unit, path = INPUTS.get(name) or unit_of(name), f"columns.{name}"
         if unit is None or not (name in mapped or is_command(name) or is_output(name)):
-            hint = f"or <component>.<signal> with a signal of {', '.join((*named('command'), *named('output')))}"
-            raise DocumentError(f"unknown column: {choices(name, mapped)} ({hint})", file=file, path=path)
+            hint = f"or <component>.<signal> with a signal of {', '.join((*rows_of_role('command'), *rows_of_role('output')))}"
+            raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
         _factor(column.unit, unit, file, f"{path}.unit")
         if column.unit == "ddmm" and name not in ("latitude", "longitude"):
             message = "only latitude and longitude are in degrees and minutes: write deg or rad"
@@ -575,7 +581,7 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
     for name, column in mapping.columns.items():
         path = f"columns.{name}"
         if column.file is not None and column.file not in mapping.file:
-            message = f"no [file.{column.file}]: {choices(column.file, mapping.file)}"
+            message = f"no [file.{column.file}]: {suggest_name(column.file, mapping.file)}"
             raise DocumentError(message, file=file, path=f"{path}.file")
         if column.interpolation == "angle" and (INPUTS.get(name) or unit_of(name)) != "rad":
             raise DocumentError(

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import pandas as pd
 
 from shipid.data.dataset import DATED, Dataset, pieces
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, suggest_name
 from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
-from shipid.physics.signals import is_command, steers
-from shipid.simulation.standard import standards
+from shipid.physics.signals import is_command, is_steering
+from shipid.simulation.standard import standard_manoeuvres
 
 NO_HELM = (
     "the log has no angle that steers, by which zigzags and turning circles are measured, and the shafts are not "
@@ -41,16 +41,16 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
 
     Parameters
     ----------
-    kind : of all runs, a key of `standards()`; default: what is recognised.
+    kind : of all runs, a key of `standard_manoeuvres()`; default: what is recognised.
     length : of the ship between perpendiculars [m]; without it nothing is judged by ship lengths.
 
     Raises
     ------
     DataError : an unknown kind, a length that is not positive.
     """
-    trials = standards()
+    trials = standard_manoeuvres()
     if kind is not None and kind not in trials:
-        raise DataError(f"no manoeuvre is called {kind!r}: {choices(kind, trials)}", path="--manoeuvre")
+        raise DataError(f"no manoeuvre is called {kind!r}: {suggest_name(kind, trials)}", path="--manoeuvre")
     if length is not None and not length > 0:
         raise DataError(f"a length of {length:g} m: it must be positive", path="--length")
     measures, judged, left = [], [], {}
@@ -64,7 +64,7 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
         record = record_of(columns)
         kinds, why = kinds_of(record) if kind is None else ((kind,), "")
         if not kinds:
-            helm = any(is_command(column) and steers(column) for column in columns)
+            helm = any(is_command(column) and is_steering(column) for column in columns)
             left[name] = why if helm else NO_HELM
         for seen in kinds:
             result = trials[seen].measures(record)

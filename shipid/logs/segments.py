@@ -11,7 +11,7 @@ import pandas as pd
 
 from shipid.data.dataset import Array, Dataset, pieces
 from shipid.logs.mapping import Segment
-from shipid.physics.signals import is_shaft, steers
+from shipid.physics.signals import is_shaft, is_steering
 
 HELM = np.radians(3.0)  # rad: less is steering a course
 TURN = np.radians(120.0)  # rad of heading over one helm: a turning, not a leg of a zigzag
@@ -87,7 +87,7 @@ def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
 
 def _helm(rows: pd.DataFrame) -> Array:
     """Mean steering angle [rad], about its median in the straightest rows; yaw rate in its place if none is logged."""
-    names = [name for name in map(str, rows.columns) if steers(name)]
+    names = [name for name in map(str, rows.columns) if is_steering(name)]
     if not names:
         r = rows["r"].to_numpy()
         return np.asarray(r / max(float(np.percentile(np.abs(r), 95)), 1e-9) * 4 * HELM)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from shipid.errors import DataError, choices
+from shipid.errors import DataError, suggest_name
 
 if TYPE_CHECKING:
     from python_calamine import CalamineSheet, CalamineWorkbook
@@ -84,7 +84,7 @@ def sheet_text(file: Path, name: str) -> str:
     """
     book = _opened(file)
     if name not in book.sheet_names:
-        raise DataError(f"no sheet {name!r}: {choices(name, book.sheet_names)}", file=file, path="format.sheet")
+        raise DataError(f"no sheet {name!r}: {suggest_name(name, book.sheet_names)}", file=file, path="format.sheet")
     sheet = _sheet(book, name, file)
     check_width(sheet.width, file)
     first = sheet.start[1] if sheet.start is not None else 0

@@ -10,8 +10,8 @@ from shipid.errors import DataError
 from shipid.measures.record import Array, Record, helm_over, plateaus, released
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_over
-from shipid.physics.signals import is_command, is_shaft, orders_thrust, steers, turns_round
-from shipid.units import DEGREE, percent
+from shipid.physics.signals import is_all_round, is_command, is_shaft, is_steering, is_thrust_order
+from shipid.units import DEGREE, percent_text
 
 STATES = ("t", "north", "east", "psi", "u", "v", "r")
 LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE
@@ -42,7 +42,7 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     if missing is not None:
         raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
-    angles = _commands(columns, steers)
+    angles = _commands(columns, is_steering)
     known = {name: _sense(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
     moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
     least = MIDSHIPS * max(moved.values(), default=0.0)
@@ -57,10 +57,10 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
 def _driving(columns: Mapping[str, Array]) -> list[Array]:
     """Shaft speed of each screw, > 0 where it drives ahead, as `record_of` says; the pitch alone where it has none."""
     shafts = _commands(columns, is_shaft)
-    for name, pitch in _commands(columns, lambda name: orders_thrust(name) and not is_shaft(name)).items():
+    for name, pitch in _commands(columns, lambda name: is_thrust_order(name) and not is_shaft(name)).items():
         shaft = f"{name.rpartition('.')[0]}.n"
         shafts[shaft] = shafts.get(shaft, np.ones(len(pitch))) * pitch / (np.abs(pitch).max() or 1.0)
-    for name, angle in _commands(columns, turns_round).items():
+    for name, angle in _commands(columns, is_all_round).items():
         shaft, off = f"{name.rpartition('.')[0]}.n", np.abs(np.arctan2(np.sin(angle), np.cos(angle)))
         if shaft in shafts and off.max() > ASTERN:
             shafts[shaft] = shafts[shaft] * (1 - off / (90 * DEGREE))
@@ -112,7 +112,7 @@ def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
     within = slice(over.row, last)
     if straight and (share[within] <= -0.5).any() and off[within].max() < LEAST_TURN:
         both = float((np.abs(share[within]) >= 0.5).mean())
-        few = f"the helm is over to either side for {percent(both)} of the time only"
+        few = f"the helm is over to either side for {percent_text(both)} of the time only"
         return (("zigzag",), "") if both >= MOSTLY else ((), few)
     levels = {round(float(record.helm[b]) / APART) for _, b in plateaus(record.t, record.helm, APART / 4)}
     if len(levels) >= MANY:

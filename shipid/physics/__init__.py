@@ -48,7 +48,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Memory:
+class ActuatorModel:
     """An actuator model: `output(state)` replaces the command, `advance(command, state, dt)` gives the next state.
 
     Its parameters are those of `advance`; `output` may take some of them.
@@ -69,30 +69,34 @@ GIVEN = ("wash",)
 """Positional arguments that another component provides: the one named by the key `behind` of the block."""
 
 TERMS: dict[str, Term] = {
-    "hull.derivatives": Term(hull.derivatives),
+    "hull.derivatives": Term(hull.derivatives_wrench),
     "hull.prime_derivatives": Term(hull.prime_derivatives),
     "hull.bis_derivatives": Term(hull.bis_derivatives),
-    "hull.mmg": Term(hull.mmg),
-    "hull.abkowitz": Term(hull.abkowitz),
-    "hull.crossflow": Term(hull.cross_flow, components=hull.strips),
-    "hull.resistance": Term(hull.resistance),
-    "hull.learned": Term(learned.learned),
+    "hull.mmg": Term(hull.mmg_wrench),
+    "hull.abkowitz": Term(hull.abkowitz_wrench),
+    "hull.crossflow": Term(hull.cross_flow, components=hull.hull_strips),
+    "hull.resistance": Term(hull.resistance_wrench),
+    "hull.learned": Term(learned.learned_wrench),
     "restoring.hydrostatic": Term(restoring.hydrostatic),
     "radiation.heave_pitch": Term(
         radiation.heave_pitch, states=radiation.heave_pitch_states, rates=radiation.heave_pitch_rates
     ),
     "radiation.roll": Term(radiation.roll, states=radiation.roll_states, rates=radiation.roll_rates),
     "waves.first_order": Term(
-        waves.first_order, drawn=waves.first_order_widths, states=waves.passage, rates=waves.passage_rates
+        waves.first_order, drawn=waves.first_order_widths, states=waves.passage_states, rates=waves.passage_rates
     ),
-    "waves.drift": Term(waves.drift, drawn=waves.drift_widths),
-    "wind.table": Term(wind.table),
-    "wind.blendermann": Term(wind.blendermann),
-    "thruster.azimuth": Term(thruster.azimuth, gives={"thrust": thruster.azimuth_thrust}),
-    "thruster.tunnel": Term(thruster.tunnel, gives={"side_force": thruster.tunnel_side_force}),
+    "waves.drift": Term(waves.drift_wrench, drawn=waves.drift_widths),
+    "wind.table": Term(wind.wind_table_wrench),
+    "wind.blendermann": Term(wind.blendermann_wrench),
+    "thruster.azimuth": Term(thruster.azimuth_wrench, gives={"thrust": thruster.azimuth_thrust}),
+    "thruster.tunnel": Term(thruster.tunnel_wrench, gives={"side_force": thruster.tunnel_side_force}),
     "thruster.propeller": Term(
-        propeller.propeller,
-        gives={"wash": propeller.wash, "thrust": propeller.propeller_thrust, "torque": propeller.propeller_torque},
+        propeller.propeller_wrench,
+        gives={
+            "wash": propeller.propeller_wash,
+            "thrust": propeller.propeller_thrust,
+            "torque": propeller.propeller_torque,
+        },
     ),
     "thruster.controllable_pitch": Term(
         propeller.controllable_pitch,
@@ -103,10 +107,11 @@ TERMS: dict[str, Term] = {
         gives={"wash": propeller.four_quadrant_wash, "thrust": propeller.four_quadrant_shaft_thrust},
     ),
     "thruster.quadratic": Term(
-        propeller.quadratic, gives={"wash": propeller.quadratic_wash, "thrust": propeller.quadratic_shaft_thrust}
+        propeller.quadratic_propeller_wrench,
+        gives={"wash": propeller.quadratic_wash, "thrust": propeller.quadratic_shaft_thrust},
     ),
-    "thruster.service_speed": Term(propeller.service_speed),
-    "thruster.rudder": Term(rudder.rudder, gives={"normal_force": rudder.normal_force}),
+    "thruster.service_speed": Term(propeller.service_speed_wrench),
+    "thruster.rudder": Term(rudder.rudder_wrench, gives={"normal_force": rudder.normal_force}),
     "thruster.rudder_polynomial": Term(
         rudder.rudder_polynomial, gives={"normal_force": rudder.polynomial_normal_force}
     ),
@@ -116,7 +121,7 @@ TERMS: dict[str, Term] = {
     "thruster.rudder_derivatives": Term(rudder.rudder_derivatives),
 }
 
-ACTUATORS: dict[str, Memory] = {
-    "first_order": Memory(thruster.bounded_output, thruster.first_order_advance),
-    "rate_limit": Memory(thruster.bounded_output, thruster.rate_limit_advance),
+ACTUATORS: dict[str, ActuatorModel] = {
+    "first_order": ActuatorModel(thruster.bounded_output, thruster.first_order_advance),
+    "rate_limit": ActuatorModel(thruster.bounded_output, thruster.rate_limit_advance),
 }

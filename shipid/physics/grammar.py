@@ -57,16 +57,16 @@ class Monomial:
 
 def monomial_names(alphabet: str | tuple[str, ...], axes: str = AXES) -> str:
     """Regular expression of the coefficient names whose factors are words of the alphabet."""
-    return rf"([{axes}])_((?:{_factor(alphabet)})+)" if axes else rf"()((?:{_factor(alphabet)})+)"
+    return rf"([{axes}])_((?:{_factor_pattern(alphabet)})+)" if axes else rf"()((?:{_factor_pattern(alphabet)})+)"
 
 
-def _factor(alphabet: str | tuple[str, ...]) -> str:
+def _factor_pattern(alphabet: str | tuple[str, ...]) -> str:
     word = f"(?:{'|'.join(alphabet)})"
     return rf"{word}|\|{word}\|"
 
 
 @cache
-def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
+def parse_monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Monomial:
     """Parse a coefficient name whose factors are words of the alphabet; ValueError shows the expected form."""
     parts = re.fullmatch(monomial_names(alphabet, axes), name)
     if parts is None:
@@ -76,7 +76,7 @@ def monomial(name: str, alphabet: str | tuple[str, ...], axes: str = AXES) -> Mo
         raise ValueError(
             f"{name!r} is not a coefficient: {start}factors of {', '.join(alphabet)}, bare or as |x|, like {example!r}"
         )
-    tokens = re.findall(_factor(alphabet), parts[2])
+    tokens = re.findall(_factor_pattern(alphabet), parts[2])
     return Monomial(parts[1], tuple((token.strip("|"), token.startswith("|")) for token in tokens))
 
 
@@ -93,11 +93,11 @@ class Grammar:
 
     def check(self, names: Iterable[str]) -> None:
         """Raise ValueError for the first invalid name, or for a second name of one monomial."""
-        _check_names(self, tuple(names))
+        _check_coefficient_names(self, tuple(names))
 
 
 @lru_cache(maxsize=256)
-def _check_names(grammar: Grammar, names: tuple[str, ...]) -> None:
+def _check_coefficient_names(grammar: Grammar, names: tuple[str, ...]) -> None:
     """See `Grammar.check`: once for all members of a family, whose names are equal."""
     seen: dict[object, str] = {}
     for name in names:
@@ -107,7 +107,7 @@ def _check_names(grammar: Grammar, names: tuple[str, ...]) -> None:
         seen[formula] = name
 
 
-def derivative(name: str) -> Monomial:
+def hull_derivative(name: str) -> Monomial:
     """Monomial of a hull derivative from its name (SNAME 1950); ValueError for acceleration derivatives.
 
     Factors are the motions and the angle of heel, phi.
@@ -117,10 +117,10 @@ def derivative(name: str) -> Monomial:
     if "delta" in name:
         where = "a block such as [thruster.rudder] with kind = 'rudder_derivatives'"
         raise ValueError(f"{name!r} is a rudder derivative: it belongs in {where}")
-    return monomial(name, (HEEL, *MOTIONS))
+    return parse_monomial(name, (HEEL, *MOTIONS))
 
 
-def turns_round(formula: Monomial) -> bool:
+def reverses_astern(formula: Monomial) -> bool:
     """Whether the force of a hull that is alike fore and aft has the other sign where it goes astern.
 
     Mirrored fore and aft, X, M, N and u, q, r change their signs. So Y_v v is the same astern, N_v v is not (Munk's
@@ -130,7 +130,7 @@ def turns_round(formula: Monomial) -> bool:
     return (formula.axis in "XMN") ^ (turned % 2 == 1)
 
 
-def rates(formula: Monomial) -> int:
+def count_rates(formula: Monomial) -> int:
     """Number of factors that are velocities or angular velocities."""
     return sum(symbol != HEEL for symbol, _ in formula.factors)
 
@@ -150,9 +150,9 @@ def kg_unit(metre: int, second: int) -> str:
 
 def derivative_unit(name: str) -> str:
     """SI unit of a hull derivative; radians count as 1."""
-    formula = derivative(name)
+    formula = hull_derivative(name)
     linear = sum(symbol in "uvw" for symbol, _ in formula.factors)
-    return kg_unit((1 if formula.axis in "XYZ" else 2) - linear, rates(formula) - 2)
+    return kg_unit((1 if formula.axis in "XYZ" else 2) - linear, count_rates(formula) - 2)
 
 
 def acceleration_unit(name: str) -> str:
@@ -166,10 +166,10 @@ def prime_scale(name: str, rho: SX, L: SX, U: SX) -> SX:
     Force = 1/2 rho L^2 U^2, moment = 1/2 rho L^3 U^2, motions u/U, v/U, r L/U; so a = 2 or 3 plus the number of
     angular factors. U [m/s] is the instantaneous speed and cancels for second-order derivatives.
     """
-    formula = derivative(name)
+    formula = hull_derivative(name)
     angular = sum(symbol in "pqr" for symbol, _ in formula.factors)
     length = (2 if formula.axis in "XYZ" else 3) + angular
-    return rho / 2 * L**length * U ** (2 - rates(formula))
+    return rho / 2 * L**length * U ** (2 - count_rates(formula))
 
 
 def bis_scale(name: str, rho: SX, g: SX, nabla: SX, L: SX) -> SX:
@@ -177,21 +177,21 @@ def bis_scale(name: str, rho: SX, g: SX, nabla: SX, L: SX) -> SX:
 
     Moment rho g nabla L; motions u / sqrt(g L), v / sqrt(g L), r sqrt(L / g). g cancels for second-order derivatives.
     """
-    formula = derivative(name)
+    formula = hull_derivative(name)
     linear = sum(symbol in "uvw" for symbol, _ in formula.factors)
-    length = (0 if formula.axis in "XYZ" else 1) + rates(formula) - linear
-    order = rates(formula)
+    length = (0 if formula.axis in "XYZ" else 1) + count_rates(formula) - linear
+    order = count_rates(formula)
     return rho * nabla * g * L**length * (1 / (g * L) if order == 2 else (g * L) ** (-order / 2))
 
 
-def deviation(name: str) -> Monomial:
+def service_deviation(name: str) -> Monomial:
     """Monomial of an Abkowitz derivative about the service speed: factors u (change of speed), v, r and delta."""
-    return monomial(name, DEVIATIONS)
+    return parse_monomial(name, DEVIATIONS)
 
 
 def hull_deviation(name: str) -> Monomial:
     """Monomial of an Abkowitz derivative of the hull: no factor delta; ValueError for a rudder derivative."""
-    formula = deviation(name)
+    formula = service_deviation(name)
     if any(symbol == "delta" for symbol, _ in formula.factors):
         raise ValueError(f"{name!r} is a rudder derivative: it belongs in a rudder of kind 'rudder_derivatives'")
     return formula
@@ -199,7 +199,7 @@ def hull_deviation(name: str) -> Monomial:
 
 def rudder_deviation(name: str) -> Monomial:
     """Monomial of an Abkowitz derivative of the rudder: at least one factor delta; ValueError without it."""
-    formula = deviation(name)
+    formula = service_deviation(name)
     if all(symbol != "delta" for symbol, _ in formula.factors):
         raise ValueError(f"{name!r} has no factor delta: it belongs in [hull.abkowitz]")
     return formula
@@ -207,7 +207,7 @@ def rudder_deviation(name: str) -> Monomial:
 
 def rudder_flow(name: str) -> Monomial:
     """Monomial of a rudder coefficient: two factors c, the flow at the rudder, then delta and the drift angle beta."""
-    formula = monomial(name, ("beta", "delta", "c"))
+    formula = parse_monomial(name, ("beta", "delta", "c"))
     if sum(symbol == "c" for symbol, _ in formula.factors) != 2:
         raise ValueError(f"{name!r} must have two factors c, the flow at the rudder, like 'Y_|c|cdelta'")
     return formula
@@ -215,24 +215,24 @@ def rudder_flow(name: str) -> Monomial:
 
 def cross_flow_monomial(name: str) -> Monomial:
     """Monomial of the flow across a rudder: factors v and r, in primes."""
-    return monomial(name, "vr", axes="")
+    return parse_monomial(name, "vr", axes="")
 
 
 def thrust_monomial(name: str) -> Monomial:
     """Monomial of a thruster coefficient: factors J, y (J_y) and t (tanh(|J_y| / width)); `1` is the constant term."""
-    return Monomial("", ()) if name == "1" else monomial(name, "Jyt", axes="")
+    return Monomial("", ()) if name == "1" else parse_monomial(name, "Jyt", axes="")
 
 
 def advance_monomial(name: str) -> Monomial:
     """Monomial of a coefficient of a screw behind a hull: factors J alone; `1` is the constant term."""
-    return Monomial("", ()) if name == "1" else monomial(name, "J", axes="")
+    return Monomial("", ()) if name == "1" else parse_monomial(name, "J", axes="")
 
 
 _MOTIONS, _OF_HULL = monomial_names((HEEL, *MOTIONS)), monomial_names(DEVIATIONS[:-1])
 _RUDDER_FLOW = rf"(?=(?:[^c]*c){{2}}[^c]*$){monomial_names(('beta', 'delta', 'c'))}"
-DERIVATIVES = Grammar(derivative, derivative_unit, _MOTIONS)
-PRIME_DERIVATIVES = Grammar(derivative, lambda _: "prime", _MOTIONS)
-BIS_DERIVATIVES = Grammar(derivative, lambda _: "bis", _MOTIONS)
+DERIVATIVES = Grammar(hull_derivative, derivative_unit, _MOTIONS)
+PRIME_DERIVATIVES = Grammar(hull_derivative, lambda _: "prime", _MOTIONS)
+BIS_DERIVATIVES = Grammar(hull_derivative, lambda _: "bis", _MOTIONS)
 HULL_DEVIATIONS = Grammar(hull_deviation, lambda _: "prime", _OF_HULL)
 RUDDER_DEVIATIONS = Grammar(rudder_deviation, lambda _: "prime", rf"(?=.*delta){monomial_names(DEVIATIONS)}")
 ADDED_MASS = Grammar(acceleration_derivative, acceleration_unit, ACCELERATIONS)

@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.signals import steers, units
+from shipid.physics.signals import is_steering, signal_units
 
 if TYPE_CHECKING:
     from casadi import SX
@@ -38,7 +38,7 @@ class Helmsman:
 
 
 @lru_cache
-def zigzag(commands: tuple[str, ...]) -> Helmsman:
+def zigzag_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """Zigzag: reverse the helm when the heading has changed from the original heading by the execute heading.
 
     The original heading is that at the first order (MSC.137(76), 4.2.6). Inputs: each command as first executed;
@@ -56,19 +56,19 @@ def zigzag(commands: tuple[str, ...]) -> Helmsman:
         return ca.if_else(turned >= inputs["execute_heading"] ** 2, -memory["side"], memory["side"])
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
-        return _steered(commands, inputs, side(signals, inputs, memory))
+        return _steer_commands(commands, inputs, side(signals, inputs, memory))
 
     def advance(signals: Named, inputs: Named, memory: Named, _dt: Any) -> Named:
         now = {"original": original(signals, memory), "executed": inputs["executed"]}
         return {"side": side(signals, inputs, memory), **now}
 
-    inputs = {**units(commands), "executed": "-", "execute_heading": "rad"}
+    inputs = {**signal_units(commands), "executed": "-", "execute_heading": "rad"}
     memory = {"side": 1.0, "original": 0.0, "executed": 0.0}
     return Helmsman("zigzag", inputs, memory, orders=orders, advance=advance)
 
 
 @lru_cache
-def yaw_rate(commands: tuple[str, ...]) -> Helmsman:
+def yaw_rate_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """PI control of the yaw rate: the share of the largest helm is s = I + gain (rate - r), limited to -1..1.
 
     dI/dt = gain / reset (rate - r), I limited to -1..1. Inputs: each command with the largest helm to starboard; `rate`
@@ -76,21 +76,21 @@ def yaw_rate(commands: tuple[str, ...]) -> Helmsman:
     """
 
     def share(signals: Named, inputs: Named, memory: Named) -> SX:
-        return _limit(memory["integral"] + inputs["gain"] * (inputs["rate"] - signals["r"]))
+        return _limit_share(memory["integral"] + inputs["gain"] * (inputs["rate"] - signals["r"]))
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
-        return _steered(commands, inputs, share(signals, inputs, memory))
+        return _steer_commands(commands, inputs, share(signals, inputs, memory))
 
     def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
         gained = inputs["gain"] / inputs["reset"] * (inputs["rate"] - signals["r"]) * dt
-        return {"integral": _limit(memory["integral"] + gained)}
+        return {"integral": _limit_share(memory["integral"] + gained)}
 
-    inputs = {**units(commands), "rate": "rad/s", "gain": "s", "reset": "s"}
+    inputs = {**signal_units(commands), "rate": "rad/s", "gain": "s", "reset": "s"}
     return Helmsman("yaw rate", inputs, {"integral": 0.0}, orders=orders, advance=advance)
 
 
 @lru_cache
-def course_keeping(commands: tuple[str, ...]) -> Helmsman:
+def course_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """PID control of the heading: share of the largest helm s = I + (omega^2 e - 2 omega r) / effect, e the error.
 
     dI/dt = omega^3 / 10 e / effect; s and I limited to -1..1. Inputs: each command with the largest helm to starboard;
@@ -98,30 +98,30 @@ def course_keeping(commands: tuple[str, ...]) -> Helmsman:
     """
 
     def error(signals: Named, inputs: Named) -> SX:
-        return _wrapped(inputs["course"] - signals["psi"])
+        return _wrap_heading(inputs["course"] - signals["psi"])
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
         omega = inputs["omega"]
         asked = omega**2 * error(signals, inputs) - 2 * DAMPING * omega * signals["r"]
-        return _steered(commands, inputs, _limit(memory["integral"] + asked / inputs["effect"]))
+        return _steer_commands(commands, inputs, _limit_share(memory["integral"] + asked / inputs["effect"]))
 
     def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
         gained = INTEGRAL * inputs["omega"] ** 3 * error(signals, inputs) / inputs["effect"] * dt
-        return {"integral": _limit(memory["integral"] + gained)}
+        return {"integral": _limit_share(memory["integral"] + gained)}
 
-    inputs = {**units(commands), "course": "rad", "omega": "rad/s", "effect": "rad/s^2"}
+    inputs = {**signal_units(commands), "course": "rad", "omega": "rad/s", "effect": "rad/s^2"}
     return Helmsman("course keeping", inputs, {"integral": 0.0}, orders=orders, advance=advance)
 
 
-def _limit(share: SX) -> SX:
+def _limit_share(share: SX) -> SX:
     return ca.fmin(ca.fmax(share, -1), 1)
 
 
-def _wrapped(angle: SX) -> SX:
+def _wrap_heading(angle: SX) -> SX:
     """The angle [rad] within half a turn to either side."""
     return ca.SX(ca.atan2(ca.sin(angle), ca.cos(angle)))
 
 
-def _steered(commands: Iterable[str], inputs: Named, share: SX) -> Named:
+def _steer_commands(commands: Iterable[str], inputs: Named, share: SX) -> Named:
     """Order of each command: what it has with the largest helm, angles that steer times the share of that helm."""
-    return {name: inputs[name] * share if steers(name) else inputs[name] for name in commands}
+    return {name: inputs[name] * share if is_steering(name) else inputs[name] for name in commands}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import given, vector
+from shipid.physics.frames import column_vector, differs_from_default
 from shipid.physics.grammar import (
     AXES,
     BIS_DERIVATIVES,
@@ -18,10 +18,10 @@ from shipid.physics.grammar import (
     PRIME_DERIVATIVES,
     Monomial,
     bis_scale,
-    derivative,
-    deviation,
+    hull_derivative,
     prime_scale,
-    turns_round,
+    reverses_astern,
+    service_deviation,
 )
 
 if TYPE_CHECKING:
@@ -31,17 +31,17 @@ SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
 TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2
 
 
-def derivatives(nu_r: SX, eta: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
+def derivatives_wrench(nu_r: SX, eta: SX, **values: Annotated[SX, DERIVATIVES]) -> SX:
     """Wrench (6) = sum over names of value x monomial(nu_r, phi), on the force side (SNAME 1950).
 
     nu_r (6) [m/s, rad/s] is the velocity through the water, phi = eta[3] [rad] the angle of heel; each value has the SI
     unit that its name implies.
     """
     motions = {**dict(zip(MOTIONS, ca.vertsplit(nu_r), strict=True)), HEEL: eta[3]}
-    return summed(values, derivative, motions)
+    return sum_monomials(values, hull_derivative, motions)
 
 
-def summed(
+def sum_monomials(
     values: Mapping[str, SX],
     formula_of: Callable[[str], Monomial],
     factors: Mapping[str, SX],
@@ -71,7 +71,9 @@ def prime_derivatives(
     L_pp [m] is the reference length, U the instantaneous speed through the water with a floor of 0.01 m/s.
     """
     U = ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
-    return derivatives(nu_r, eta, **{name: value * prime_scale(name, rho, L_pp, U) for name, value in values.items()})
+    return derivatives_wrench(
+        nu_r, eta, **{name: value * prime_scale(name, rho, L_pp, U) for name, value in values.items()}
+    )
 
 
 def bis_derivatives(
@@ -90,10 +92,10 @@ def bis_derivatives(
     volume. Unlike the prime system it holds at rest: linear damping stays linear.
     """
     scaled = {name: value * bis_scale(name, rho, g, nabla, L_pp) for name, value in values.items()}
-    return derivatives(nu_r, eta, **scaled)
+    return derivatives_wrench(nu_r, eta, **scaled)
 
 
-def mmg(
+def mmg_wrench(
     nu_r: SX,
     eta: SX,
     *,
@@ -128,15 +130,17 @@ def mmg(
         * T
         / L_pp
         * prime_scale(name, rho, L_pp, at_least)
-        * (sense if turns_round(derivative(name)) else 1)
+        * (sense if reverses_astern(hull_derivative(name)) else 1)
         for name, value in values.items()
     }
-    return derivatives(nu_r, eta, **scaled) - vector(rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0)
+    return derivatives_wrench(nu_r, eta, **scaled) - column_vector(
+        rho / 2 * L_pp * T * R_0 * U**2 * ahead, 0, 0, 0, 0, 0
+    )
 
 
 def _more_astern(value: SX, u: SX, k_astern: SX | float) -> SX:
     """The value, and k_astern times it where the ship goes astern."""
-    return value * ca.if_else(u >= 0, 1, k_astern) if given(k_astern, 1.0) else value
+    return value * ca.if_else(u >= 0, 1, k_astern) if differs_from_default(k_astern, 1.0) else value
 
 
 def about_service_speed(nu_r: SX, delta: SX | float, values: Mapping[str, SX], L_pp: SX, U_0: SX, rho: SX) -> SX:
@@ -145,10 +149,10 @@ def about_service_speed(nu_r: SX, delta: SX | float, values: Mapping[str, SX], L
     Factors u' = (u - U_0) / U_0, v' = v / U_0, r' = r L / U_0, delta [rad].
     """
     factors = {"u": nu_r[0] / U_0 - 1, "v": nu_r[1] / U_0, "r": nu_r[5] * L_pp / U_0, "delta": ca.SX(delta)}
-    return summed(values, deviation, factors, rho / 2 * L_pp**2 * U_0**2, L_pp)
+    return sum_monomials(values, service_deviation, factors, rho / 2 * L_pp**2 * U_0**2, L_pp)
 
 
-def abkowitz(
+def abkowitz_wrench(
     nu_r: SX,
     *,
     L_pp: Annotated[SX, "m", POSITIVE],
@@ -163,7 +167,7 @@ def abkowitz(
     return about_service_speed(nu_r, 0.0, values, L_pp, U_0, rho)
 
 
-def strips(*, strips: int) -> dict[str, Any]:
+def hull_strips(*, strips: int) -> dict[str, Any]:
     """Midpoints of equal strips as a fraction of the length, and the fraction that each strip covers."""
     import numpy as np
 
@@ -195,14 +199,14 @@ def cross_flow(
     """
     x = x_aft + (x_fwd - x_aft) * fraction
     across = nu_r[1] + x * nu_r[5]
-    if given(k_fwd, 0.0) or given(k_ends, 0.0):
+    if differs_from_default(k_fwd, 0.0) or differs_from_default(k_ends, 0.0):
         s = 2 * fraction - 1
         C_d = C_d * ca.fmax(1 + k_fwd * s + k_ends * (3 * s**2 - 1) / 2, 0)
     dY = -rho / 2 * T * C_d * (x_fwd - x_aft) * share * across * ca.fabs(across)
-    return vector(0, dY, 0, 0, 0, x * dY)
+    return column_vector(0, dY, 0, 0, 0, x * dY)
 
 
-def resistance(
+def resistance_wrench(
     nu_r: SX,
     *,
     R_0: Annotated[SX | float, "kg m^-1"] = 0.0,
@@ -219,4 +223,4 @@ def resistance(
     u = nu_r[0]
     a = ca.fabs(u)
     polynomial = R_0 + a * (R_1 + a * (R_2 + a * (R_3 + a * R_4)))
-    return vector(_more_astern(-polynomial * u * a, u, k_astern), 0, 0, 0, 0, 0)
+    return column_vector(_more_astern(-polynomial * u * a, u, k_astern), 0, 0, 0, 0, 0)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import skew
+from shipid.physics.frames import skew_matrix
 from shipid.physics.grammar import ADDED_MASS, AXES, MOTIONS, POSITIVE
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ Entries = dict[tuple[int, int], Any]
 """Row and column in a matrix [6 x 6] -> entry, a symbol, a number or an array (members,); what is not named is zero."""
 
 
-def rigid_body(
+def rigid_body_entries(
     *,
     m: Annotated[SX, "kg", POSITIVE],
     I_z: Annotated[SX, "kg m^2", POSITIVE],
@@ -35,7 +35,7 @@ def rigid_body(
     return masses | right | left | moments
 
 
-def added_mass(**derivatives: Annotated[SX, ADDED_MASS]) -> Entries:
+def added_mass_entries(**derivatives: Annotated[SX, ADDED_MASS]) -> Entries:
     """M_A = -[X_udot ...]: the named acceleration derivatives with their sign turned (SNAME 1950).
 
     Derivatives are on the force side (X_udot < 0), in kg, kg m or kg m^2 by their name; what is not named is zero.
@@ -43,7 +43,7 @@ def added_mass(**derivatives: Annotated[SX, ADDED_MASS]) -> Entries:
     return {(AXES.index(name[0]), MOTIONS.index(name[2])): -value for name, value in derivatives.items()}
 
 
-def matrix(entries: Entries) -> SX:
+def mass_matrix(entries: Entries) -> SX:
     """A matrix [6 x 6] of symbols; its zeros stay structural."""
     M = ca.SX(6, 6)
     for place, value in entries.items():
@@ -51,17 +51,17 @@ def matrix(entries: Entries) -> SX:
     return M
 
 
-def mass(inertia: Mapping[str, Any], added: Mapping[str, Any]) -> list[list[Any]]:
-    """Rows of M_RB + M_A [6 x 6] of numbers: the named arguments of `rigid_body`, and those of `added_mass`."""
-    M_RB, M_A = rigid_body(**inertia), added_mass(**added)
+def total_mass(inertia: Mapping[str, Any], added: Mapping[str, Any]) -> list[list[Any]]:
+    """Rows of M_RB + M_A [6 x 6] of numbers: the named arguments of `rigid_body_entries`, and those of `added_mass_entries`."""
+    M_RB, M_A = rigid_body_entries(**inertia), added_mass_entries(**added)
     return [[M_RB.get((i, j), 0.0) + M_A.get((i, j), 0.0) for j in range(6)] for i in range(6)]
 
 
-def coriolis(M: SX, nu: SX) -> SX:
+def coriolis_force(M: SX, nu: SX) -> SX:
     """C(nu) nu (6) of a mass matrix M [6 x 6], by its symmetric part: it does no work (Fossen 2021, eq. 3.57).
 
     In the plane: [-(m22 v + c r) r, m11 u r, (m22 v + c r) u - m11 u v], c = (m26 + m62) / 2.
     """
     momentum = (M + M.T) / 2 @ nu
-    linear, angular = skew(momentum[:3]), skew(momentum[3:])
+    linear, angular = skew_matrix(momentum[:3]), skew_matrix(momentum[3:])
     return -ca.vertcat(linear @ nu[3:], linear @ nu[:3] + angular @ nu[3:])

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import vector
+from shipid.physics.frames import column_vector
 from shipid.physics.grammar import POSITIVE
 
 if TYPE_CHECKING:
     from casadi import SX
 
 
-def learned(
+def learned_wrench(
     nu_r: SX,
     *,
     u_scale: Annotated[SX, "m s^-1", POSITIVE],
@@ -48,4 +48,4 @@ def learned(
         X += b_X * ((one + other) / 2 - ca.tanh(a_0))
         odd = (one - other) / 2
         Y, N = Y + b_Y * odd, N + b_N * odd
-    return vector(X_max * ca.tanh(X), Y_max * ca.tanh(Y), 0, 0, 0, N_max * ca.tanh(N))
+    return column_vector(X_max * ca.tanh(X), Y_max * ca.tanh(Y), 0, 0, 0, N_max * ca.tanh(N))

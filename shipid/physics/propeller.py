@@ -7,11 +7,11 @@ from functools import wraps
 from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import force_at, given, vector
+from shipid.physics.frames import column_vector, differs_from_default, wrench_of_force
 from shipid.physics.grammar import ADVANCE, POSITIVE
 from shipid.physics.hull import SPEED_FLOOR
-from shipid.physics.thruster import SHAFT_FLOOR, polynomial
-from shipid.physics.wind import interpolate
+from shipid.physics.thruster import SHAFT_FLOOR, thrust_polynomial_value
+from shipid.physics.wind import interpolate_ramps
 
 if TYPE_CHECKING:
     from casadi import SX
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 
 
-def drift(nu_r: SX) -> tuple[SX, SX]:
+def drift_angle(nu_r: SX) -> tuple[SX, SX]:
     """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
 
     Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small. Where
@@ -36,7 +36,7 @@ def signed_root(square: SX) -> SX:
     return square / ca.sqrt(ca.fmax(ca.fabs(square), ROOT_FLOOR**2))
 
 
-def inflow(
+def propeller_inflow(
     nu_r: SX,
     x: SX,
     y: SX,
@@ -53,25 +53,25 @@ def inflow(
     v_P = (v + x r) / U. The part with tau and C_P is that of MMG models before C_1, C_2; Son and Nomoto (1982) have
     C_P alone.
     """
-    U, beta = drift(nu_r)
+    U, beta = drift_angle(nu_r)
     beta_P = beta - x * nu_r[5] / U
     C_2 = ca.if_else(beta_P >= 0, C_2_plus, C_2_minus)
     change = 1 + (1 - ca.exp(-C_1 * ca.fabs(beta_P))) * (C_2 - 1)
     share = (1 - w_P0) * change
-    if given(tau, 0.0) or given(C_P, 0.0):
+    if differs_from_default(tau, 0.0) or differs_from_default(C_P, 0.0):
         v_P = (nu_r[1] + x * nu_r[5]) / ca.sqrt(ca.fmax(nu_r[0] ** 2 + nu_r[1] ** 2, SPEED_FLOOR**2))
         share += tau * ca.fabs(v_P) + C_P * v_P**2
     return share * (nu_r[0] - nu_r[5] * y)
 
 
-def thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX, J_max: SX) -> SX:
+def propeller_thrust_coefficient(u_P: SX, n: SX, D_p: SX, K_T: Mapping[str, SX], J_min: SX, J_max: SX) -> SX:
     """K_T(J) with J = u_P / (|n| D_p), its sign reversed for n < 0, limited to J_min..J_max."""
     sense = ca.if_else(n >= 0, 1, -1)
     J = sense * u_P / (ca.fmax(ca.fabs(n), SHAFT_FLOOR) * D_p)
-    return polynomial(K_T, ca.fmin(ca.fmax(J, J_min), J_max), ca.SX(1, 1), ca.SX(1))
+    return thrust_polynomial_value(K_T, ca.fmin(ca.fmax(J, J_min), J_max), ca.SX(1, 1), ca.SX(1))
 
 
-def beyond(u_P: SX, n: SX, D_p: SX, J_min: SX, J_max: SX) -> SX:
+def flow_beyond_polynomial(u_P: SX, n: SX, D_p: SX, J_min: SX, J_max: SX) -> SX:
     """Signed square [m^2/s^2] by which the inflow is beyond that of J_min..J_max: u_P|u_P| for a stopped screw.
 
     sign(u_P) max(u_P^2 - (J n D_p)^2, 0), J = J_max where the water drives the screw in its sense, J_min against it.
@@ -92,18 +92,18 @@ def polynomial_thrust(
     k_drag: SX | float,
     rho: SX,
 ) -> SX:
-    """Thrust [N] of a screw, rho n^2 D_p^4 K_T(J), with its drag beyond J_min..J_max; see `propeller`."""
+    """Thrust [N] of a screw, rho n^2 D_p^4 K_T(J), with its drag beyond J_min..J_max; see `propeller_wrench`."""
     sense = ca.if_else(n >= 0, 1, -k_astern)
-    K = thrust_coefficient(u_P, n, D_p, K_T, J_min, J_max)
+    K = propeller_thrust_coefficient(u_P, n, D_p, K_T, J_min, J_max)
     if K_T_astern:
-        K = ca.if_else(n >= 0, K, thrust_coefficient(u_P, n, D_p, K_T_astern, J_min, J_max))
+        K = ca.if_else(n >= 0, K, propeller_thrust_coefficient(u_P, n, D_p, K_T_astern, J_min, J_max))
     thrust = sense * rho * n**2 * D_p**2 * D_p**2 * K
-    if given(k_drag, 0.0):
-        thrust -= k_drag * rho * D_p**2 * beyond(u_P, n, D_p, J_min, J_max)
+    if differs_from_default(k_drag, 0.0):
+        thrust -= k_drag * rho * D_p**2 * flow_beyond_polynomial(u_P, n, D_p, J_min, J_max)
     return thrust
 
 
-def propeller(
+def propeller_wrench(
     nu_r: SX,
     n: SX,
     *,
@@ -130,29 +130,31 @@ def propeller(
 ) -> SX:
     """Wrench (6) of a propeller behind a hull: X = (1 - t_P) rho n^2 D_p^4 K_T(J) (MMG eqs. 12-17).
 
-    n [rev/s]; wake w_P0 on a straight course, C_1, C_2, tau, C_P its change with drift (see `inflow`). For n < 0
+    n [rev/s]; wake w_P0 on a straight course, C_1, C_2, tau, C_P its change with drift (see `propeller_inflow`). For n < 0
     X = -(1 - t_P) k_astern rho n^2 D_p^4 K(J), J = u_P / (n D_p), with K = K_T_astern, by default the polynomial of
     ahead. Yasukawa and Yoshimura (2015).
 
-    Beyond J_min..J_max K_T stays, and the water drags the screw by k_drag rho D_p^2 `beyond`: a stopped screw by
+    Beyond J_min..J_max K_T stays, and the water drags the screw by k_drag rho D_p^2 `flow_beyond_polynomial`: a stopped screw by
     k_drag rho D_p^2 u_P|u_P|. A screw astern gives the side force Y = rho n^2 D_p^4 Y_astern(J) and the moment about
     the origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, which moves the stern to port,
     Y_astern < 0 < N_astern.
     """
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    u_P = propeller_inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     thrust = polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, ca.SX(J_min), ca.SX(J_max), k_astern, k_drag, rho)
-    wrench = force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
+    wrench = wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
     if Y_astern or N_astern:
         unit = ca.if_else(n >= 0, 0, rho * n**2 * D_p**2 * D_p**2)
-        Y, N = (thrust_coefficient(u_P, n, D_p, K or {}, ca.SX(J_min), ca.SX(J_max)) for K in (Y_astern, N_astern))
-        wrench += unit * vector(0, Y, 0, -z * Y, 0, D_p * N)
+        Y, N = (
+            propeller_thrust_coefficient(u_P, n, D_p, K or {}, ca.SX(J_min), ca.SX(J_max)) for K in (Y_astern, N_astern)
+        )
+        wrench += unit * column_vector(0, Y, 0, -z * Y, 0, D_p * N)
     return wrench
 
 
-@wraps(propeller, assigned=("__annotations__",))
+@wraps(propeller_wrench, assigned=("__annotations__",))
 def propeller_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
-    """Thrust [N] in the shaft of `propeller`: before the thrust deduction."""
-    return propeller(nu_r, n, **{**numbers, "t_P": 0.0})[0]
+    """Thrust [N] in the shaft of `propeller_wrench`: before the thrust deduction."""
+    return propeller_wrench(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def propeller_torque(
@@ -173,18 +175,18 @@ def propeller_torque(
     C_P: Annotated[SX | float, "-"] = 0.0,
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX | None:
-    """Torque [N m] in the shaft of `propeller`, Q = sign(n) rho n^2 D_p^5 K_Q(J); None without K_Q.
+    """Torque [N m] in the shaft of `propeller_wrench`, Q = sign(n) rho n^2 D_p^5 K_Q(J); None without K_Q.
 
     K_Q is that behind the ship: of the open-water test over the relative rotative efficiency (ITTC 7.5-02-03-01.4).
     """
     if K_Q is None:
         return None
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    K = thrust_coefficient(u_P, n, D_p, K_Q, ca.SX(J_min), ca.SX(J_max))
+    u_P = propeller_inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    K = propeller_thrust_coefficient(u_P, n, D_p, K_Q, ca.SX(J_min), ca.SX(J_max))
     return rho * n * ca.fabs(n) * D_p**2 * D_p**3 * K
 
 
-def wash(
+def propeller_wash(
     nu_r: SX,
     n: SX,
     *,
@@ -212,13 +214,13 @@ def wash(
     the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory that share is 1/2
     at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
     """
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
-    K = thrust_coefficient(u_P, n, D_p, K_T, ca.SX(J_min), ca.SX(J_max))
+    u_P = propeller_inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
+    K = propeller_thrust_coefficient(u_P, n, D_p, K_T, ca.SX(J_min), ca.SX(J_max))
     driven = 8 / ca.pi * K * (n * D_p) ** 2
     ahead = ca.sqrt(ca.fmax(u_P**2 + driven, 0) + SPEED_FLOOR**2)
     race = ca.if_else(u_P >= 0, ahead, signed_root(SPEED_FLOOR**2 - u_P**2 + ca.fmax(driven, 0)))
-    if given(k_suction, 0.0):
-        K_a = thrust_coefficient(u_P, n, D_p, K_T_astern or K_T, ca.SX(J_min), ca.SX(J_max))
+    if differs_from_default(k_suction, 0.0):
+        K_a = propeller_thrust_coefficient(u_P, n, D_p, K_T_astern or K_T, ca.SX(J_min), ca.SX(J_max))
         added = 8 / ca.pi * k_astern * ca.fmax(K_a, 0) * (n * D_p) ** 2
         astern = u_P - k_suction * (ca.sqrt(u_P**2 + added + SPEED_FLOOR**2) - ca.sqrt(u_P**2 + SPEED_FLOOR**2))
         return ca.vertcat(ca.if_else(n >= 0, u_P, astern), ca.if_else(n >= 0, race, astern), D_p)
@@ -259,13 +261,15 @@ def controllable_pitch(
 
     n [rev/s]; pitch p [-], the ratio P/D at 0.7 of the radius, negative to drive astern. That is K_T = k_P p - k_J J:
     no thrust at p = 0 in still water, zero thrust at J = k_P p / k_J, and drag of a rotating propeller of zero pitch.
-    The inflow u_P is that behind a hull (see `inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n| V_a of
+    The inflow u_P is that behind a hull (see `propeller_inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n| V_a of
     Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T curves of
     the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
     """
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
+    u_P = propeller_inflow(
+        nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P
+    )
     thrust = rho * D_p**2 * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
-    return force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
+    return wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
 
 
 @wraps(controllable_pitch, assigned=("__annotations__",))
@@ -294,12 +298,14 @@ def controllable_wash(
 ) -> SX:
     """Slipstream of a controllable-pitch propeller, (3): inflow [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`. So the flow at a rudder
+    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream_speed`. So the flow at a rudder
     has no step where the pitch goes through zero.
     """
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
+    u_P = propeller_inflow(
+        nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P
+    )
     driven = 8 / ca.pi * D_p**2 * bilinear_thrust(u_P, n, pitch, D_p, k_P, k_J, k_astern)
-    return ca.vertcat(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
+    return ca.vertcat(u_P, slipstream_speed(u_P, u_P * ca.fabs(u_P), driven), D_p)
 
 
 def quadratic_thrust(
@@ -319,13 +325,13 @@ def quadratic_thrust(
     ahead = n >= 0
     thrust = T_nn * ca.if_else(ahead, 1, k_astern) * n * ca.fabs(n)
     thrust -= (T_nu + ca.if_else(ahead, 0, dT_nu)) * ca.fabs(n) * u_P + T_uu * u_P * ca.fabs(u_P)
-    if not given(k_driven, 1.0):
+    if not differs_from_default(k_driven, 1.0):
         return thrust
     sense = ca.if_else(ahead, 1, -1)
     return sense * (ca.fmax(sense * thrust, 0) + k_driven * ca.fmin(sense * thrust, 0))
 
 
-def quadratic(
+def quadratic_propeller_wrench(
     nu_r: SX,
     n: SX,
     *,
@@ -350,14 +356,14 @@ def quadratic(
     """
     u_P = (1 - w_P0) * nu_r[0]
     thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
-    ahead = force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
-    return ahead + thrust * vector(0, Y_T, 0, -z * Y_T, 0, N_T)
+    ahead = wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
+    return ahead + thrust * column_vector(0, Y_T, 0, -z * Y_T, 0, N_T)
 
 
-@wraps(quadratic, assigned=("__annotations__",))
+@wraps(quadratic_propeller_wrench, assigned=("__annotations__",))
 def quadratic_shaft_thrust(nu_r: SX, n: SX, **numbers: Any) -> SX:
-    """Thrust [N] in the shaft of `quadratic`."""
-    return quadratic(nu_r, n, **{**numbers, "t_P": 0.0})[0]
+    """Thrust [N] in the shaft of `quadratic_propeller_wrench`."""
+    return quadratic_propeller_wrench(nu_r, n, **{**numbers, "t_P": 0.0})[0]
 
 
 def quadratic_wash(
@@ -380,20 +386,20 @@ def quadratic_wash(
     """Slipstream of a screw with a quadratic law of thrust, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
 
     Its signed square is c_uu u_P|u_P| + c_un n u_P + c_nn n|n| (van Berlekom and Goddard 1972), and with a diameter
-    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream`. With none of these numbers there
+    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream_speed`. With none of these numbers there
     is no slipstream, and a rudder is in the inflow.
     """
     u_P = (1 - w_P0) * nu_r[0]
-    if not any(given(number, 0.0) for number in (D_p, c_uu, c_un, c_nn)):
-        return vector(u_P, u_P, D_p)
+    if not any(differs_from_default(number, 0.0) for number in (D_p, c_uu, c_un, c_nn)):
+        return column_vector(u_P, u_P, D_p)
     still, driven = ca.SX(1, 1), c_uu * u_P * ca.fabs(u_P) + c_un * n * u_P + c_nn * n * ca.fabs(n)
-    if given(D_p, 0.0):
+    if differs_from_default(D_p, 0.0):
         thrust = quadratic_thrust(u_P, n, T_nn, T_nu, T_uu, k_astern, dT_nu, k_driven)
         still, driven = u_P * ca.fabs(u_P), driven + 8 * thrust / (ca.pi * rho * D_p**2)
-    return vector(u_P, slipstream(u_P, still, driven), D_p)
+    return column_vector(u_P, slipstream_speed(u_P, still, driven), D_p)
 
 
-def slipstream(u_P: SX, still: SX, driven: SX) -> SX:
+def slipstream_speed(u_P: SX, still: SX, driven: SX) -> SX:
     """Speed [m/s] of a slipstream of signed square `still` and what the screw adds to it, `driven` [m^2/s^2].
 
     A screw astern takes at most all flow of a ship that goes ahead; on a ship that goes astern it adds none.
@@ -406,7 +412,7 @@ def four_quadrant_thrust(u_P: SX, n: SX, D_p: SX, beta_deg: list[SX], C_T: list[
     tip = 0.7 * ca.pi * n * D_p
     square = u_P**2 + tip**2
     beta = ca.atan2(u_P, ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, tip))
-    coefficient = interpolate(beta * (180 / ca.pi), ca.vertcat(*beta_deg), ca.vertcat(*C_T))
+    coefficient = interpolate_ramps(beta * (180 / ca.pi), ca.vertcat(*beta_deg), ca.vertcat(*C_T))
     return ca.pi / 8 * D_p**2 * square * coefficient
 
 
@@ -434,11 +440,13 @@ def four_quadrant(
     T = 1/2 rho C_T(beta) (u_P^2 + (0.7 pi n D_p)^2) pi / 4 D_p^2 with the advance angle at 0.7 of the radius, beta =
     atan2(u_P, 0.7 pi n D_p): 0 to 90 deg ahead, 90 to 180 the screw astern while the ship goes ahead (crash stop), -90
     to 0 the screw ahead while she goes astern, -180 to -90 astern. A stopped screw, at +-90 deg, drags. Inflow u_P as
-    in `inflow`.
+    in `propeller_inflow`.
     """
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
+    u_P = propeller_inflow(
+        nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P
+    )
     thrust = rho * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T)
-    return force_at(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
+    return wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), (1 - t_P) * thrust, ca.SX(1, 1))
 
 
 @wraps(four_quadrant, assigned=("__annotations__",))
@@ -465,14 +473,16 @@ def four_quadrant_wash(
 ) -> SX:
     """Slipstream of a propeller in four quadrants, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
 
-    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream`.
+    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream_speed`.
     """
-    u_P = inflow(nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P)
+    u_P = propeller_inflow(
+        nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P
+    )
     driven = 8 / ca.pi * four_quadrant_thrust(u_P, n, D_p, beta_deg, C_T) / D_p**2
-    return vector(u_P, slipstream(u_P, u_P * ca.fabs(u_P), driven), D_p)
+    return column_vector(u_P, slipstream_speed(u_P, u_P * ca.fabs(u_P), driven), D_p)
 
 
-def service_speed(
+def service_speed_wrench(
     nu_r: SX,
     n: SX,
     *,
@@ -490,4 +500,4 @@ def service_speed(
     steady motion is valid only near that speed.
     """
     d = nu_r[0] / U_0 - n / n_0
-    return vector(rho / 2 * L_pp**2 * U_0**2 * d * (X_u + d * (X_uu + d * X_uuu)), 0, 0, 0, 0, 0)
+    return column_vector(rho / 2 * L_pp**2 * U_0**2 * d * (X_u + d * (X_uu + d * X_uuu)), 0, 0, 0, 0, 0)

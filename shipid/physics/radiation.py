@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import heave_rate, vector
+from shipid.physics.frames import column_vector, heave_rate
 from shipid.physics.grammar import POSITIVE
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def heave_pitch(
     heave, pitch = state[:middle], state[middle:]
     Z = kernel_force(heave, K33_cos, K33_sin) + kernel_force(pitch, K35_cos, K35_sin)
     M = kernel_force(heave, K35_cos, K35_sin) + kernel_force(pitch, K55_cos, K55_sin)
-    return vector(0, 0, -Z, 0, -M, 0)
+    return column_vector(0, 0, -Z, 0, -M, 0)
 
 
 def heave_pitch_rates(
@@ -90,7 +90,7 @@ def roll(
     K44_sin: Annotated[list[SX], "kg m^2 s^-2"],
 ) -> SX:
     """Wrench (6) of roll radiation; states (2 x modes) [rad] are driven by the roll rate."""
-    return vector(0, 0, 0, -kernel_force(state, K44_cos, K44_sin), 0, 0)
+    return column_vector(0, 0, 0, -kernel_force(state, K44_cos, K44_sin), 0, 0)
 
 
 def roll_rates(

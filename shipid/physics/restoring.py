@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from shipid.physics.frames import vector
+from shipid.physics.frames import column_vector
 from shipid.physics.grammar import POSITIVE
 
 if TYPE_CHECKING:
@@ -31,4 +31,4 @@ def hydrostatic(
     stiffness, weight = rho * g * A_wp, rho * g * nabla
     Z = -stiffness * (z - x_F * theta)
     M = stiffness * x_F * z - weight * GM_L * theta
-    return vector(0, 0, Z, -weight * GM_T * phi, M, 0)
+    return column_vector(0, 0, Z, -weight * GM_T * phi, M, 0)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from shipid.errors import ShipidError
 from shipid.physics import symbols as ca
-from shipid.units import listed, plural
-from shipid.users import begins_at, of_users
+from shipid.units import join_names, plural_word
+from shipid.users import definition_location, is_user_code
 
 if TYPE_CHECKING:
     from casadi import SX
 
 
-def returned(
+def check_returned(
     where: str, function: Callable[..., Any], value: Any, given: Iterable[Any], count: int, words: str = ""
 ) -> SX:
     """What a function returned, as symbols (count); ShipidError, with the place of a user's function, for all else.
@@ -23,16 +23,18 @@ def returned(
     where : the function in words, the beginning of the line. words : what it must return.
     given : its arguments: symbols, numbers, lists and tables of them. A user's function may return no others.
     """
-    symbols = _symbols(value)
+    symbols = _as_symbols(value)
     if symbols is None or symbols.shape != (count, 1):
-        words = words or f"{count} {plural(count, 'number')}"
-        raise ShipidError(f"{where} must return {words}, not {_found(value, symbols)}{begins_at(function)}")
-    if of_users(function) and (fault := _fault(symbols, ca.veccat(*_flat(given)))):
-        raise ShipidError(f"{where} {fault}{begins_at(function)}")
+        words = words or f"{count} {plural_word(count, 'number')}"
+        raise ShipidError(
+            f"{where} must return {words}, not {_value_words(value, symbols)}{definition_location(function)}"
+        )
+    if is_user_code(function) and (fault := _symbol_fault(symbols, ca.veccat(*_flatten_arguments(given)))):
+        raise ShipidError(f"{where} {fault}{definition_location(function)}")
     return symbols
 
 
-def _symbols(value: Any) -> SX | None:
+def _as_symbols(value: Any) -> SX | None:
     """A value as symbols, also numbers of CasADi and NumPy; None for what is none."""
     if isinstance(value, ca.SX):
         return value
@@ -42,16 +44,16 @@ def _symbols(value: Any) -> SX | None:
         return None
 
 
-def _found(value: Any, symbols: SX | None) -> str:
+def _value_words(value: Any, symbols: SX | None) -> str:
     if value is None:
         return "None: end it with `return`"
     if symbols is None:
         many = isinstance(value, list | tuple)
         return f"{type(value).__name__}{': join its entries by ca.vertcat' if many else ''}"
-    return f"{symbols.numel()} {plural(symbols.numel(), 'number')}" if symbols.is_column() else f"{symbols.shape}"
+    return f"{symbols.numel()} {plural_word(symbols.numel(), 'number')}" if symbols.is_column() else f"{symbols.shape}"
 
 
-def _flat(given: Iterable[Any]) -> Iterable[Any]:
+def _flatten_arguments(given: Iterable[Any]) -> Iterable[Any]:
     for one in given:
         if isinstance(one, dict):
             yield from one.values()
@@ -61,11 +63,11 @@ def _flat(given: Iterable[Any]) -> Iterable[Any]:
             yield one
 
 
-def _fault(symbols: SX, given: SX) -> str:
+def _symbol_fault(symbols: SX, given: SX) -> str:
     """What is wrong with symbols that a user's function returned for others; empty for nothing."""
     graph = ca.Function("term", [ca.veccat(*ca.symvar(given))], [symbols], {"allow_free": True})
     if graph.has_free():
-        return f"returns symbols of its own, {listed(graph.get_free())}: make them parameters, or numbers"
+        return f"returns symbols of its own, {join_names(graph.get_free())}: make them parameters, or numbers"
     constants = (
         graph.instruction_constant(k) for k in range(graph.n_instructions()) if graph.instruction_id(k) == ca.OP_CONST
     )

@@ -7,7 +7,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import given, vector
+from shipid.physics.frames import column_vector, differs_from_default
 from shipid.physics.grammar import (
     CROSS_FLOWS,
     POSITIVE,
@@ -16,14 +16,14 @@ from shipid.physics.grammar import (
     cross_flow_monomial,
     rudder_flow,
 )
-from shipid.physics.hull import SPEED_FLOOR, TIGHTEST, about_service_speed, summed
-from shipid.physics.propeller import drift, signed_root
+from shipid.physics.hull import SPEED_FLOOR, TIGHTEST, about_service_speed, sum_monomials
+from shipid.physics.propeller import drift_angle, signed_root
 
 if TYPE_CHECKING:
     from casadi import SX
 
 
-def rudder(
+def rudder_wrench(
     nu_r: SX,
     delta: SX,
     wash: SX,
@@ -98,9 +98,9 @@ def normal_force(
     f_angle_side: Annotated[SX | float, "-"] = 0.0,
     rho: Annotated[SX, "kg m^-3", POSITIVE],
 ) -> SX:
-    """Normal force F_N [N] on the blade of `rudder`, > 0 turns the ship to starboard."""
+    """Normal force F_N [N] on the blade of `rudder_wrench`, > 0 turns the ship to starboard."""
     u_P, u_race, D_p = wash[0], wash[1], wash[2]
-    U, beta = drift(nu_r)
+    U, beta = drift_angle(nu_r)
     across = U * beta - ell_R * nu_r[5]
     v_R = ca.if_else(across >= 0, gamma_R_plus, gamma_R_minus) * across
     eta = ca.fmin(D_p / H_R, 1)
@@ -109,7 +109,11 @@ def normal_force(
     u_R = epsilon * ca.if_else(within >= 0, size, -size)
     U_R = ca.sqrt(u_R**2 + v_R**2)
     F_N = rho / 2 * A_R * f_alpha * U_R * (u_R * ca.sin(delta) - v_R * ca.cos(delta))
-    if given(f_angle, 0.0) or given(f_side, 0.0) or given(f_angle_side, 0.0):
+    if (
+        differs_from_default(f_angle, 0.0)
+        or differs_from_default(f_side, 0.0)
+        or differs_from_default(f_angle_side, 0.0)
+    ):
         s = (u_R * ca.sin(delta) - v_R * ca.cos(delta)) / U_R
         F_N *= 1 + f_angle * ca.fabs(s) + f_side * ca.sign(s) + f_angle_side * s
     return F_N
@@ -118,7 +122,7 @@ def normal_force(
 def _forces(F_N: SX, delta: SX, x: SX, y: SX | float, z: SX | float, t_R: SX, a_H: SX, x_H: SX) -> SX:
     """Wrench (6) of a normal force F_N on rudder and hull (Yasukawa and Yoshimura 2015, eq. 18)."""
     X, Y = -(1 - t_R) * F_N * ca.sin(delta), -(1 + a_H) * F_N * ca.cos(delta)
-    return vector(X, Y, 0, -z * Y, z * X, -(x + a_H * x_H) * F_N * ca.cos(delta) - y * X)
+    return column_vector(X, Y, 0, -z * Y, z * X, -(x + a_H * x_H) * F_N * ca.cos(delta) - y * X)
 
 
 def rudder_polynomial(
@@ -142,10 +146,10 @@ def rudder_polynomial(
 ) -> SX:
     """Wrench (6) of a rudder whose flow across is a polynomial (Son and Nomoto 1982).
 
-    wash : (u_P, u_race, D_p) as of `rudder`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed. Across:
-    v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, with the sign of `rudder` (-gamma_R is the
+    wash : (u_P, u_race, D_p) as of `rudder_wrench`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed. Across:
+    v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, with the sign of `rudder_wrench` (-gamma_R is the
     value of "v"). U is at least |r| L_pp / TIGHTEST: beyond any turn in which such a polynomial was measured a cubic of
-    r' would grow without limit on a ship that turns on the spot. F_N and the forces of it are those of `rudder`.
+    r' would grow without limit on a ship that turns on the spot. F_N and the forces of it are those of `rudder_wrench`.
     """
     F_N = polynomial_normal_force(
         nu_r, delta, wash, A_R=A_R, f_alpha=f_alpha, epsilon=epsilon, k_x=k_x, v_R=v_R, L_pp=L_pp, rho=rho
@@ -195,9 +199,9 @@ def rudder_coefficients(
     name (`Y_|c|cdelta` turns with the flow), delta [rad], and beta = atan(-v / |u|), the drift angle. A coefficient
     even in delta (`Y_cc|delta|`) makes one side stronger. van Berlekom and Goddard (1972); Skjetne et al. (2004).
     """
-    _, beta = drift(nu_r)
+    _, beta = drift_angle(nu_r)
     factors = {"c": wash[0] + kappa * (wash[1] - wash[0]), "beta": beta, "delta": delta}
-    return summed(values, rudder_flow, factors, rho / 2 * L_pp**2, L_pp)
+    return sum_monomials(values, rudder_flow, factors, rho / 2 * L_pp**2, L_pp)
 
 
 @wraps(rudder_coefficients, assigned=("__annotations__",))

@@ -288,30 +288,30 @@ def signal_of(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-def row_of(name: str) -> Signal | None:
+def signal_row(name: str) -> Signal | None:
     """Row of a command (`port.n`) or of another signal (`u`); None for an unknown name."""
     return SIGNALS.get(signal_of(name))
 
 
-def _row(name: str) -> Signal:
+def _row_or_unknown(name: str) -> Signal:
     """Row of a command or another signal; one without any property for an unknown name."""
-    return row_of(name) or _UNKNOWN
+    return signal_row(name) or _UNKNOWN
 
 
-def named(role: Role) -> dict[str, Signal]:
+def rows_of_role(role: Role) -> dict[str, Signal]:
     """Rows of one role, in the order of the table."""
     return {name: row for name, row in SIGNALS.items() if row.role == role}
 
 
-def measurable(names: Iterable[str]) -> list[str]:
+def measurable_signals(names: Iterable[str]) -> list[str]:
     """Signals of the environment among some names that a dataset may hold: wind, but no current."""
     rows = ((name, SIGNALS.get(name)) for name in names)
     return [name for name, row in rows if row is not None and row.role == "environment" and row.column != "none"]
 
 
-def plain_inputs(names: Iterable[str]) -> list[str]:
+def direct_inputs(names: Iterable[str]) -> list[str]:
     """Those of them that are an input of a method as they are: no direction, and not the wind, which is relative."""
-    return [name for name in measurable(names) if not SIGNALS[name].angle and name != "V_w"]
+    return [name for name in measurable_signals(names) if not SIGNALS[name].angle and name != "V_w"]
 
 
 def is_command(name: str) -> bool:
@@ -333,38 +333,38 @@ def _is_of_component(name: str, role: Role) -> bool:
 
 def is_shaft(command: str) -> bool:
     """Whether a command is a shaft speed, such as `port.n`."""
-    return _row(command).shaft
+    return _row_or_unknown(command).shaft
 
 
-def steers(command: str) -> bool:
+def is_steering(command: str) -> bool:
     """Whether a command is an angle that turns the ship, such as `port.alpha` or `rudder.delta`."""
-    return _row(command).turns != 0
+    return _row_or_unknown(command).turns != 0
 
 
-def turns_round(command: str) -> bool:
+def is_all_round(command: str) -> bool:
     """Whether a command is an angle of a unit that may turn all round, such as `port.alpha`; a rudder does not."""
-    row = _row(command)
+    row = _row_or_unknown(command)
     return row.angle and row.reach[1] - row.reach[0] >= 2 * math.pi
 
 
-def wraps(name: str) -> bool:
+def is_wrapped_angle(name: str) -> bool:
     """Whether a column is an angle of the ship or the weather, unwrapped before it is interpolated."""
     return name in SIGNALS and SIGNALS[name].angle
 
 
-def orders_thrust(name: str) -> bool:
+def is_thrust_order(name: str) -> bool:
     """Whether the last part of a name is a command that does not steer: a shaft speed or a pitch."""
-    return _row(name).role == "command" and _row(name).turns == 0
+    return _row_or_unknown(name).role == "command" and _row_or_unknown(name).turns == 0
 
 
-def neutral(command: str) -> float:
+def neutral_value(command: str) -> float:
     """Default value [SI] of a command: helm amidships, shaft stopped, service pitch."""
-    return _row(command).neutral
+    return _row_or_unknown(command).neutral
 
 
 def mirror_sign(name: str) -> float:
     """Factor of a signal in the port-starboard mirror, 1 or -1."""
-    return float(_row(name).mirror)
+    return float(_row_or_unknown(name).mirror)
 
 
 def read_unit(name: str) -> tuple[str, float]:
@@ -373,6 +373,6 @@ def read_unit(name: str) -> tuple[str, float]:
     return row.read_in, 1.0 / row.factor
 
 
-def units(names: Iterable[str]) -> dict[str, str]:
+def signal_units(names: Iterable[str]) -> dict[str, str]:
     """Name -> SI unit of the given commands or signals."""
     return {name: SIGNALS[signal_of(name)].unit for name in names}

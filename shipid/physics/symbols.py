@@ -19,15 +19,15 @@ else:
         return value
 
 
-class Symbol:
+class SymbolStandIn:
     """Stands for `SX` in signatures, so that they are read without CasADi."""
 
 
 @cache
-def types_of(function: Callable[..., Any]) -> dict[str, Any]:
+def argument_types(function: Callable[..., Any]) -> dict[str, Any]:
     """Types of the arguments and of the result of a function of symbols, with their units, by name.
 
     `SX` need not be a name in the function's file. Raises whatever `typing.get_type_hints` raises, such as NameError
     for another type that is none.
     """
-    return get_type_hints(function, localns={"SX": Symbol}, include_extras=True)
+    return get_type_hints(function, localns={"SX": SymbolStandIn}, include_extras=True)

@@ -7,7 +7,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import force_at, given
+from shipid.physics.frames import differs_from_default, wrench_of_force
 from shipid.physics.grammar import POSITIVE, THRUST, thrust_monomial
 
 if TYPE_CHECKING:
@@ -17,13 +17,13 @@ SHAFT_FLOOR = 1e-3  # rev/s: J = u / (n D) stays finite at n = 0
 UNLIMITED = 1e9  # default limit of a command: beyond all of them
 
 
-def polynomial(coefficients: Mapping[str, SX], J: SX, J_y: SX, width: SX) -> SX:
+def thrust_polynomial_value(coefficients: Mapping[str, SX], J: SX, J_y: SX, width: SX) -> SX:
     """Sum of named monomials in J, y = J_y and t = tanh(|J_y| / width)."""
     symbols = {"J": J, "y": J_y, "t": ca.tanh(ca.fabs(J_y) / width)}
     return sum((value * thrust_monomial(name).value(symbols) for name, value in coefficients.items()), ca.SX(1, 1))
 
 
-def azimuth(
+def azimuth_wrench(
     nu_r: SX,
     n: SX,
     alpha: SX,
@@ -66,22 +66,22 @@ def azimuth(
     J_c = ca.fmin(ca.fmax(J, J_min), J_max)
     Jy_c = ca.fmin(ca.fmax(J_y, -Jy_max), Jy_max)
     over, under, side = J - ca.fmin(J, J_max), J - ca.fmax(J, J_min), J_y - Jy_c
-    K_x_ = polynomial(K_x, J_c, Jy_c, J_t) - over * (k_over + k_over2 * over) - k_under * under
-    K_y_ = polynomial(K_y, J_c, Jy_c, J_t) - (k_side + k_sideJ * ca.fmax(J_c, 0)) * side
+    K_x_ = thrust_polynomial_value(K_x, J_c, Jy_c, J_t) - over * (k_over + k_over2 * over) - k_under * under
+    K_y_ = thrust_polynomial_value(K_y, J_c, Jy_c, J_t) - (k_side + k_sideJ * ca.fmax(J_c, 0)) * side
     scale = k_T * rho * speed**2 * D_p**2 * D_p**2
     F_x = scale * sense * ca.if_else(ahead, 1, k_astern) * K_x_
     F_y = scale * K_y_
-    return force_at(x, y, z, c * F_x - s * F_y, s * F_x + c * F_y)
+    return wrench_of_force(x, y, z, c * F_x - s * F_y, s * F_x + c * F_y)
 
 
-@wraps(azimuth, assigned=("__annotations__",))
+@wraps(azimuth_wrench, assigned=("__annotations__",))
 def azimuth_thrust(nu_r: SX, n: SX, alpha: SX, **numbers: Any) -> SX:
-    """Thrust [N] of `azimuth` along the axis of the unit."""
-    force = azimuth(nu_r, n, alpha, **numbers)
+    """Thrust [N] of `azimuth_wrench` along the axis of the unit."""
+    force = azimuth_wrench(nu_r, n, alpha, **numbers)
     return ca.cos(alpha) * force[0] + ca.sin(alpha) * force[1]
 
 
-def tunnel(
+def tunnel_wrench(
     n: SX,
     *,
     x: Annotated[SX, "m"],
@@ -91,7 +91,9 @@ def tunnel(
     F_3: Annotated[SX, "N s^3"],
 ) -> SX:
     """Wrench (6) of a transverse tunnel thruster at zero ship speed: Y = F_1 n + F_2 n|n| + F_3 n^3, n [rev/s]."""
-    return force_at(ca.SX(x), ca.SX(1, 1), ca.SX(z), ca.SX(1, 1), tunnel_side_force(n, F_1=F_1, F_2=F_2, F_3=F_3))
+    return wrench_of_force(
+        ca.SX(x), ca.SX(1, 1), ca.SX(z), ca.SX(1, 1), tunnel_side_force(n, F_1=F_1, F_2=F_2, F_3=F_3)
+    )
 
 
 def tunnel_side_force(
@@ -101,15 +103,15 @@ def tunnel_side_force(
     F_2: Annotated[SX, "N s^2"],
     F_3: Annotated[SX, "N s^3"],
 ) -> SX:
-    """Force [N] of `tunnel`, > 0 to starboard."""
+    """Force [N] of `tunnel_wrench`, > 0 to starboard."""
     return n * (F_1 + ca.fabs(n) * (F_2 + ca.fabs(n) * F_3))
 
 
-def bounded(value: SX, low: SX | float, high: SX | float) -> SX:
+def bounded_value(value: SX, low: SX | float, high: SX | float) -> SX:
     """The value kept within low and high; a bound that no document gives stays out of the equations."""
-    if given(low, -UNLIMITED):
+    if differs_from_default(low, -UNLIMITED):
         value = ca.fmax(value, low)
-    return ca.fmin(value, high) if given(high, UNLIMITED) else value
+    return ca.fmin(value, high) if differs_from_default(high, UNLIMITED) else value
 
 
 def bounded_output(
@@ -119,7 +121,7 @@ def bounded_output(
     high: Annotated[SX | float, "of the command"] = UNLIMITED,
 ) -> SX:
     """The actual value of a command: the actuator state, within the limits of the device."""
-    return bounded(state, low, high)
+    return bounded_value(state, low, high)
 
 
 def first_order_advance(
@@ -138,9 +140,9 @@ def first_order_advance(
     held command while the limit does not bind, so a step of 1 s with T = 0.5 s does not oscillate. The order c and the
     state a are kept within low and high.
     """
-    reached = bounded(state, low, high)
-    change = (bounded(command, low, high) - reached) * (1 - ca.exp(-dt / T))
-    if not given(rate, UNLIMITED):
+    reached = bounded_value(state, low, high)
+    change = (bounded_value(command, low, high) - reached) * (1 - ca.exp(-dt / T))
+    if not differs_from_default(rate, UNLIMITED):
         return reached + change
     return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
 
@@ -159,6 +161,6 @@ def rate_limit_advance(
     rate in the command's unit per second; the order and the state are kept within low and high: the stops of a
     steering gear, the greatest speed of a shaft ahead and astern.
     """
-    reached = bounded(state, low, high)
-    change = bounded(command, low, high) - reached
+    reached = bounded_value(state, low, high)
+    change = bounded_value(command, low, high) - reached
     return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import rotation
+from shipid.physics.frames import rotation_matrix
 from shipid.physics.grammar import AXES
 
 if TYPE_CHECKING:
@@ -23,14 +23,14 @@ DRIFT = ("X_drift", "Y_drift", "N_drift")
 TABLES = {"waves.first_order": ("omega", "beta_deg", *FORCES), "waves.drift": ("omega", "beta_deg", *DRIFT)}
 
 
-def passage(block: Mapping[str, Any]) -> tuple[str, ...]:  # noqa: ARG001
+def passage_states(block: Mapping[str, Any]) -> tuple[str, ...]:  # noqa: ARG001
     """Names of the wave states: time [s], and the displacement of the water by the current, north and east [m]."""
     return ("t", "north", "east")
 
 
 def passage_rates(eta: SX, nu: SX, nu_r: SX) -> SX:
     """d(state)/dt of the wave states: 1, then the current velocity north and east [m/s]."""
-    return ca.vertcat(ca.SX(1), (rotation(eta[3], eta[4], eta[5]) @ (nu - nu_r)[:3])[:2])
+    return ca.vertcat(ca.SX(1), (rotation_matrix(eta[3], eta[4], eta[5]) @ (nu - nu_r)[:3])[:2])
 
 
 def first_order_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:  # noqa: ARG001
@@ -40,7 +40,7 @@ def first_order_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str,
 
 
 def drift_widths(*, table: Mapping[str, Any], harmonics: int) -> dict[str, int]:  # noqa: ARG001
-    """Widths of the component arguments of `drift`; `drift`: three series of real coefficients."""
+    """Widths of the component arguments of `drift_wrench`; `drift_wrench`: three series of real coefficients."""
     return {"c_chi": 1, "s_chi": 1, "drift": 3 * (harmonics + 1)}
 
 
@@ -83,7 +83,7 @@ def _series(coefficients: SX, basis: list[SX]) -> SX:
     return sum((coefficients[m] * entry for m, entry in enumerate(basis)), ca.SX(1, 1))
 
 
-def drift(eta: SX, c_chi: SX, s_chi: SX, drift: SX) -> SX:
+def drift_wrench(eta: SX, c_chi: SX, s_chi: SX, drift: SX) -> SX:
     """Wrench (6) of the mean drift force of one direction of waves: surge, sway and yaw.
 
     drift (3 series, one after the other): Fourier coefficients of the sum of a^2 D(omega, beta) [N, N m].

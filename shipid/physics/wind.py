@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import vector
+from shipid.physics.frames import column_vector
 from shipid.physics.grammar import POSITIVE
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def relative_wind(nu: SX, psi: SX, V_w: SX, beta_w: SX) -> tuple[SX, SX]:
     return square, -ca.atan2(v_rw, along)
 
 
-def interpolate(x: SX, grid: SX, values: SX) -> SX:
+def interpolate_ramps(x: SX, grid: SX, values: SX) -> SX:
     """Piecewise linear interpolation as a sum of ramps, constant beyond the ends; in SX, for all engines."""
     x = ca.fmin(ca.fmax(x, grid[0]), grid[-1])
     slopes = ca.diff(values) / ca.diff(grid)
@@ -38,7 +38,7 @@ def interpolate(x: SX, grid: SX, values: SX) -> SX:
     return result
 
 
-def table(
+def wind_table_wrench(
     nu: SX,
     psi: SX,
     V_w: SX,
@@ -60,11 +60,11 @@ def table(
     square, gamma = relative_wind(nu, psi, V_w, beta_w)
     q, side = rho_a / 2 * square, ca.sign(gamma)
     grid = ca.vertcat(*gamma_deg) * (ca.pi / 180)
-    C_X_, C_Y_, C_N_ = (interpolate(ca.fabs(gamma), grid, ca.vertcat(*values)) for values in (C_X, C_Y, C_N))
-    return vector(q * A_FW * C_X_, side * q * A_LW * C_Y_, 0, 0, 0, side * q * A_LW * L_oa * C_N_)
+    C_X_, C_Y_, C_N_ = (interpolate_ramps(ca.fabs(gamma), grid, ca.vertcat(*values)) for values in (C_X, C_Y, C_N))
+    return column_vector(q * A_FW * C_X_, side * q * A_LW * C_Y_, 0, 0, 0, side * q * A_LW * L_oa * C_N_)
 
 
-def blendermann(
+def blendermann_wrench(
     nu: SX,
     psi: SX,
     V_w: SX,
@@ -96,4 +96,4 @@ def blendermann(
     C_Y = C_Dt * ca.sin(gamma) / damping
     C_N = (s_L / L_oa - 0.18 * (gamma - ca.pi / 2)) * C_Y
     Y = side * q * A_LW * C_Y
-    return vector(q * A_FW * C_X, Y, 0, kappa * s_H * Y, 0, side * q * A_LW * L_oa * C_N)
+    return column_vector(q * A_FW * C_X, Y, 0, kappa * s_H * Y, 0, side * q * A_LW * L_oa * C_N)

@@ -16,7 +16,7 @@ from shipid.report.section import Section
 from shipid.report.selection import close_styles, exemplars, model_chips, sizes
 from shipid.report.tables import Cell, Column, Table, frame_table, with_cells
 from shipid.report.wording import counted, listed, metres
-from shipid.units import level_text, percent, plural
+from shipid.units import level_text, percent_text, plural_word
 
 WORST = 12  # test runs in the table of those that pay
 BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
@@ -59,7 +59,7 @@ def coverage(content: ReportContent) -> Figure | None:
     if not names:
         return None
     counts, banded = sizes(frame.N_D), frame.model.nunique()
-    drawn = f" Of {banded} models, {listed(names, 6)} {plural(len(names), 'is', 'are')} drawn; the table has all."
+    drawn = f" Of {banded} models, {listed(names, 6)} {plural_word(len(names), 'is', 'are')} drawn; the table has all."
     return Figure(
         id="coverage",
         title="What bands promise, and what they hold",
@@ -100,7 +100,7 @@ def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str]
 
 
 def _share_words(row: dict[Hashable, Any]) -> str:
-    return f"{percent(row['coverage'])} [{percent(row['low'])}, {percent(row['high'])}]"
+    return f"{percent_text(row['coverage'])} [{percent_text(row['low'])}, {percent_text(row['high'])}]"
 
 
 def _takeaway_coverage(frame: pd.DataFrame, size: int) -> str:
@@ -110,7 +110,9 @@ def _takeaway_coverage(frame: pd.DataFrame, size: int) -> str:
         return f"No band is promised at N_D = {size}."
     below = mine[mine.high < level].sort_index()
     least, most = mine.iloc[0], mine.iloc[-1]
-    text = f"With N_D = {size}, bands of {level_text(level)} hold {percent(float(mine.coverage.mean()))} of the test "
+    text = (
+        f"With N_D = {size}, bands of {level_text(level)} hold {percent_text(float(mine.coverage.mean()))} of the test "
+    )
     text += f"paths on average over {counted(len(mine), 'model')}; the mean radius is {metres(least.width)} "
     text += f"({least.model})" + (f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". ")
     if below.empty:
@@ -183,7 +185,7 @@ def _least_held(frame: pd.DataFrame) -> str:
     if kinds.empty:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
-    text = f"Bands hold least at {worst.group} ({worst.model}): {percent(worst.coverage)} of the paths."
+    text = f"Bands hold least at {worst.group} ({worst.model}): {percent_text(worst.coverage)} of the paths."
     better = worst.by == "kind" and not worst.note and kinds.group[kinds.by.eq("kind")].nunique() > 1
     return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
 
@@ -198,7 +200,7 @@ def coverage_by_run(content: ReportContent) -> Table | None:
     half = int((mean < 0.5).sum())
     have = "has less than half of its" if half == 1 else "have less than half of their"
     takeaway = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
-    held = with_cells(shown, held=[Cell(percent(share), share) for share in shown.coverage])
+    held = with_cells(shown, held=[Cell(percent_text(share), share) for share in shown.coverage])
     return frame_table("coverage-runs", "Runs that bands hold least", takeaway, held, RUNS)
 
 

@@ -20,7 +20,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from shipid.errors import ShipidError, choices
+from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, Indices
 from shipid.report.wording import scientific
 
@@ -286,7 +286,7 @@ def _find_option(control: Control, value: object) -> Any:
     """An option by its text, or by its number where the text is one."""
     texts = [str(option) for option in control.options]
     if value is not None and str(value) not in texts:
-        words = f"{control.label}: {str(value)!r} is none of its options; {choices(str(value), texts)}"
+        words = f"{control.label}: {str(value)!r} is none of its options; {suggest_name(str(value), texts)}"
         raise ShipidError(words, path="figures")
     return control.options[control.start if value is None else texts.index(str(value))]
 

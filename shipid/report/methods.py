@@ -32,7 +32,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.tables import Cell, Column, Table, frame_table, with_cells, word_cell
 from shipid.report.wording import counted, difference_text, ends, listed, number, shortened
-from shipid.units import plural
+from shipid.units import plural_word
 
 EVERY = "with physics"
 STEPS = (  # greatest by least error below which an axis has these ticks in a decade: two at least are within it
@@ -98,16 +98,16 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
         return f"with N_D = {N_D} no method has a result in every cell with physics"
     best, alike = whole.iloc[0], whole.H.iloc[0] * (1 + ALIKE) >= whole.H
     tied, over = [str(name) for name in whole.method[alike]], " over all cells with physics" if first else ""
-    err = plural(len(tied), "errs", "err alike,")
+    err = plural_word(len(tied), "errs", "err alike,")
     text = f"with N_D = {N_D} {listed(tied)} {err} least{over}, {number(best.H)} m"
     leads = best.reference in tied
     for row in rows_in(whole[~alike if leads else alike][:1]):
         if math.isfinite(row.low):
-            its = f"{row.method} is next, its" if leads else plural(len(tied), "its", "their")
+            its = f"{row.method} is next, its" if leads else plural_word(len(tied), "its", "their")
             text += f" ({its} difference to {row.reference} is {difference_text(row.difference, row.low, row.high)})"
     partial = set(mine.method[mine.missing.gt(0)])
     if ahead := [name for name in best.ahead.split(", ") if name in partial]:
-        text += f", but over the cells that both have {listed(ahead)} {plural(len(ahead), 'errs', 'err')} less"
+        text += f", but over the cells that both have {listed(ahead)} {plural_word(len(ahead), 'errs', 'err')} less"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in rows_in(mine[mine.failed.gt(0)])]
     text += f", without a result: {listed(failed)}" if failed else ""
     partly = [str(row.method) for row in rows_in(mine[mine.missing.gt(mine.failed)])]

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.errors import ShipidError, choices
+from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
 from shipid.report.errors_over import close_up_chips, line_source, name_of_line
 from shipid.report.figure import MUTED, NAIVE, TRUTH, Chip, Control, Figure, Trace, chart, escaped, even_places, line
@@ -277,7 +277,7 @@ def find_window(content: ReportContent, run: str | None, t: float | None, N_D: i
     if not runs:
         raise ShipidError("there is nothing to draw: the results hold no windows", path="prediction")
     if run is not None and run not in runs:
-        raise ShipidError(f"no window of run {run!r}; {choices(run, runs)}", path="prediction")
+        raise ShipidError(f"no window of run {run!r}; {suggest_name(run, runs)}", path="prediction")
     if N_D is not None and N_D not in counts:
         raise ShipidError(f"no window with N_D = {N_D}; valid: {', '.join(map(str, counts))}", path="prediction")
     windows = runs[run or next(iter(runs))]

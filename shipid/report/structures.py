@@ -25,7 +25,7 @@ from shipid.report.tables import (
     word_cell,
 )
 from shipid.report.wording import fixed, listed
-from shipid.units import decimals_for
+from shipid.units import digit_decimals
 
 GROUP_ERRORS = {
     "group": Column("group"),
@@ -134,7 +134,7 @@ def _measure_cell(row: Mapping[Any, Any]) -> Cell:
     value, low, high = (float(row[name]) for name in ("value", "low", "high"))
     if np.isnan(value):
         return word_cell(None)
-    places = decimals_for(value, 4)
+    places = digit_decimals(value, 4)
     ends = "" if np.isnan(low + high) else f" ({fixed(low, places)} … {fixed(high, places)})"
     return Cell(fixed(value, places) + ends, value)
 

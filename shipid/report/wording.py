@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 
 from shipid import units
-from shipid.units import decimals_of, plural
+from shipid.units import length_decimals, plural_word
 
 CONSTANT = "constant u, v, r"
 """Name of the path that no model and no data are needed for: the motion at the instant goes on."""
@@ -23,7 +23,7 @@ def number(value: float) -> str:
 
 
 def _decimals(value: float) -> int:
-    return 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else decimals_of(value)
+    return 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else length_decimals(value)
 
 
 def fixed(value: float, decimals: int) -> str:
@@ -84,7 +84,7 @@ def distance(value: float) -> str:
 def listed(names: Sequence[str], limit: int = 4) -> str:
     """Join as `a, b and c`; what exceeds the limit is counted."""
     shown = [*names] if len(names) <= limit else [*names[: limit - 1], f"{len(names) - limit + 1} more"]
-    return units.listed(shown) or "none"
+    return units.join_names(shown) or "none"
 
 
 def bound(text: str) -> str:
@@ -101,7 +101,7 @@ def _power(match: re.Match[str]) -> str:
 
 def counted(count: int, noun: str) -> str:
     """`1 run`, `3 runs`."""
-    return f"{count:,} {plural(count, noun)}"
+    return f"{count:,} {plural_word(count, noun)}"
 
 
 def duration(seconds: float) -> str:

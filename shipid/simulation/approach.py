@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics.helm import course_keeping
-from shipid.physics.signals import ACTUAL, is_shaft, neutral, steers
-from shipid.units import GRAVITY, listed
-from shipid.vessel.dynamics import HELM, Dynamics, dynamics
+from shipid.physics.helm import course_helmsman
+from shipid.physics.signals import ACTUAL, is_shaft, is_steering, neutral_value
+from shipid.units import GRAVITY, join_names
+from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Controls:
     @property
     def commands(self) -> tuple[str, ...]:
         """Names of all commands of the vessel."""
-        return dynamics(self.vessel).commands
+        return vessel_dynamics(self.vessel).commands
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -95,13 +95,15 @@ class Controls:
     def _driving(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
         """Shaft speeds that push the vessel ahead, if any, and the sides to which some of them turn her, too."""
         vessel = self.vessel
-        idle = acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
+        idle = straight_acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         if not np.isfinite(idle).all():
-            weather = ", ".join(dynamics(vessel).environment)
+            weather = ", ".join(vessel_dynamics(vessel).environment)
             zeros = f" and {weather} 0, as where none is given" if weather else ""
             message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
             raise DocumentError(f"{message}: mend its terms or their numbers", file=vessel.file)
-        ahead = {name: acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)}
+        ahead = {
+            name: straight_acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)
+        }
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         yaw = [ahead[name][2] - idle[2] for name in drives]
         return drives, tuple(float(np.sign(change)) for change in yaw if abs(change) > NOTHING)
@@ -112,23 +114,23 @@ class Controls:
 
         At another ratio of speed and shaft speed the polynomials of a screw, or a hull about that speed, may not hold.
         """
-        speed = service_speed(self.vessel)
+        speed = vessel_service_speed(self.vessel)
         n = balanced_shaft(self, speed)
         if n is None:  # nothing drives her so fast, or nothing holds her back
             n = PROBE_SHAFT
-            speed = min(_balanced(self.vessel, self.ahead(n)), speed)
+            speed = min(_balanced_speed(self.vessel, self.ahead(n)), speed)
         running = self.ahead(n)
-        straight = acceleration(self.vessel, speed, running)
+        straight = straight_acceleration(self.vessel, speed, running)
         turned = {
-            name: acceleration(self.vessel, speed, {**running, name: PROBE_HELM})[2] - straight[2]
+            name: straight_acceleration(self.vessel, speed, {**running, name: PROBE_HELM})[2] - straight[2]
             for name in self.commands
-            if steers(name)
+            if is_steering(name)
         }
         return {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
 
     def ahead(self, n: float) -> dict[str, float]:
         """Every command on a straight course: the shafts that drive her at n [rev/s], all else neutral."""
-        return {name: n if name in self.drives else neutral(name) for name in self.commands}
+        return {name: n if name in self.drives else neutral_value(name) for name in self.commands}
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
         """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,).
@@ -137,21 +139,23 @@ class Controls:
         """
         angles = {name: sign * helm for name, sign in self.helm.items()} if helm.any() else {}
         return {
-            name: angles.get(name, n if name in self.drives else np.full(len(n), neutral(name)))
+            name: angles.get(name, n if name in self.drives else np.full(len(n), neutral_value(name)))
             for name in self.commands
         }
 
 
-def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
+def straight_acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
     """Surge, sway and yaw acceleration (3,) [m/s^2, rad/s^2] of the ship straight ahead at u [m/s] in calm water.
 
     Surge is that of a ship that keeps her trim, as on a steady course: a deep screw would trim her first.
 
     commands : command -> value [SI], reached by the actuators; other commands are neutral.
     """
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
-    memory, orders = ([commands.get(name, neutral(name)) for name in names] for names in (model.memory, model.commands))
+    memory, orders = (
+        [commands.get(name, neutral_value(name)) for name in names] for names in (model.memory, model.commands)
+    )
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
     rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
     motions, mass = model.state[model.num_dof :], vessel.mass
@@ -165,23 +169,25 @@ def acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Arr
 def helm_effect(controls: Controls, n: float, u: float) -> float:
     """Yaw acceleration per helm angle [1/s^2] at shaft speed n [rev/s] and speed u [m/s]."""
     yaw = [
-        acceleration(controls.vessel, u, {name: float(order[0]) for name, order in controls.orders(*given).items()})[2]
+        straight_acceleration(
+            controls.vessel, u, {name: float(order[0]) for name, order in controls.orders(*given).items()}
+        )[2]
         for given in ((np.full(1, n), np.full(1, angle)) for angle in (0.0, PROBE_HELM))
     ]
     return float(yaw[1] - yaw[0]) / PROBE_HELM
 
 
-def service_speed(vessel: Vessel) -> float:
+def vessel_service_speed(vessel: Vessel) -> float:
     """Service speed U_0 of the document [m/s]; that of a Froude number of 0.2 if it gives none."""
     given = vessel.document.get("particulars", {}).get("U_0")
-    return float(given or FROUDE * np.sqrt(GRAVITY * _length(vessel)))
+    return float(given or FROUDE * np.sqrt(GRAVITY * _length_or_usual(vessel)))
 
 
 def balanced_shaft(controls: Controls, speed: float) -> float | None:
     """Shaft speed [rev/s] at which a ship straight ahead at a speed [m/s] keeps it; None if there is none."""
 
     def surplus(n: float) -> float:
-        return float(acceleration(controls.vessel, speed, controls.ahead(n))[0])
+        return float(straight_acceleration(controls.vessel, speed, controls.ahead(n))[0])
 
     low, high = 0.0, 1.0
     while surplus(high) < 0:
@@ -210,7 +216,9 @@ class Approach:
     helm: dict[str, Array]
 
 
-def steady(controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False) -> Approach:
+def steady_approach(
+    controls: Controls, n: Array, *, step: float, method: Method, engine: str, held: bool = False
+) -> Approach:
     """Steady straight motion in calm water at shaft speeds n (S,) [rev/s].
 
     Each sample is simulated from rest until no velocity changes by 0.001 m/s or rad/s in 30 s (large and slow ships: by
@@ -222,19 +230,19 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
     ShipidError : it diverges, is steady neither after an hour nor after 200 ship lengths, or turns with the helm
         amidships (`NotStraight`).
     """
-    vessel, count, speeds, length = controls.vessel, len(n), n.tolist(), _length(controls.vessel)
-    helmsman = course_keeping(controls.commands) if held else None
-    model = dynamics(vessel, helmsman)
+    vessel, count, speeds, length = controls.vessel, len(n), n.tolist(), _length_or_usual(controls.vessel)
+    helmsman = course_helmsman(controls.commands) if held else None
+    model = vessel_dynamics(vessel, helmsman)
     names = (*model.state, *model.hidden)
     state = {name: np.zeros(count) for name in names}
     orders = controls.orders(n, np.full(count, KEEPING if held else 0.0))
     memory = {name: orders[name].copy() if name in orders else np.zeros(count) for name in model.memory}
     if held:
-        memory |= {name: np.zeros(count) for name in memory if steers(name)}
-        orders |= _course(controls, n)
+        memory |= {name: np.zeros(count) for name in memory if is_steering(name)}
+        orders |= _course_inputs(controls, n)
     moving = np.arange(count)
     num_steps = max(round(CHUNK / step), 1)
-    of_one, reached = np.sqrt(GRAVITY * length), np.array([_speed(controls, shaft) for shaft in speeds])
+    of_one, reached = np.sqrt(GRAVITY * length), np.array([_steady_speed(controls, shaft) for shaft in speeds])
     reached = np.where(reached < AT_REST * of_one, CREEPING * of_one, reached)
     longest = max(LONGEST, *(PASSING * length / reached))
     settled = np.minimum(SETTLED, SLOW * reached**2 / length)
@@ -254,7 +262,7 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
         )
         if path.diverged.any():
             raise ShipidError(
-                f"the approach of {vessel.name} at {_rpm(n[moving], path.diverged[0])} rpm diverges: "
+                f"the approach of {vessel.name} at {_rpm_words(n[moving], path.diverged[0])} rpm diverges: "
                 f"take a smaller step than {step:g} s"
             )
         velocities = model.state[model.num_dof :]
@@ -273,52 +281,58 @@ def steady(controls: Controls, n: Array, *, step: float, method: Method, engine:
                 straight = np.minimum(SETTLED, STRAIGHT * reached / length)
                 turning = np.abs(state["r"]) >= straight
                 if turning.any():
-                    words = f"turns with the helm amidships at {_rpm(n, turning)} rpm, so it has no straight approach"
+                    words = (
+                        f"turns with the helm amidships at {_rpm_words(n, turning)} rpm, so it has no straight approach"
+                    )
                     raise NotStraight(f"{vessel.name} {words}: {REMEDY}")
-            helm = _held(controls, model, state, memory, orders) if held else {}
+            helm = _held_helm(controls, model, state, memory, orders) if held else {}
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
             return Approach(state | {name: np.zeros(count) for name in anew}, kept, helm)
     remedy = 'start from rest (approach = "rest")' if held else REMEDY
     if restless and set(restless) <= SWINGING:
-        remedy = f"its hull damps {listed(restless)} too little (Z_w, K_p and M_q do so), or {remedy}"
-    still = f", {listed(restless)} still {'changes' if len(restless) == 1 else 'change'}" if restless else ""
-    ahead = f"straight ahead at {_rpm(n[moving], moving >= 0)} rpm{still}"
+        remedy = f"its hull damps {join_names(restless)} too little (Z_w, K_p and M_q do so), or {remedy}"
+    still = f", {join_names(restless)} still {'changes' if len(restless) == 1 else 'change'}" if restless else ""
+    ahead = f"straight ahead at {_rpm_words(n[moving], moving >= 0)} rpm{still}"
     raise NotStraight(f"{vessel.name} is not steady after {longest:.0f} s {ahead}: {remedy}")
 
 
-def _course(controls: Controls, n: Array) -> dict[str, Array]:
+def _course_inputs(controls: Controls, n: Array) -> dict[str, Array]:
     """Inputs (S,) of the helmsman: course 0, natural frequency 2 U / L, and the effect of the helm at the speed U."""
-    speeds = np.array([_speed(controls, shaft) for shaft in n])
+    speeds = np.array([_steady_speed(controls, shaft) for shaft in n])
     effects = [KEEPING * helm_effect(controls, shaft, speed) for shaft, speed in zip(n, speeds, strict=True)]
     if min(effects) <= 0:
         raise ShipidError(f"the helm of {controls.vessel.name} does not turn it at {60 * n.min():g} rpm")
-    return {"course": np.zeros(len(n)), "omega": 2 * speeds / _length(controls.vessel), "effect": np.array(effects)}
+    return {
+        "course": np.zeros(len(n)),
+        "omega": 2 * speeds / _length_or_usual(controls.vessel),
+        "effect": np.array(effects),
+    }
 
 
-def _length(vessel: Vessel) -> float:
+def _length_or_usual(vessel: Vessel) -> float:
     """Length between perpendiculars [m], of a ship without one a usual length."""
     return vessel.length or LENGTH
 
 
-def _speed(controls: Controls, n: float) -> float:
+def _steady_speed(controls: Controls, n: float) -> float:
     """Speed ahead [m/s] at which the surge acceleration is 0, at shaft speed n [rev/s] and helm amidships."""
     orders = {name: float(order[0]) for name, order in controls.orders(np.full(1, n), np.zeros(1)).items()}
-    return _balanced(controls.vessel, orders)
+    return _balanced_speed(controls.vessel, orders)
 
 
-def _balanced(vessel: Vessel, orders: Mapping[str, float]) -> float:
+def _balanced_speed(vessel: Vessel, orders: Mapping[str, float]) -> float:
     """Speed ahead [m/s] at which the surge acceleration is 0 with these commands, the others neutral."""
     low, high = 0.0, 0.1
-    while high < FASTEST and acceleration(vessel, high, orders)[0] > 0:
+    while high < FASTEST and straight_acceleration(vessel, high, orders)[0] > 0:
         low, high = high, 2 * high
     for _ in range(30):
         middle = (low + high) / 2
-        low, high = (middle, high) if acceleration(vessel, middle, orders)[0] > 0 else (low, middle)
+        low, high = (middle, high) if straight_acceleration(vessel, middle, orders)[0] > 0 else (low, middle)
     return high
 
 
-def _held(
+def _held_helm(
     controls: Controls,
     model: Dynamics,
     state: Mapping[str, Array],
@@ -339,5 +353,5 @@ def _held(
     return {name: given[name] for name in controls.helm}
 
 
-def _rpm(n: Array, faulty: NDArray[np.bool_]) -> str:
+def _rpm_words(n: Array, faulty: NDArray[np.bool_]) -> str:
     return f"{60 * n[int(np.argmax(faulty))]:g}"

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
-from shipid.checked import Checked
-from shipid.document import required, taken_for_numbers
-from shipid.errors import choices
+from shipid.checked import CheckedModel
+from shipid.document import requirement_words, taken_for_numbers
+from shipid.errors import suggest_name
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 
 At = Callable[[str], float]
@@ -22,7 +22,7 @@ SEEDS = 2**31  # number of different seeds that may be drawn
 COURSE = "course_deg"
 
 
-class Draw(Checked, BaseModel):
+class ManoeuvreDraw(CheckedModel, BaseModel):
     """`[[truth.manoeuvre]]`: a kind of manoeuvre, its share of the runs, and the keys of the kind.
 
     A number is a fixed value. A pair [low, high] in place of a number is a range; each run draws from it uniformly.
@@ -35,9 +35,9 @@ class Draw(Checked, BaseModel):
     share: Annotated[FiniteFloat, Field(gt=0, description="weight among all blocks")] = 1.0
 
     @model_validator(mode="after")
-    def _fits(self) -> Draw:
+    def _fits(self) -> ManoeuvreDraw:
         if self.kind not in KINDS:
-            raise ValueError(f"{self.kind!r} is no kind of manoeuvre: {choices(self.kind, KINDS)}")
+            raise ValueError(f"{self.kind!r} is no kind of manoeuvre: {suggest_name(self.kind, KINDS)}")
         for place in (0.0, 1.0):  # valid at both ends of every range: valid between them
             self.manoeuvre(1.0, lambda _, place=place: place)  # type: ignore[misc]
         return self
@@ -60,13 +60,13 @@ class Draw(Checked, BaseModel):
         given: dict[str, Any] = {}
         orders: dict[str, Any] = {}
         level = get_args(fields["orders"])[1] if "orders" in fields else None
-        for key, value in _flat(self.model_extra or {}):
+        for key, value in _flatten_keys(self.model_extra or {}):
             if key in fields and key != "orders":
-                given[key] = value if takes_many(fields[key]) else _drawn(key, value, at)
+                given[key] = value if is_collection_type(fields[key]) else _draw_value(key, value, at)
             elif level is not None and key not in SHARED:
-                orders[key] = limits(key, value) if takes_many(level) else _drawn(key, value, at)
+                orders[key] = range_limits(key, value) if is_collection_type(level) else _draw_value(key, value, at)
             else:
-                remedy = "[truth] gives it for all runs" if key in SHARED else choices(key, fields)
+                remedy = "[truth] gives it for all runs" if key in SHARED else suggest_name(key, fields)
                 raise ValueError(f"{key}: no key of {self.kind}: {remedy}")
         if level is not None:
             given["orders"] = orders
@@ -74,19 +74,19 @@ class Draw(Checked, BaseModel):
             given.setdefault("seed", int(at("seed") * SEEDS))
         if "duration" in kind.model_fields:
             given["duration"] = duration
-        given.setdefault(COURSE, _between(0.0, 360.0, at("psi")))
+        given.setdefault(COURSE, _value_in_range(0.0, 360.0, at("psi")))
         try:
             manoeuvre: Manoeuvre = kind.__pydantic_validator__.validate_python(given)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             key = ".".join(str(part) for part in first["loc"] if part != "orders")
-            raise ValueError(f"{key or self.kind}: {required(first)}") from None
+            raise ValueError(f"{key or self.kind}: {requirement_words(first)}") from None
         for key, value in taken_for_numbers(given, manoeuvre):
             raise ValueError(f"{key}: {value!r}: must be a number")
         return manoeuvre
 
 
-def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
+def _flatten_keys(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Pairs of key and value; a key in a table becomes `table.key`, because `bow.n_rpm = 0` is a table in TOML."""
     result: list[tuple[str, Any]] = []
     for key, value in given.items():
@@ -96,35 +96,35 @@ def _flat(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
     return result
 
 
-def takes_many(annotation: Any) -> bool:
+def is_collection_type(annotation: Any) -> bool:
     """Whether the type of a field is a tuple, list or table, so that a list is its value and not a range."""
     if get_origin(annotation) is Annotated:
-        return takes_many(get_args(annotation)[0])
+        return is_collection_type(get_args(annotation)[0])
     if get_origin(annotation) in (Union, UnionType):
-        return any(map(takes_many, get_args(annotation)))
+        return any(map(is_collection_type, get_args(annotation)))
     return get_origin(annotation) in (tuple, list, dict)
 
 
-def _drawn(key: str, value: Any, at: At) -> Any:
+def _draw_value(key: str, value: Any, at: At) -> Any:
     """The value itself, a number from the range [low, high], or one of several texts."""
     if not isinstance(value, list | tuple):
         return value
     if value and all(isinstance(one, str) for one in value):
         return value[min(int(at(key) * len(value)), len(value) - 1)]
-    low, high = limits(key, value)
-    return _between(low, high, at("psi" if key == COURSE else _quantity(key)))
+    low, high = range_limits(key, value)
+    return _value_in_range(low, high, at("psi" if key == COURSE else _without_unit_suffix(key)))
 
 
-def _quantity(key: str) -> str:
+def _without_unit_suffix(key: str) -> str:
     """Key without its unit suffix (`_rpm`, `_deg`)."""
     return next((key.removesuffix(unit) for unit in UNITS if key.endswith(unit)), key)
 
 
-def _between(low: float, high: float, place: float) -> float:
+def _value_in_range(low: float, high: float, place: float) -> float:
     return low + (high - low) * place
 
 
-def limits(key: str, value: Any) -> tuple[float, float]:
+def range_limits(key: str, value: Any) -> tuple[float, float]:
     """(low, high) of a pair; (x, x) of a number x; ValueError for anything else."""
     pair = value if isinstance(value, list | tuple) else [value, value]
     if len(pair) != 2 or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in pair):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.errors import DocumentError
-from shipid.vessel.perturb import uniform
+from shipid.vessel.perturb import uniform_draw
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,7 @@ SAMPLES = 32  # per period of the highest harmonic in the search for the peak
 STRATA = 8  # strata of the range of levels
 
 
-def multisine(
+def multisine_series(
     time: Array,
     *,
     period: float,
@@ -39,7 +39,7 @@ def multisine(
     used: a crest factor of 1.4 for 10 to 40 harmonics of a wide band, 1.7 to 1.9 for narrow (17..21) and sparse bands,
     where Schroeder's are 1.9 for successive harmonics and up to 3 for sparse ones.
 
-    Several commands at once get disjoint harmonics (`deal`), which makes them orthogonal over a period, and are shifted
+    Several commands at once get disjoint harmonics (`deal_harmonics`), which makes them orthogonal over a period, and are shifted
     in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
 
     Raises
@@ -49,19 +49,21 @@ def multisine(
     _check_multisine(time, period, harmonics, amplitude)
     h = np.array(harmonics, dtype=np.int64)
     start = -np.pi * np.arange(len(h)) * np.arange(1, len(h) + 1) / len(h)
-    phi = _begin_at_zero(h, _optimise(h, start, key))
+    phi = _shift_to_zero(h, _optimise_phases(h, start, key))
     shape = np.sin(2 * np.pi * np.outer(time, h) / period + phi).sum(axis=1)
-    return np.asarray(amplitude / _peak(h, phi) * shape)
+    return np.asarray(amplitude / _peak_bound(h, phi) * shape)
 
 
-def deal(harmonics: Sequence[int], count: int) -> tuple[tuple[int, ...], ...]:
+def deal_harmonics(harmonics: Sequence[int], count: int) -> tuple[tuple[int, ...], ...]:
     """Distribute harmonics to `count` orthogonal multisines in turn, so that each covers the whole band."""
     if not 1 <= count <= len(harmonics):
         raise DocumentError(f"{len(harmonics)} harmonics cannot be shared by {count} commands", path="harmonics")
     return tuple(tuple(sorted(harmonics)[first::count]) for first in range(count))
 
 
-def aprbs(time: Array, *, hold: tuple[float, float], levels: tuple[float, float], key: tuple[object, ...]) -> Array:
+def aprbs_series(
+    time: Array, *, hold: tuple[float, float], levels: tuple[float, float], key: tuple[object, ...]
+) -> Array:
     """Amplitude-modulated pseudo-random binary sequence (T,) at times (T,) [s]: levels held for random times.
 
     Hold times are uniform in `hold` [s], counted from time[0]; the last is cut at the end of `time`. Levels are
@@ -73,16 +75,16 @@ def aprbs(time: Array, *, hold: tuple[float, float], levels: tuple[float, float]
     ------
     DocumentError : limits with low > high, or hold times that are not positive.
     """
-    _check_ordered("hold", hold, "s")
-    _check_ordered("levels", levels, "")
+    _check_limit_order("hold", hold, "s")
+    _check_limit_order("levels", levels, "")
     if hold[0] <= 0:
         raise DocumentError(f"hold times must be positive, not {hold[0]:g} s", path="hold")
     most = int((time[-1] - time[0]) / hold[0]) + 1
-    draws = np.array([uniform(*key, "hold", number) for number in range(most)])
+    draws = np.array([uniform_draw(*key, "hold", number) for number in range(most)])
     ends = time[0] + np.cumsum(hold[0] + (hold[1] - hold[0]) * draws)
     slack = 1e-9 * max(1.0, float(np.abs(time).max()))  # a level ends at 3 * 0.1 where it should at 0.3
     number = np.searchsorted(ends, time + slack, side="right")
-    return np.asarray(levels[0] + (levels[1] - levels[0]) * _spread(int(number[-1]) + 1, key)[number])
+    return np.asarray(levels[0] + (levels[1] - levels[0]) * _stratified_draws(int(number[-1]) + 1, key)[number])
 
 
 def limit_rate(series: Array, step: float, rate: float) -> Array:
@@ -113,13 +115,13 @@ def _check_multisine(time: Array, period: float, harmonics: Sequence[int], ampli
         raise DocumentError(message, path="harmonics")
 
 
-def _check_ordered(name: str, limits: tuple[float, float], unit: str) -> None:
+def _check_limit_order(name: str, limits: tuple[float, float], unit: str) -> None:
     if limits[0] > limits[1]:
         given = f"[{limits[0]:g}, {limits[1]:g}] {unit}".rstrip()
         raise DocumentError(f"low > high: give [low, high], not {given}", path=name)
 
 
-def _wave(harmonics: NDArray[np.int64], phi: Array) -> Array:
+def _one_period(harmonics: NDArray[np.int64], phi: Array) -> Array:
     """One period of the sum of unit sines with phases (..., K): (..., SAMPLES * greatest harmonic)."""
     count = SAMPLES * int(harmonics.max())
     lines = np.zeros((*phi.shape[:-1], count // 2 + 1), dtype=complex)
@@ -127,18 +129,20 @@ def _wave(harmonics: NDArray[np.int64], phi: Array) -> Array:
     return np.fft.irfft(lines, count)
 
 
-def _peak(harmonics: NDArray[np.int64], phi: Array) -> float:
+def _peak_bound(harmonics: NDArray[np.int64], phi: Array) -> float:
     """Upper bound of |x| at all times: greatest sample divided by cos(pi / SAMPLES) (Ehlich and Zeller 1964)."""
-    return float(np.abs(_wave(harmonics, phi)).max() / np.cos(np.pi / SAMPLES))
+    return float(np.abs(_one_period(harmonics, phi)).max() / np.cos(np.pi / SAMPLES))
 
 
-def _optimise(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object, ...]) -> Array:
+def _optimise_phases(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object, ...]) -> Array:
     """Phases (K,) with the lowest peak of STARTS searches of ROUNDS iterations."""
-    drawn = [[uniform(*key, "phase", start, int(harmonic)) for harmonic in harmonics] for start in range(1, STARTS)]
+    drawn = [
+        [uniform_draw(*key, "phase", start, int(harmonic)) for harmonic in harmonics] for start in range(1, STARTS)
+    ]
     phi = np.vstack([schroeder, 2 * np.pi * np.array(drawn).reshape(STARTS - 1, len(harmonics))])
     best, lowest = schroeder, np.inf
     for level in np.linspace(0.75, 0.995, ROUNDS):
-        wave = _wave(harmonics, phi)
+        wave = _one_period(harmonics, phi)
         peaks = np.abs(wave).max(axis=1)
         if peaks.min() < lowest:
             best, lowest = phi[int(np.argmin(peaks))], float(peaks.min())
@@ -147,13 +151,13 @@ def _optimise(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object,
     return best
 
 
-def _begin_at_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
+def _shift_to_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
     """Phases (K,) of the wave shifted in time so that it rises through 0 at t = 0."""
 
     def at(angle: float) -> float:
         return float(np.sin(harmonics * angle + phi).sum())
 
-    wave = _wave(harmonics, phi)
+    wave = _one_period(harmonics, phi)
     rising = int(np.flatnonzero((wave <= 0) & (np.roll(wave, -1) > 0))[0])
     low, high = 2 * np.pi * rising / len(wave), 2 * np.pi * (rising + 1) / len(wave)
     for _ in range(60):
@@ -162,9 +166,9 @@ def _begin_at_zero(harmonics: NDArray[np.int64], phi: Array) -> Array:
     return phi + harmonics * low
 
 
-def _spread(count: int, key: tuple[object, ...]) -> Array:
+def _stratified_draws(count: int, key: tuple[object, ...]) -> Array:
     """Stratified random numbers (count,) in [0, 1): each block of STRATA numbers has one in each equal part."""
     blocks = range(-(-count // STRATA))
-    order = np.array([[uniform(*key, "order", block, part) for part in range(STRATA)] for block in blocks])
-    within = np.array([[uniform(*key, "level", block, part) for part in range(STRATA)] for block in blocks])
+    order = np.array([[uniform_draw(*key, "order", block, part) for part in range(STRATA)] for block in blocks])
+    within = np.array([[uniform_draw(*key, "level", block, part) for part in range(STRATA)] for block in blocks])
     return np.asarray(((np.argsort(order, axis=1) + within) / STRATA).ravel()[:count])

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from shipid.checked import Checked
+from shipid.checked import CheckedModel
 from shipid.errors import DocumentError
-from shipid.vessel.perturb import uniform
+from shipid.vessel.perturb import uniform_draw
 
 Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -22,7 +22,7 @@ Positive = Annotated[FiniteFloat, Field(gt=0)]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
-class Gusts(Checked, BaseModel):
+class Gusts(CheckedModel, BaseModel):
     """A `gusts` block: spectrum, height [m] and frequency band [Hz].
 
     `npd` depends only on wind speed and height. `kaimal` needs a turbulence intensity (sigma / mean speed) and takes
@@ -51,7 +51,7 @@ class Gusts(Checked, BaseModel):
         return self
 
 
-def series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:
+def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:
     """Gust speed (T, S) [m/s] at times (T,) [s], for mean speeds (S,) [m/s]; mean + gust is never negative.
 
     x(t) = sum_k a_k cos(2 pi f_k t + phi_k). The band is divided into bins of equal width in ln f. f_k is uniform in
@@ -73,17 +73,17 @@ def series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[ob
     result = np.empty((len(time), len(mean_speed)))
     # one by one: no series may depend on the others, not even in the last bit
     for column, key, amplitude in zip(result.T, keys, amplitudes, strict=True):
-        frequencies, phases = _draw(gusts, key)
+        frequencies, phases = _draw_harmonics(gusts, key)
         column[:] = np.cos(2 * np.pi * np.outer(time, frequencies) + phases) @ amplitude
     return np.maximum(result, -mean_speed)
 
 
-def variance(gusts: Gusts, mean_speed: Array) -> Array:
+def gust_variance(gusts: Gusts, mean_speed: Array) -> Array:
     """Variance (S,) [m^2/s^2] of the gusts for mean speeds (S,) [m/s]: the spectrum's integral over the band."""
     return np.asarray(_bin_variances(gusts, mean_speed).sum(axis=1))
 
 
-def spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:
+def gust_spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:
     """One-sided spectral density [m^2/s^2/Hz] at frequencies [Hz], for mean speeds [m/s] (shapes that broadcast).
 
     `npd`: S = 320 (U/10)^2 (z/10)^0.45 (1 + x^n)^(-5/(3n)), x = 172 f (z/10)^(2/3) (U/10)^(-3/4), n = 0.468, with the
@@ -96,23 +96,23 @@ def spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:
     speed = np.asarray(mean_speed, dtype=np.float64)
     blows = speed > 0
     U = np.where(blows, speed, 1.0)
-    density = _npd(gusts, U, frequency) if gusts.kind == "npd" else _kaimal(gusts, U, frequency)
+    density = _npd_spectrum(gusts, U, frequency) if gusts.kind == "npd" else _kaimal_spectrum(gusts, U, frequency)
     return np.asarray(np.where(blows, density, 0.0))
 
 
-def _npd(gusts: Gusts, U: Array, frequency: Array) -> Array:
+def _npd_spectrum(gusts: Gusts, U: Array, frequency: Array) -> Array:
     n, z = 0.468, gusts.height / 10
     x = 172 * frequency * z ** (2 / 3) * (U / 10) ** -0.75
     return np.asarray(320 * (U / 10) ** 2 * z**0.45 * (1 + x**n) ** (-5 / (3 * n)))
 
 
-def _kaimal(gusts: Gusts, U: Array, frequency: Array) -> Array:
+def _kaimal_spectrum(gusts: Gusts, U: Array, frequency: Array) -> Array:
     assert gusts.turbulence_intensity is not None
     passing = (gusts.length_scale or 8.1 * 0.7 * min(gusts.height, 60.0)) / U  # s: an eddy passes by
     return np.asarray(4 * (gusts.turbulence_intensity * U) ** 2 * passing * (1 + 6 * frequency * passing) ** (-5 / 3))
 
 
-def _edges(gusts: Gusts) -> Array:
+def _band_edges(gusts: Gusts) -> Array:
     """Natural logarithm of the limits (K + 1,) of the bins in Hz."""
     low, high = np.log(gusts.frequencies)
     return np.linspace(low, high, gusts.harmonics + 1)
@@ -120,18 +120,18 @@ def _edges(gusts: Gusts) -> Array:
 
 def _bin_variances(gusts: Gusts, mean_speed: Array) -> Array:
     """Integral of the spectrum over each bin (S, K) [m^2/s^2], by Gauss's rule in ln f."""
-    edges = _edges(gusts)
+    edges = _band_edges(gusts)
     half = np.diff(edges)[:, None] / 2
     frequency = np.exp(edges[:-1, None] + half * (1 + NODES))
-    density = spectrum(gusts, np.asarray(mean_speed)[:, None, None], frequency)
+    density = gust_spectrum(gusts, np.asarray(mean_speed)[:, None, None], frequency)
     return np.asarray((density * frequency * half * WEIGHTS).sum(axis=2))
 
 
-def _draw(gusts: Gusts, key: tuple[object, ...]) -> tuple[Array, Array]:
+def _draw_harmonics(gusts: Gusts, key: tuple[object, ...]) -> tuple[Array, Array]:
     """Frequencies [Hz] and phases [rad] of the harmonics, (K,) each."""
     place, turn = (
-        np.array([uniform(*key, "gust", quantity, k) for k in range(gusts.harmonics)])
+        np.array([uniform_draw(*key, "gust", quantity, k) for k in range(gusts.harmonics)])
         for quantity in ("frequency", "phase")
     )
-    edges = _edges(gusts)
+    edges = _band_edges(gusts)
     return np.exp(edges[:-1] + np.diff(edges) * place), 2 * np.pi * turn

@@ -10,13 +10,13 @@ import numpy as np
 from shipid.engine.rollout import Trajectories
 
 
-def logged(path: Trajectories, names: Sequence[str]) -> dict[str, np.ndarray]:
+def log_columns(path: Trajectories, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Log columns of the first variant, column -> (R, S); u, v [m/s] and r [rad/s] in the horizontal plane."""
-    columns = {column_of(name): path[name][:, 0] for name in names}
-    return columns | horizontal(columns)
+    columns = {state_column(name): path[name][:, 0] for name in names}
+    return columns | horizontal_velocities(columns)
 
 
-def column_of(state: str) -> str:
+def state_column(state: str) -> str:
     """Name of the log column of a state."""
     return "z" if state == "down" else state
 
@@ -25,7 +25,7 @@ LEANING = ("phi", "theta", "w", "q")
 """States by which velocities along the ship's axes differ from those of a log, which are horizontal."""
 
 
-def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
+def horizontal_velocities(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
     """Horizontal velocities u, v [m/s] along and across the heading, and r = d(psi)/dt [rad/s], from body-fixed ones.
 
     Fossen 2021, eqs. 2.31 and 2.40. maths : module with cos and sin for the columns: numpy, or casadi for symbols.
@@ -39,8 +39,8 @@ def horizontal(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
     return {"u": u * maths.cos(theta) + down * maths.sin(theta), "v": across, "r": turning}
 
 
-def aboard(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
-    """Body-fixed u, v [m/s] and r [rad/s] from the columns of a log: inverse of `horizontal`; w, q are body-fixed."""
+def body_velocities(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
+    """Body-fixed u, v [m/s] and r [rad/s] from the columns of a log: inverse of `horizontal_velocities`; w, q are body-fixed."""
     zero = 0.0 * columns["u"]
     phi, theta, w, q = (columns.get(name, zero) for name in LEANING)
     v = (columns["v"] + w * maths.sin(phi)) / maths.cos(phi)
@@ -49,6 +49,6 @@ def aboard(columns: Mapping[str, Any], maths: Any = np) -> dict[str, Any]:
     return {"u": u, "v": v, "r": r}
 
 
-def run_names(count: int) -> list[str]:
+def number_runs(count: int) -> list[str]:
     """Names `M001`, `M002`, ... of `count` runs, with enough digits to sort by name."""
     return [f"M{number + 1:0{max(3, len(str(count)))}d}" for number in range(count)]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
 
-from shipid.checked import Checked
-from shipid.errors import DocumentError, choices
+from shipid.checked import CheckedModel
+from shipid.errors import DocumentError, suggest_name
 from shipid.measures.record import Measures, Record
 from shipid.measures.spiral import Levels, levels, rate_levels, reverse_spiral, spiral
 from shipid.measures.stopping import stop
@@ -25,8 +25,8 @@ from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
 from shipid.simulation.approach import Controls, helm_effect
-from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
-from shipid.simulation.request import Request, Side, in_rows
+from shipid.simulation.excitation import aprbs_series, deal_harmonics, limit_rate, multisine_series
+from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import DEGREE, RPM
 from shipid.vessel.schema import term_blocks
 
@@ -44,7 +44,7 @@ ZIGZAG, TURN, LEVEL, STOP = 30.0, 60.0, 40.0, 80.0  # ship lengths of standard m
 SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 
 
-def _rising(limits: tuple[float, float]) -> tuple[float, float]:
+def _check_rising(limits: tuple[float, float]) -> tuple[float, float]:
     """The pair itself; ValueError if the first is above the second."""
     low, high = limits
     if low > high:
@@ -52,11 +52,11 @@ def _rising(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-Hold = Annotated[tuple[Positive, Positive], AfterValidator(_rising)]
+Hold = Annotated[tuple[Positive, Positive], AfterValidator(_check_rising)]
 
 
 @dataclass(frozen=True)
-class Start:
+class StartState:
     """Initial state of the ship: upright, all velocities 0 except the speed ahead.
 
     Parameters
@@ -73,7 +73,7 @@ class Start:
     held: bool = False
 
 
-class Manoeuvre(Checked, BaseModel, ABC):
+class Manoeuvre(CheckedModel, BaseModel, ABC):
     """Base class of all kinds of manoeuvre: name, initial heading, initial state and orders."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -87,7 +87,7 @@ class Manoeuvre(Checked, BaseModel, ABC):
 
     @property
     @abstractmethod
-    def start(self) -> Start:
+    def start(self) -> StartState:
         """State of the ship at t = 0."""
 
     def helmsman(self, controls: Controls) -> Helmsman | None:  # noqa: ARG002
@@ -111,7 +111,7 @@ class Manoeuvre(Checked, BaseModel, ABC):
         self.helmsman(controls)
 
 
-class Ordered(Manoeuvre):
+class OrderedManoeuvre(Manoeuvre):
     """Orders to the single commands of the vessel, from an initial speed ahead, without an approach.
 
     A key of `orders` is a signal with its unit, for all commands of that signal (`n_rpm`, `alpha_deg`, `delta_deg`), or
@@ -131,9 +131,9 @@ class Ordered(Manoeuvre):
         return self.duration
 
     @property
-    def start(self) -> Start:
+    def start(self) -> StartState:
         """At `start_speed`, without an approach."""
-        return Start(speed=self.start_speed, at_order=self.actuators_at == "order")
+        return StartState(speed=self.start_speed, at_order=self.actuators_at == "order")
 
     @abstractmethod
     def series(self, key: str, t: Array) -> Array:
@@ -147,7 +147,7 @@ class Ordered(Manoeuvre):
         unknown = next((key for key in series if key not in valid), None)
         if unknown is not None:
             known = {*valid, *type(self).model_fields} - {"orders"}
-            message = f"orders no command of {controls.vessel.name}: {choices(unknown, known)}"
+            message = f"orders no command of {controls.vessel.name}: {suggest_name(unknown, known)}"
             raise DocumentError(message, path=f"manoeuvre.{unknown}")
         result = {}
         for name, (single, common) in chosen.items():
@@ -163,7 +163,7 @@ class Ordered(Manoeuvre):
         self.inputs(controls, np.zeros(1), 0.0)
 
 
-class Turning(Ordered):
+class ConstantOrders(OrderedManoeuvre):
     """Constant orders: a turn, or a straight run where the angle is zero."""
 
     orders: Annotated[dict[str, FiniteFloat], Field(description="key -> order, in the unit of the key")] = {}
@@ -173,7 +173,7 @@ class Turning(Ordered):
         return np.full(len(t), self.orders[key])
 
 
-class Steps(Ordered):
+class StepManoeuvre(OrderedManoeuvre):
     """Orders that change within a run: each key has random levels in its range, each held for a random time.
 
     Levels and times follow `excitation.aprbs`: keys change independently of each other.
@@ -185,10 +185,10 @@ class Steps(Ordered):
 
     def series(self, key: str, t: Array) -> Array:
         """Order at times (T,), piecewise constant."""
-        return aprbs(t, hold=self.hold, levels=self.orders[key], key=(self.seed, "steps", key))
+        return aprbs_series(t, hold=self.hold, levels=self.orders[key], key=(self.seed, "steps", key))
 
 
-class Approached(Manoeuvre):
+class ApproachedManoeuvre(Manoeuvre):
     """A manoeuvre by helm angle and shaft speed after an approach; the log begins with t = 0 at the end of it."""
 
     n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
@@ -198,11 +198,11 @@ class Approached(Manoeuvre):
     ] = "steady"
 
     @property
-    def start(self) -> Start:
+    def start(self) -> StartState:
         """Initial state: steady straight ahead, or at rest."""
         if self.approach == "rest":
-            return Start()
-        return Start(shaft=self.n_rpm * RPM, held=self.approach == "helmsman")
+            return StartState()
+        return StartState(shaft=self.n_rpm * RPM, held=self.approach == "helmsman")
 
     def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:  # noqa: ARG002
         """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
@@ -231,14 +231,14 @@ class Approached(Manoeuvre):
         self.helmsman(controls)
 
 
-class Executed(Approached):
+class ExecutedManoeuvre(ApproachedManoeuvre):
     """A manoeuvre with straight motion until its first order is executed."""
 
     execute_at: Annotated[NotNegative, Field(description="s of the log that go by before the first order")] = 0.0
 
     def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:
         """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
-        before = ~_from(self.execute_at, t)
+        before = ~_is_after(self.execute_at, t)
         return inputs | {name: np.where(before, angle, inputs[name]) for name, angle in helm.items()}
 
     def check(self, controls: Controls) -> None:
@@ -249,7 +249,7 @@ class Executed(Approached):
         super().check(controls)
 
 
-class Timed(Executed):
+class TimedManoeuvre(ExecutedManoeuvre):
     """A manoeuvre of a given duration."""
 
     duration: Annotated[Positive, Field(description="s")]
@@ -260,7 +260,7 @@ class Timed(Executed):
         return self.duration
 
 
-class Trial(Executed):
+class Trial(ExecutedManoeuvre):
     """A standard manoeuvre: `shipid manoeuvre` performs it at the scale of a ship, and runs of it are measured.
 
     angles : what the angles on the command line are, in their order; a `helm` is in deg.
@@ -298,7 +298,7 @@ class Trial(Executed):
         return Levels(np.empty(0), np.empty(0), 0)
 
 
-class HelmOver(Timed):
+class HelmOverManoeuvre(TimedManoeuvre):
     """A manoeuvre that begins with the helm put over to one side."""
 
     angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg of helm")] = 20.0
@@ -320,10 +320,10 @@ class HelmOver(Timed):
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,) [s]: amidships, then the first helm angle."""
-        return np.where(_from(self.execute_at, t), self.sense * self.angle_deg * DEGREE, 0.0)
+        return np.where(_is_after(self.execute_at, t), self.sense * self.angle_deg * DEGREE, 0.0)
 
 
-class TurningCircle(HelmOver, Trial):
+class TurningCircle(HelmOverManoeuvre, Trial):
     """The helm is put over and held."""
 
     measures = staticmethod(turning)
@@ -336,7 +336,7 @@ class TurningCircle(HelmOver, Trial):
         return cls(angle_deg=request.angle(35.0), side=request.side, duration=request.time(TURN), **request.keys)
 
 
-class PullOut(HelmOver, Trial):
+class PullOut(HelmOverManoeuvre, Trial):
     """A turn, then the helm amidships: a stable ship's yaw rate decays to zero."""
 
     measures = staticmethod(pull_out)
@@ -345,19 +345,21 @@ class PullOut(HelmOver, Trial):
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
-        return np.where(_from(self.execute_at + self.turn, t), 0.0, super().helm(t))
+        return np.where(_is_after(self.execute_at + self.turn, t), 0.0, super().helm(t))
 
     @classmethod
     def scaled(cls, request: Request) -> Self:
         """A turn of 30 ship lengths, then as many amidships or more: until the rate of a stable ship has decayed."""
         begin, end = request.keys["execute_at"], request.time(TURN)
-        turn = in_rows((end - begin) / 2, request.interval)  # between two rows the log would show the release after it
+        turn = round_to_rows(
+            (end - begin) / 2, request.interval
+        )  # between two rows the log would show the release after it
         if request.duration is None:
             end = begin + turn + request.passing * request.settling(TURN / 2)
         return cls(angle_deg=request.angle(20.0), side=request.side, turn=turn, duration=end, **request.keys)
 
 
-class Zigzag(HelmOver, Trial):
+class Zigzag(HelmOverManoeuvre, Trial):
     """The helm is reversed each time the heading has changed from that at the first order by the execute heading."""
 
     measures = staticmethod(zigzag)
@@ -378,12 +380,12 @@ class Zigzag(HelmOver, Trial):
 
     def helmsman(self, controls: Controls) -> Helmsman:
         """The zigzag helmsman: reverses the helm at the execute heading."""
-        return helm.zigzag(controls.commands)
+        return helm.zigzag_helmsman(controls.commands)
 
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
         """Name -> (T,) [SI]: first helm angle, shaft speeds, whether executed, execute heading: for the helmsman."""
         reversal = np.full(len(t), self.sense * self.reversal_deg * DEGREE)
-        more = {"executed": np.where(_from(self.execute_at, t), 1.0, 0.0), "execute_heading": reversal}
+        more = {"executed": np.where(_is_after(self.execute_at, t), 1.0, 0.0), "execute_heading": reversal}
         return super().inputs(controls, t, speed) | more
 
     @classmethod
@@ -423,7 +425,7 @@ class Spiral(Trial):
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
-        return _levels(self.angles_deg, self.hold, self.execute_at, t) * DEGREE
+        return _level_series(self.angles_deg, self.hold, self.execute_at, t) * DEGREE
 
     @classmethod
     def scaled(cls, request: Request) -> Self:
@@ -466,7 +468,7 @@ class ReverseSpiral(Trial):
 
     def helmsman(self, controls: Controls) -> Helmsman:
         """The yaw-rate helmsman: a PI controller of the yaw rate by the helm."""
-        return helm.yaw_rate(controls.commands)
+        return helm.yaw_rate_helmsman(controls.commands)
 
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
         """Name -> (T,): largest helm angle, shaft speeds, ordered yaw rate, gain and reset time of the PI law.
@@ -478,7 +480,7 @@ class ReverseSpiral(Trial):
         if effect <= 0:
             raise DocumentError(f"at {self.n_rpm:g} rpm the helm does not turn the ship", path="manoeuvre.n_rpm")
         law = {"gain": np.full(len(t), 2 * omega / effect), "reset": np.full(len(t), 2 / omega)}
-        rate = _levels(self.rates_deg, self.hold, self.execute_at, t) * DEGREE
+        rate = _level_series(self.rates_deg, self.hold, self.execute_at, t) * DEGREE
         return controls.orders(self.shaft(t), np.full(len(t), greatest)) | {"rate": rate, **law}
 
     @classmethod
@@ -489,7 +491,7 @@ class ReverseSpiral(Trial):
         return cls(rates_deg=rates, hold=request.level(LEVEL), **request.keys)
 
 
-class CrashStop(Timed, Trial):
+class CrashStop(TimedManoeuvre, Trial):
     """Full astern, the helm amidships: a shaft turns the other way, of a controllable pitch the pitch is reversed."""
 
     measures = staticmethod(stop)
@@ -518,11 +520,11 @@ class CrashStop(Timed, Trial):
 
     def shaft(self, t: Array) -> Array:
         """Shaft speed [rev/s] at times (T,)."""
-        return np.where(_from(self.execute_at, t), -self.astern_rpm, self.n_rpm) * RPM
+        return np.where(_is_after(self.execute_at, t), -self.astern_rpm, self.n_rpm) * RPM
 
     def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
         """Name -> (T,): the commands [SI] at times t (T,) [s]."""
-        orders, astern = super().inputs(controls, t, speed), _from(self.execute_at, t)
+        orders, astern = super().inputs(controls, t, speed), _is_after(self.execute_at, t)
         for shaft in controls.drives:
             pitch = f"{shaft.rpartition('.')[0]}.pitch"
             if pitch in orders:
@@ -535,7 +537,7 @@ class CrashStop(Timed, Trial):
         return cls(astern_rpm=request.keys["n_rpm"], duration=request.time(STOP), **request.keys)
 
 
-class Excitation(Timed):
+class Excitation(TimedManoeuvre):
     """Helm and shaft move about zero and n_rpm by a multisine or by random levels (APRBS), within rate limits."""
 
     signal: Literal["multisine", "aprbs"]
@@ -544,7 +546,7 @@ class Excitation(Timed):
     period: Annotated[Positive, Field(description="s, of the multisine")] = 200.0
     harmonics: Annotated[
         tuple[PositiveInt, PositiveInt],
-        AfterValidator(_rising),
+        AfterValidator(_check_rising),
         Field(description="lowest and highest of the multisine; assigned alternately to helm and shaft"),
     ] = (1, 20)
     hold: Annotated[Hold, Field(description="s, least and most of an APRBS level")] = (5.0, 20.0)
@@ -567,26 +569,28 @@ class Excitation(Timed):
 
     def _series(self, t: Array, channel: int, amplitude: float, rate: float | None) -> Array:
         """Excitation (T,) of one channel (0: helm, 1: shaft) about zero, in the unit of `amplitude`."""
-        after = _from(self.execute_at, t)
+        after = _is_after(self.execute_at, t)
         series = np.zeros(len(t))
         if amplitude == 0 or not after.any():
             return series
         key = (self.seed, "excitation", channel)
         time = t[after] - self.execute_at
         if self.signal == "aprbs":
-            series[after] = aprbs(time, hold=self.hold, levels=(-amplitude, amplitude), key=key)
+            series[after] = aprbs_series(time, hold=self.hold, levels=(-amplitude, amplitude), key=key)
         else:
             band = range(self.harmonics[0], self.harmonics[1] + 1)
-            harmonics = deal(band, 2)[channel] if self.angle_deg and self.amplitude_rpm else band
-            series[after] = multisine(time, period=self.period, harmonics=harmonics, amplitude=amplitude, key=key)
+            harmonics = deal_harmonics(band, 2)[channel] if self.angle_deg and self.amplitude_rpm else band
+            series[after] = multisine_series(
+                time, period=self.period, harmonics=harmonics, amplitude=amplitude, key=key
+            )
         if rate is None or len(t) < 2:
             return series
         return np.asarray(limit_rate(np.concatenate([[0.0], series]), float(t[1] - t[0]), rate)[1:])
 
 
 KINDS: dict[str, type[Manoeuvre]] = {
-    "turning": Turning,
-    "steps": Steps,
+    "turning": ConstantOrders,
+    "steps": StepManoeuvre,
     "turning_circle": TurningCircle,
     "pull_out": PullOut,
     "zigzag": Zigzag,
@@ -598,7 +602,7 @@ KINDS: dict[str, type[Manoeuvre]] = {
 """Name -> class of every kind. To add one, write the class and name it here."""
 
 
-def name_of(manoeuvre: Manoeuvre) -> str:
+def kind_name(manoeuvre: Manoeuvre) -> str:
     """Name of the kind of a manoeuvre in `KINDS`."""
     return next(name for name, kind in KINDS.items() if type(manoeuvre) is kind)
 
@@ -616,12 +620,12 @@ def order_keys(command: str) -> tuple[str, str]:
     return f"{command}{suffix}", f"{signal}{suffix}"
 
 
-def _from(moment: float, t: Array) -> NDArray[np.bool_]:
+def _is_after(moment: float, t: Array) -> NDArray[np.bool_]:
     """Mask (T,): whether t >= moment [s], with a tolerance for rounding."""
     return np.asarray(t >= moment - 1e-9 * max(1.0, moment))
 
 
-def _levels(levels: Sequence[float], hold: float, execute: float, t: Array) -> Array:
+def _level_series(levels: Sequence[float], hold: float, execute: float, t: Array) -> Array:
     """Series (T,): 0 until `execute` [s], then each level for `hold` [s], and the last to the end."""
     number = np.floor((t - execute) / hold + 1e-9).astype(int)
     return np.where(number < 0, 0.0, np.array(levels, dtype=float)[np.clip(number, 0, len(levels) - 1)])

@@ -14,14 +14,14 @@ from shipid.measures.criteria import criteria
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
-from shipid.physics.signals import ACTUAL, neutral, signal_of, steers
+from shipid.physics.signals import ACTUAL, is_steering, neutral_value, signal_of
 from shipid.report.manoeuvre import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
-from shipid.simulation.perform import perform
-from shipid.simulation.standard import Standard, standard
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.standard import Standard, define_standard
 from shipid.units import RPM
 from shipid.version import __version__
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.outline import ship_outline
 from shipid.vessel.schema import term_blocks
@@ -33,7 +33,7 @@ SLOW, FAST = 0.9, 1.1  # of the service speed: the approach of the tests
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredManoeuvre:
     """A simulated standard manoeuvre with its measures.
 
     Parameters
@@ -63,13 +63,13 @@ def measure_standard(
     step: float | None = None,
     approach: str | None = None,
     engine: str = "auto",
-) -> Measured:
-    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `standard`.
+) -> MeasuredManoeuvre:
+    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `define_standard`.
 
     engine : of the rollout; `repeated` where many vessels of one structure follow.
     approach : None: with the helm amidships; where the ship then does not go straight, a helmsman holds the course.
 
-    Raises ShipidError as `standard` and `perform` do.
+    Raises ShipidError as `define_standard` and `perform_manoeuvres` do.
     """
     how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step, "approach": approach}
     return measure_all(vessel, [(name, angles, side)], engine=engine, **how)[0]
@@ -84,19 +84,19 @@ def measure_all(
     step: float | None = None,
     approach: str | None = None,
     engine: str = "auto",
-) -> list[Measured]:
+) -> list[MeasuredManoeuvre]:
     """Simulate standard manoeuvres from one approach, each a name, angles [deg] and side; see `measure_standard`."""
     how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step}
     for given in (approach,) if approach else ("steady", "helmsman"):
         chosen = list[Standard]()
         for name, angles, side in wanted:
             n = chosen[0].manoeuvre.n_rpm * RPM if chosen else None
-            chosen.append(standard(vessel, name, angles, side=side, approach=given, n=n, **how))
+            chosen.append(define_standard(vessel, name, angles, side=side, approach=given, n=n, **how))
         runs = [
             one.manoeuvre.model_copy(update={"name": f"{one.kind}-{number + 1}"}) for number, one in enumerate(chosen)
         ]
         try:
-            log = perform(vessel, runs, step=chosen[0].step, interval=chosen[0].interval, engine=engine)
+            log = perform_manoeuvres(vessel, runs, step=chosen[0].step, interval=chosen[0].interval, engine=engine)
         except NotStraight:
             if approach is not None or given == "helmsman":
                 raise
@@ -104,26 +104,26 @@ def measure_all(
         break
     log = log[[column for column in log if not str(column).startswith(ACTUAL)]]
     return [
-        _read(vessel, one, log[log["run"] == run.name].reset_index(drop=True))
+        _measure_log(vessel, one, log[log["run"] == run.name].reset_index(drop=True))
         for one, run in zip(chosen, runs, strict=True)
     ]
 
 
-def _read(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measured:
+def _measure_log(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> MeasuredManoeuvre:
     """The measures of one log."""
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
-    record = record_of(_within_stops(vessel, columns), Controls(vessel).effects[1])
+    record = record_of(_limit_angles(vessel, columns), Controls(vessel).effects[1])
     measures, length = chosen.manoeuvre.measured(record), vessel.length
     judged = criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
     else:
-        remarks = [_other_speed(vessel, chosen.speed), _thrust_astern(vessel) if chosen.kind == "stop" else ""]
+        remarks = [_speed_remark(vessel, chosen.speed), _thrust_remark(vessel) if chosen.kind == "stop" else ""]
         judged = [replace(one, note="; ".join(filter(None, [*remarks, one.note]))) for one in judged]
-    return Measured(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
+    return MeasuredManoeuvre(vessel, chosen, frame, record, measure_rows(measures, length), criterion_rows(judged))
 
 
-def _other_speed(vessel: Vessel, speed: float) -> str:
+def _speed_remark(vessel: Vessel, speed: float) -> str:
     """Whether the approach speed [m/s] is another than that of the tests, as far as U_0 says; empty near it."""
     service = vessel.document.get("particulars", {}).get("U_0", speed)
     if SLOW <= speed / service <= FAST:
@@ -131,7 +131,7 @@ def _other_speed(vessel: Vessel, speed: float) -> str:
     return f"the approach is at {speed:.3g} m/s, {speed / service:.2g} times the service speed U_0"
 
 
-def _thrust_astern(vessel: Vessel) -> str:
+def _thrust_remark(vessel: Vessel) -> str:
     """Which screws push astern by the polynomial of ahead, which was not measured there; empty if none does."""
     ahead = [
         path
@@ -141,10 +141,10 @@ def _thrust_astern(vessel: Vessel) -> str:
     return f"thrust astern of {', '.join(ahead)} is extrapolated: K_T is for ahead, give K_T_astern" if ahead else ""
 
 
-def _within_stops(vessel: Vessel, columns: Mapping[str, Any]) -> dict[str, Any]:
+def _limit_angles(vessel: Vessel, columns: Mapping[str, Any]) -> dict[str, Any]:
     """The columns, with every angle kept within the stops of its gear: the helm is what the gear does of an order."""
     numbers, result = vessel.parameters, dict(columns)
-    for name in filter(steers, dynamics(vessel).commands):
+    for name in filter(is_steering, vessel_dynamics(vessel).commands):
         component, _, signal = name.rpartition(".")
         gear = f"thruster.{component}.actuator.{signal}"
         low, high = numbers.get(f"{gear}.low", -np.inf), numbers.get(f"{gear}.high", np.inf)
@@ -152,10 +152,10 @@ def _within_stops(vessel: Vessel, columns: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def approached(measured: Measured) -> str:
+def approach_words(measured: MeasuredManoeuvre) -> str:
     """The approach in words."""
     chosen = measured.standard
-    pitches = {neutral(name) for name in dynamics(measured.vessel).commands if signal_of(name) == "pitch"}
+    pitches = {neutral_value(name) for name in vessel_dynamics(measured.vessel).commands if signal_of(name) == "pitch"}
     shaft = ", ".join([f"{chosen.manoeuvre.n_rpm:.4g} rpm", *(f"P/D {pitch:g} ordered" for pitch in pitches)])
     if chosen.manoeuvre.approach == "rest":
         return f"from rest, {shaft}"
@@ -163,7 +163,7 @@ def approached(measured: Measured) -> str:
     return f"approach at {chosen.speed:.3g} m/s ({shaft}){held}"
 
 
-def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
+def measure_trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, Any]], list[str]]:
     """Criteria of IMO MSC.137(76) for a turn at 35 deg of helm and zigzags 10/10 and 20/20, one dict for each.
 
     Also why this vessel cannot perform some of them, one sentence a reason. `speed` [m/s] is that of the approach.
@@ -178,7 +178,7 @@ def trials(vessel: Vessel, speed: float | None = None) -> tuple[list[dict[str, A
     return rows, [f"{', '.join(names)}: {message}" for message, names in refused.items()]
 
 
-def _to_the_end(log: pd.DataFrame, measured: Measured) -> pd.DataFrame:
+def _cut_at_end(log: pd.DataFrame, measured: MeasuredManoeuvre) -> pd.DataFrame:
     """Rows up to the end of the manoeuvre itself, as its kind says."""
     ends = measured.standard.manoeuvre.ends
     known = {row["measure"]: float(row["value"]) for row in measured.measures}
@@ -186,7 +186,7 @@ def _to_the_end(log: pd.DataFrame, measured: Measured) -> pd.DataFrame:
     return log[: int(np.searchsorted(log["t"], end)) + 1] if np.isfinite(end) else log
 
 
-def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent:
+def manoeuvre_content(measured: MeasuredManoeuvre, command: str = "") -> ManoeuvreContent:
     """Assemble the report page of a manoeuvre; `command` is the command line that reproduces it."""
     ship, chosen, record = measured.vessel, measured.standard, measured.record
     columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
@@ -196,14 +196,14 @@ def manoeuvre_content(measured: Measured, command: str = "") -> ManoeuvreContent
         title=f"{ship.name}: {chosen.title}",
         name=chosen.kind,
         first=chosen.manoeuvre.first,
-        log=_to_the_end(pd.DataFrame({**columns, "shaft": shaft}), measured),
+        log=_cut_at_end(pd.DataFrame({**columns, "shaft": shaft}), measured),
         measures=pd.DataFrame(measured.measures),
         criteria=pd.DataFrame(measured.criteria),
         outline=ship_outline(ship.document["particulars"]),
         levels=pd.DataFrame({"helm": steady.helm, "rate": steady.rate}),
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
-            "Approach": f"{approached(measured)}, calm deep water, no wind",
+            "Approach": f"{approach_words(measured)}, calm deep water, no wind",
             "Simulation": f"steps of {chosen.step:g} s, rows of {chosen.interval:g} s",
             "shipid": __version__,
         },

@@ -10,25 +10,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.arguments import by_name, names_of, numbers, one_of, positive, steps_in
-from shipid.engine.casadi import orders_of, outputs_of
-from shipid.engine.engines import named
+from shipid.arguments import as_float_array, as_names, check_choice, check_mapping, check_positive, whole_steps
+from shipid.engine.casadi import evaluate_orders, evaluate_outputs
+from shipid.engine.engines import engine_by_name
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
-from shipid.errors import DocumentError, ShipidError, choices
+from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics.helm import Helmsman
-from shipid.physics.signals import ACTUAL, measurable
-from shipid.simulation.approach import Controls, steady
-from shipid.simulation.log import logged, run_names
-from shipid.simulation.manoeuvre import Approached, Manoeuvre
+from shipid.physics.signals import ACTUAL, measurable_signals
+from shipid.simulation.approach import Controls, steady_approach
+from shipid.simulation.log import log_columns, number_runs
+from shipid.simulation.manoeuvre import ApproachedManoeuvre, Manoeuvre
 from shipid.units import DEGREE
-from shipid.vessel.dynamics import HELM, Dynamics, dynamics
+from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
 
 
-def perform(
+def perform_manoeuvres(
     vessel: Vessel,
     manoeuvres: Iterable[Manoeuvre] | Manoeuvre,
     *,
@@ -67,25 +67,25 @@ def perform(
     ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step, a
         time that is not positive, an unknown method or output.
     """
-    manoeuvres = _listed(manoeuvres)
-    step = positive("step", step)
-    between = step if interval is None else positive("interval", interval)
+    manoeuvres = _check_manoeuvres(manoeuvres)
+    step = check_positive("step", step)
+    between = step if interval is None else check_positive("interval", interval)
     if duration is not None:
-        duration = positive("duration", duration)
-    every = steps_in(between, step)
+        duration = check_positive("duration", duration)
+    every = whole_steps(between, step)
     if not every:
         raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
-    names = _names(manoeuvres)
-    rows = [_rows(one.length if duration is None else duration, between) for one in manoeuvres]
+    names = _run_names(manoeuvres)
+    rows = [_count_rows(one.length if duration is None else duration, between) for one in manoeuvres]
     environment = {} if environment is None else environment
-    by_name("environment", environment, "a name to a number or an array")
-    weather = _weather(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
-    one_of("method", method, get_args(Method))
-    named(engine, "cpu")
-    seas = _seas({} if components is None else components, len(manoeuvres))
-    outputs = names_of("outputs", outputs)
+    check_mapping("environment", environment, "a name to a number or an array")
+    weather = _environment_series(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
+    check_choice("method", method, get_args(Method))
+    engine_by_name(engine, "cpu")
+    seas = _check_components({} if components is None else components, len(manoeuvres))
+    outputs = as_names("outputs", outputs)
     for name in outputs:
-        one_of("outputs", name, dynamics(vessel).outputs)
+        check_choice("outputs", name, vessel_dynamics(vessel).outputs)
     controls = Controls(vessel)
     groups: dict[Helmsman | None, list[int]] = {}
     for place, one in enumerate(manoeuvres):
@@ -100,7 +100,7 @@ def perform(
             {channel: values[:, places] for channel, values in weather.items()},
             {path: drawn[places] for path, drawn in seas.items()},
         )
-        columns = _together(controls, helmsman, batch, every, how, outputs)
+        columns = _perform_batch(controls, helmsman, batch, every, how, outputs)
         for sample, place in enumerate(places):
             logs[place] = {name: values[: rows[place], sample] for name, values in columns.items()}
     frame: dict[str, Any] = {"run": np.repeat(names, rows)}
@@ -109,7 +109,7 @@ def perform(
     return pd.DataFrame(frame | {"flags": np.zeros(sum(rows), dtype=np.int64)})
 
 
-def _listed(given: Any) -> list[Manoeuvre]:
+def _check_manoeuvres(given: Any) -> list[Manoeuvre]:
     """One manoeuvre or several as a list; ShipidError for what is none, and for no manoeuvre."""
     given = [given] if isinstance(given, Manoeuvre | str) else given
     if not isinstance(given, Iterable):
@@ -124,18 +124,18 @@ def _listed(given: Any) -> list[Manoeuvre]:
     return manoeuvres
 
 
-def _names(manoeuvres: Sequence[Manoeuvre]) -> list[str]:
+def _run_names(manoeuvres: Sequence[Manoeuvre]) -> list[str]:
     """Name of each run, a number where the manoeuvre has none; DocumentError where two are the same."""
-    names = [one.name or number for one, number in zip(manoeuvres, run_names(len(manoeuvres)), strict=True)]
+    names = [one.name or number for one, number in zip(manoeuvres, number_runs(len(manoeuvres)), strict=True)]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DocumentError(f"two runs are named {twice!r}", path="manoeuvre.name")
     return names
 
 
-def _seas(components: Mapping[str, Array], count: int) -> dict[str, Array]:
+def _check_components(components: Mapping[str, Array], count: int) -> dict[str, Array]:
     """Wave components (count, ...) by the path of their term; ShipidError for another number of ships."""
-    by_name("components", components, "the path of a term to an array")
+    check_mapping("components", components, "the path of a term to an array")
     seas = {path: np.atleast_1d(drawn) for path, drawn in components.items()}
     for path, drawn in seas.items():
         if len(drawn) != count:
@@ -154,7 +154,7 @@ class _Batch:
     seas: Mapping[str, Array]
 
 
-def _together(
+def _perform_batch(
     controls: Controls,
     helmsman: Helmsman | None,
     batch: _Batch,
@@ -164,12 +164,12 @@ def _together(
 ) -> dict[str, Array]:
     """Columns (rows, num_samples) of the logs of a batch, from one rollout with the length of the longest."""
     vessel, num_steps = controls.vessel, every * (batch.rows - 1)
-    model, t = dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
-    start, memory, helms = _start(batch.manoeuvres, controls, how)
+    model, t = vessel_dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
+    start, memory, helms = _initial_states(batch.manoeuvres, controls, how)
     inputs = [one.inputs(controls, t, speed) for one, speed in zip(batch.manoeuvres, start["u"], strict=True)]
     for sample, helm in helms.items():
         one = batch.manoeuvres[sample]
-        assert isinstance(one, Approached)
+        assert isinstance(one, ApproachedManoeuvre)
         inputs[sample] = one.held(inputs[sample], t, helm)
     commands = {name: np.stack([one[name] for one in inputs], axis=1) for name in inputs[0]}
     if helmsman is None:
@@ -180,7 +180,7 @@ def _together(
     path = rollout(
         vessel,
         start,
-        _held(commands),
+        _reduce_constant(commands),
         {name: values[0] if len(values) == 1 else values[:-1] for name, values in weather.items()},
         num_steps=num_steps,
         every=every,
@@ -197,43 +197,45 @@ def _together(
         )
     moments = np.arange(batch.rows) * every
     felt = {name: values[np.minimum(moments, len(values) - 1)] for name, values in weather.items()}
-    log = logged(path, model.state)
+    log = log_columns(path, model.state)
     steps = np.minimum(moments, num_steps - 1)
     if helmsman is None:
         log |= {name: commands[name][steps] + 0.0 for name in model.ordered}
     else:
-        log |= _of_records(model.ordered, orders_of, vessel, model, path, commands, felt, steps)
+        log |= _evaluate_records(model.ordered, evaluate_orders, vessel, model, path, commands, felt, steps)
     if outputs:
-        shown = _of_records(tuple(model.outputs), outputs_of, vessel, model, path, commands, felt, steps)
+        shown = _evaluate_records(tuple(model.outputs), evaluate_outputs, vessel, model, path, commands, felt, steps)
         log |= {name: shown[name] for name in outputs}
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"{ACTUAL}{name}": path[f"{ACTUAL}{name}"][:, 0] for name in lagged}
-    return log | {name: felt[name] for name in measurable(felt)}
+    return log | {name: felt[name] for name in measurable_signals(felt)}
 
 
-def _held(commands: Mapping[str, Array]) -> dict[str, Array]:
+def _reduce_constant(commands: Mapping[str, Array]) -> dict[str, Array]:
     """Commands (T, num_samples); reduced to (num_samples,) if all are constant, which is faster in the engines."""
     if all((values == values[0]).all() for values in commands.values()):
         return {name: values[0] for name, values in commands.items()}
     return dict(commands)
 
 
-def _rows(length: float, interval: float) -> int:
+def _count_rows(length: float, interval: float) -> int:
     """Number of rows of a log of `length` [s] with rows every `interval` [s], first row included; at least 2."""
-    return max(steps_in(length, interval) or int(length / interval), 1) + 1
+    return max(whole_steps(length, interval) or int(length / interval), 1) + 1
 
 
-def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int) -> dict[str, Array]:
+def _environment_series(
+    vessel: Vessel, environment: Mapping[str, float | Array], count: int, instants: int
+) -> dict[str, Array]:
     """Channel of the vessel's environment -> (1 or num_instants, num_manoeuvres)."""
-    names = dynamics(vessel).environment
+    names = vessel_dynamics(vessel).environment
     unknown = next((name for name in environment if name not in names), None)
     if unknown is not None:
         raise DocumentError(
-            f"{vessel.name} has no environment channel {unknown!r}: {choices(unknown, names)}",
+            f"{vessel.name} has no environment channel {unknown!r}: {suggest_name(unknown, names)}",
             file=vessel.file,
             path="environment",
         )
-    given = {name: numbers(f"environment {name!r}", environment.get(name, 0.0)) for name in names}
+    given = {name: as_float_array(f"environment {name!r}", environment.get(name, 0.0)) for name in names}
     for name, values in given.items():
         if values.shape not in ((), (count,), (instants, count)):
             wanted = f"one value or {count}, one a manoeuvre, or a series ({instants}, {count})"
@@ -244,14 +246,14 @@ def _weather(vessel: Vessel, environment: Mapping[str, float | Array], count: in
     }
 
 
-def _start(
+def _initial_states(
     manoeuvres: Sequence[Manoeuvre], controls: Controls, how: Mapping[str, Any]
 ) -> tuple[dict[str, Array], dict[str, Array], dict[int, dict[str, float]]]:
     """States and actuator states at t = 0, name -> (num_manoeuvres,); actuators are at 0 without an approach.
 
     Also, for each manoeuvre whose approach a helmsman holds, angle command -> helm [rad].
     """
-    model, count = dynamics(controls.vessel), len(manoeuvres)
+    model, count = vessel_dynamics(controls.vessel), len(manoeuvres)
     starts = [one.start for one in manoeuvres]
     start = {name: np.zeros(count) for name in (*model.state, *model.hidden)}
     memory = {name: np.zeros(count) for name in model.memory}
@@ -261,7 +263,7 @@ def _start(
         if not moving:
             continue
         speeds, which = np.unique([starts[sample].shaft for sample in moving], return_inverse=True)
-        settled = steady(controls, speeds, held=held, **how)
+        settled = steady_approach(controls, speeds, held=held, **how)
         for into, values_of in ((start, settled.state), (memory, settled.memory)):
             for name, values in values_of.items():
                 into[name][moving] = values[which]
@@ -272,7 +274,7 @@ def _start(
     return start, memory, helms
 
 
-def _of_records(
+def _evaluate_records(
     names: Sequence[str],
     function: Callable[..., Array],
     vessel: Vessel,

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from shipid.simulation.approach import Controls
-from shipid.vessel.stability import growths
+from shipid.vessel.stability import yaw_growths
 
 Side = Literal["starboard", "port"]
 DECAYS, LONGEST = 8.0, 200.0  # until a turn is steady: time constants of a small yaw, and at most ship lengths
@@ -61,11 +61,11 @@ class Request:
         The time is eight time constants of a small yaw about the straight course of the approach, the slowest of all
         turns, but at most that for 200 ship lengths.
         """
-        rates = growths(self.controls.vessel, self.speed, self.controls.ahead(self.n))
+        rates = yaw_growths(self.controls.vessel, self.speed, self.controls.ahead(self.n))
         decay = min(map(abs, rates)) * self.passing  # in a ship length
         return float(np.clip(DECAYS / decay if decay > 0 else np.inf, least, LONGEST))
 
 
-def in_rows(time: float, interval: float) -> float:
+def round_to_rows(time: float, interval: float) -> float:
     """The time [s] in whole intervals, rounded up."""
     return float(np.ceil(time / interval) * interval)

@@ -10,15 +10,15 @@ import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid import document as documents
-from shipid.capacity import too_much
-from shipid.errors import DocumentError, ShipidError, choices
+from shipid.capacity import excess_memory_words
+from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
-from shipid.simulation.perform import perform
-from shipid.simulation.truth import LONGEST, Truth, simulate
-from shipid.units import plural
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.truth import LONGEST, Truth, simulate_truth
+from shipid.units import plural_word
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
@@ -34,7 +34,7 @@ class Script(BaseModel):
     interval: Annotated[Positive, Field(description="s between logged rows, a multiple of step")] = 1.0
 
 
-def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
+def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
     """Simulate a vessel by the manoeuvres of a document; the columns are those of a dataset.
 
     Parameters
@@ -45,48 +45,48 @@ def simulated(vessel: Vessel, name: str) -> pd.DataFrame:
 
     Raises DocumentError with file, path and remedy for what this vessel cannot perform.
     """
-    file = documents.find(name, "studies")
-    document = documents.read(file)
+    file = documents.find_document(name, "studies")
+    document = documents.read_document(file)
     documents.check_values(document, file)
     truth = document.get("truth")
     try:
         if isinstance(truth, Mapping):
             drawn = {key: value for key, value in truth.items() if key != "set"} | {"vessel": vessel.key}
-            declared: Truth = documents.parse(Truth, drawn, file, "truth")
-            _check_size(vessel, declared.manoeuvres, declared.length, declared.step, "truth.duration")
-            return simulate(declared, vessel)
+            declared: Truth = documents.parse_model(Truth, drawn, file, "truth")
+            _check_run_size(vessel, declared.manoeuvres, declared.length, declared.step, "truth.duration")
+            return simulate_truth(declared, vessel)
         if "manoeuvre" not in document:
             raise DocumentError("holds no manoeuvres: give a [truth], or [[manoeuvre]] blocks")
-        script = documents.parse(Script, document, file)
-        manoeuvres = _given(script, vessel)
-        _check_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step, "manoeuvre")
-        frame = perform(vessel, manoeuvres, step=script.step, interval=script.interval)
+        script = documents.parse_model(Script, document, file)
+        manoeuvres = _script_manoeuvres(script, vessel)
+        _check_run_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step, "manoeuvre")
+        frame = perform_manoeuvres(vessel, manoeuvres, step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
 
 
-def _check_size(vessel: Vessel, count: int, length: float, step: float, path: str) -> None:
+def _check_run_size(vessel: Vessel, count: int, length: float, step: float, path: str) -> None:
     """Raise DocumentError for runs, of `length` and `step` [s], that no machine would end or that exceed this one.
 
     path : of what makes them long; the step is in the same block, or beside it.
     """
     if length > LONGEST:
         raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s, make it shorter", path=path)
-    if fault := too_much(count * length / step * 2 * len(dynamics(vessel).commands)):
-        words = f"{step:g} s: {count} {plural(count, 'run')} of {length:g} s {fault}"
+    if fault := excess_memory_words(count * length / step * 2 * len(vessel_dynamics(vessel).commands)):
+        words = f"{step:g} s: {count} {plural_word(count, 'run')} of {length:g} s {fault}"
         raise DocumentError(words, path=f"{path.rpartition('.')[0]}.step".removeprefix("."))
 
 
-def _given(script: Script, vessel: Vessel) -> list[Manoeuvre]:
+def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
     """The manoeuvres of a document, which this vessel can perform."""
     controls, manoeuvres = Controls(vessel), []
     for place, block in enumerate(script.manoeuvre):
         kind, where = str(block.get("kind", "")), f"manoeuvre.{place}"
         if kind not in KINDS:
-            raise DocumentError(f"{kind!r} is no kind of manoeuvre: {choices(kind, KINDS)}", path=f"{where}.kind")
+            raise DocumentError(f"{kind!r} is no kind of manoeuvre: {suggest_name(kind, KINDS)}", path=f"{where}.kind")
         rest = {key: value for key, value in block.items() if key != "kind"}
-        one: Manoeuvre = documents.parse(KINDS[kind], rest, None, where)
+        one: Manoeuvre = documents.parse_model(KINDS[kind], rest, None, where)
         try:
             one.check(controls)
         except DocumentError as error:

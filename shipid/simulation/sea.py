@@ -8,12 +8,12 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, PositiveInt
 
-from shipid.checked import Checked
+from shipid.checked import CheckedModel
 from shipid.physics.grammar import AXES
 from shipid.physics.waves import EVEN
 from shipid.units import GRAVITY
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import uniform
+from shipid.vessel.perturb import uniform_draw
 from shipid.vessel.schema import term_blocks
 
 Array = np.ndarray
@@ -21,7 +21,7 @@ LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a J
 SIDE = {axis: 1 if place in EVEN else -1 for place, axis in enumerate(AXES)}  # in the relative heading: -1 for odd
 
 
-class Sea(Checked, BaseModel):
+class Sea(CheckedModel, BaseModel):
     """`[truth.waves]`: an irregular sea with a JONSWAP spectrum, long-crested unless `spreading` is given.
 
     Its components hold 99 % of the energy: those from half to 3.2 times the peak frequency.
@@ -43,7 +43,7 @@ class Sea(Checked, BaseModel):
         return LOWEST * peak, HIGHEST * peak
 
 
-def jonswap(omega: Array, sea: Sea) -> Array:
+def jonswap_spectrum(omega: Array, sea: Sea) -> Array:
     """S(omega) [m^2 s] with m_0 = H_s^2 / 16 (Hasselmann et al. 1973; normalised numerically over its whole range)."""
     peak = 2 * np.pi / sea.T_p
 
@@ -60,11 +60,11 @@ def jonswap(omega: Array, sea: Sea) -> Array:
 def share_outside(sea: Sea, low: float, high: float) -> float:
     """Share (0 to 1) of the energy of the components below `low` or above `high` [rad/s]."""
     omega = np.linspace(*sea.range, 2001)
-    energy = jonswap(omega, sea.model_copy(update={"H_s": 1.0}))
+    energy = jonswap_spectrum(omega, sea.model_copy(update={"H_s": 1.0}))
     return float(energy[(omega < low) | (omega > high)].sum() / energy.sum())
 
 
-def table_range(vessel: Vessel) -> tuple[float, float]:
+def wave_table_range(vessel: Vessel) -> tuple[float, float]:
     """Lowest and highest frequency [rad/s] that all wave tables of a vessel contain."""
     blocks = [block for _, key, block in term_blocks(vessel.document) if key.startswith("waves.")]
     columns = [block["table"]["omega"] for block in blocks]
@@ -80,8 +80,8 @@ def draw_components(sea: Sea, direction: Array, names: Sequence[Any]) -> dict[st
     """
     edges = np.linspace(*sea.range, sea.components + 1)
     fine = np.linspace(edges[:-1], edges[1:], 33)
-    energy = np.trapezoid(jonswap(fine, sea), fine, axis=0)
-    rows = [np.random.default_rng(int(uniform("sea", name) * 2**53)).random((3, sea.components)) for name in names]
+    energy = np.trapezoid(jonswap_spectrum(fine, sea), fine, axis=0)
+    rows = [np.random.default_rng(int(uniform_draw("sea", name) * 2**53)).random((3, sea.components)) for name in names]
     jitter, phase, turn = np.array(rows).reshape(-1, 3, sea.components).transpose(1, 0, 2)
     spread = np.zeros_like(turn) if sea.spreading is None else spread_angles(sea.spreading, turn)
     return {
@@ -109,31 +109,33 @@ def wave_loads(vessel: Vessel, drawn: Mapping[str, Array]) -> dict[str, Array]:
     for path, key, block in term_blocks(vessel.document):
         if key == "waves.first_order":
             g = vessel.document.get("constants", {}).get("g", GRAVITY)
-            result[path] = _first_order(block, drawn, g)
+            result[path] = _first_order_loads(block, drawn, g)
         elif key == "waves.drift":
-            result[path] = _drift(block, drawn)
+            result[path] = _drift_loads(block, drawn)
     return result
 
 
-def _first_order(block: Mapping[str, Any], drawn: Mapping[str, Array], g: float) -> Array:
+def _first_order_loads(block: Mapping[str, Any], drawn: Mapping[str, Array], g: float) -> Array:
     columns = {name: np.asarray(values) for name, values in block["table"].items()}
     series = [
-        fourier(columns, columns[f"{axis}_real"] + 1j * columns[f"{axis}_imag"], SIDE[axis], block["harmonics"])
+        heading_series(columns, columns[f"{axis}_real"] + 1j * columns[f"{axis}_imag"], SIDE[axis], block["harmonics"])
         for axis in SIDE
     ]
     omega, grid = drawn["omega"], np.unique(columns["omega"])
-    coefficients_by_axis = [interpolate(omega, grid, one) * drawn["amplitude"][..., None] for one in series]
+    coefficients_by_axis = [interpolate_lagrange(omega, grid, one) * drawn["amplitude"][..., None] for one in series]
     coefficients = np.concatenate(coefficients_by_axis, axis=-1)
     head = (omega, omega**2 / g, np.cos(drawn["chi"]), np.sin(drawn["chi"]), drawn["epsilon"])
     return np.concatenate([np.stack(head, axis=-1), coefficients.real, coefficients.imag], axis=-1)
 
 
-def _drift(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
+def _drift_loads(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
     """Mean drift: components of one direction are summed beforehand."""
     columns = {name: np.asarray(values) for name, values in block["table"].items()}
     grid = np.unique(columns["omega"])
     coefficients_by_axis = [
-        interpolate(drawn["omega"], grid, fourier(columns, columns[f"{axis}_drift"], SIDE[axis], block["harmonics"]))
+        interpolate_lagrange(
+            drawn["omega"], grid, heading_series(columns, columns[f"{axis}_drift"], SIDE[axis], block["harmonics"])
+        )
         for axis in ("X", "Y", "N")
     ]
     series = np.concatenate(coefficients_by_axis, axis=-1) * drawn["amplitude"][..., None] ** 2
@@ -143,7 +145,7 @@ def _drift(block: Mapping[str, Any], drawn: Mapping[str, Array]) -> Array:
     return np.concatenate([np.cos(chi)[..., None], np.sin(chi)[..., None], series], axis=-1)
 
 
-def fourier(columns: Mapping[str, Array], values: Array, side: int, harmonics: int) -> Array:
+def heading_series(columns: Mapping[str, Array], values: Array, side: int, harmonics: int) -> Array:
     """Coefficients (num_omega, harmonics + 1) of a cosine (side 1) or sine (side -1) series in the relative heading.
 
     The table must hold, for each frequency, the same equally spaced headings from 0 to 180 deg.
@@ -164,7 +166,7 @@ def fourier(columns: Mapping[str, Array], values: Array, side: int, harmonics: i
     return result if np.iscomplexobj(values) else result.real
 
 
-def interpolate(x: Array, grid: Array, values: Array) -> Array:
+def interpolate_lagrange(x: Array, grid: Array, values: Array) -> Array:
     """Four-point Lagrange interpolation of values (len(grid), n) at x (...); zero above the grid, held below it."""
     first = np.clip(np.searchsorted(grid, x) - 2, 0, len(grid) - 4)
     places = first[..., None] + np.arange(4)

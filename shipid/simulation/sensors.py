@@ -10,11 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from shipid.arguments import steps_in
-from shipid.checked import Checked
-from shipid.errors import DocumentError, choices
-from shipid.physics.signals import wraps
-from shipid.vessel.perturb import uniform
+from shipid.arguments import whole_steps
+from shipid.checked import CheckedModel
+from shipid.errors import DocumentError, suggest_name
+from shipid.physics.signals import is_wrapped_angle
+from shipid.vessel.perturb import uniform_draw
 
 Array = NDArray[np.float64]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
@@ -23,7 +23,7 @@ UNMEASURED = ("run", "t", "flags")
 SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
 
-class Sensor(Checked, BaseModel):
+class Sensor(CheckedModel, BaseModel):
     """One sensor of a `sensors` table: column -> block, in the SI unit of the column."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -38,7 +38,7 @@ class Sensor(Checked, BaseModel):
     quantum: Annotated[NotNegative, Field(description="samples are rounded to its multiples; 0: not rounded")] = 0.0
 
 
-def measure(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
+def measure_record(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
     """Measured log of a true record: a frame with the columns of `fine` and a row every `interval` [s] of each run.
 
     A sample is the true value at the time minus `latency` (linear between rows; the first value before the start), plus
@@ -54,34 +54,36 @@ def measure(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, 
     ------
     DocumentError : a sensor has no column, or `interval` is no multiple of the record's step.
     """
-    _check_columns(sensors, [str(name) for name in fine.columns])
-    logs = [_log(str(run), rows, sensors, interval, seed) for run, rows in fine.groupby("run", sort=False)]
+    _check_sensor_columns(sensors, [str(name) for name in fine.columns])
+    logs = [_measure_run(str(run), rows, sensors, interval, seed) for run, rows in fine.groupby("run", sort=False)]
     return pd.concat(logs, ignore_index=True)
 
 
-def _check_columns(sensors: Mapping[str, Sensor], columns: list[str]) -> None:
+def _check_sensor_columns(sensors: Mapping[str, Sensor], columns: list[str]) -> None:
     valid = [name for name in columns if name not in UNMEASURED]
     for name in sensors:
         if name not in valid:
-            raise DocumentError(f"no column {name!r} to measure: {choices(name, valid)}", path="sensors")
+            raise DocumentError(f"no column {name!r} to measure: {suggest_name(name, valid)}", path="sensors")
 
 
-def _log(run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
+def _measure_run(
+    run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int
+) -> pd.DataFrame:
     """Measured log of one run."""
-    step = _step(run, rows["t"].to_numpy())
-    stride = steps_in(interval, step)
+    step = _clock_step(run, rows["t"].to_numpy())
+    stride = whole_steps(interval, step)
     if not stride:
         message = f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s"
         raise DocumentError(message, path="interval")
     log = rows.iloc[::stride].copy()
     for name, sensor in sensors.items():
         truth = rows[name].to_numpy(dtype=np.float64)
-        truth = np.unwrap(truth) if wraps(name) else truth
-        log[name] = _samples(sensor, truth, step, stride, (seed, run, name))
+        truth = np.unwrap(truth) if is_wrapped_angle(name) else truth
+        log[name] = _sensor_samples(sensor, truth, step, stride, (seed, run, name))
     return log
 
 
-def _step(run: str, t: Array) -> float:
+def _clock_step(run: str, t: Array) -> float:
     """Step [s] of the clock t (N,) of one run."""
     step = float(t[-1] - t[0]) / max(len(t) - 1, 1)
     if len(t) < 2 or np.abs(np.diff(t) - step).max() > 1e-3 * step:
@@ -89,31 +91,33 @@ def _step(run: str, t: Array) -> float:
     return step
 
 
-def _samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[Any, ...]) -> Array:
+def _sensor_samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[Any, ...]) -> Array:
     """Output of a sensor at every `stride`-th row of the true values (N,), which are `step` [s] apart."""
     logged = np.arange(0, len(truth), stride)  # all clocks below count rows of the record from the run's first
     period = stride if sensor.interval is None else sensor.interval / step
     latest = np.floor(logged / period + SAME)  # number of the last sample taken by each logged row
     taken, which = np.unique(latest, return_inverse=True)  # samples between logged rows are not needed
-    values = _at(truth, taken * period - sensor.latency / step)
-    values = values + sensor.bias * _normal(1, *key, "bias") + sensor.noise * _normal(len(taken), *key, "noise")
+    values = _value_at_row(truth, taken * period - sensor.latency / step)
+    values = (
+        values + sensor.bias * _normal_draws(1, *key, "bias") + sensor.noise * _normal_draws(len(taken), *key, "noise")
+    )
     if sensor.quantum > 0:
         values = sensor.quantum * np.rint(values / sensor.quantum)
     return np.asarray(values[which])
 
 
-def _at(truth: Array, place: Array) -> Array:
+def _value_at_row(truth: Array, place: Array) -> Array:
     """Values (N,) at fractional row numbers: linear between rows, constant before the first, exact at a row."""
     nearest = np.rint(place)
     place = np.where(np.abs(place - nearest) < SAME, nearest, place)
     return np.interp(place, np.arange(len(truth)), truth)
 
 
-def _normal(count: int, *key: Any) -> Array:
+def _normal_draws(count: int, *key: Any) -> Array:
     """Standard normal draws (count,) that depend only on the key; a longer series begins with the shorter one.
 
     Box-Muller transform of PCG64's raw output: NumPy guarantees the raw output for all versions, but not its normals.
     """
-    raw = np.random.PCG64(int(uniform(*key) * 2**53)).random_raw(2 * count).reshape(count, 2)
+    raw = np.random.PCG64(int(uniform_draw(*key) * 2**53)).random_raw(2 * count).reshape(count, 2)
     first, second = ((raw >> np.uint64(11)) / 2.0**53).T
     return np.asarray(np.sqrt(-2 * np.log1p(-first)) * np.cos(2 * np.pi * second))

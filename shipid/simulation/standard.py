@@ -9,13 +9,13 @@ from typing import cast, get_args
 
 import numpy as np
 
-from shipid.arguments import number, numbers, of_class
+from shipid.arguments import as_float_array, check_class, check_number
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import ShipidError, choices
-from shipid.simulation.approach import Controls, balanced_shaft, service_speed
+from shipid.errors import ShipidError, suggest_name
+from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
 from shipid.simulation.manoeuvre import KINDS, MOST_HEADING, MOST_HELM, Trial
-from shipid.simulation.request import Request, Side, in_rows
-from shipid.units import RPM, plural
+from shipid.simulation.request import Request, Side, round_to_rows
+from shipid.units import RPM, plural_word
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
@@ -33,7 +33,7 @@ class Standard:
 
     Parameters
     ----------
-    kind, title : key of `standards()`, and a title in words.
+    kind, title : key of `standard_manoeuvres()`, and a title in words.
     speed : approach speed [m/s]. step : of the integration [s]. interval : between rows of the log [s].
     """
 
@@ -45,12 +45,12 @@ class Standard:
     interval: float
 
 
-def standards() -> dict[str, type[Trial]]:
+def standard_manoeuvres() -> dict[str, type[Trial]]:
     """Name -> class of every standard manoeuvre: the kinds of `KINDS` that are a `Trial`."""
     return {CALLED.get(name, name.replace("_", "-")): kind for name, kind in KINDS.items() if issubclass(kind, Trial)}
 
 
-def standard(
+def define_standard(
     vessel: Vessel,
     name: str,
     angles: Sequence[float] | float = (),
@@ -66,7 +66,7 @@ def standard(
 
     Parameters
     ----------
-    name : a key of `standards()`, such as `zigzag`, `turning` or `pull-out`.
+    name : a key of `standard_manoeuvres()`, such as `zigzag`, `turning` or `pull-out`.
     angles : one or several [deg], of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate
         [deg/s].
     speed : approach speed [m/s]; default: the document's U_0, else Froude number 0.2.
@@ -83,29 +83,29 @@ def standard(
     ShipidError : an unknown name, side or approach, angles that do not fit, no length, a speed that no shaft speed
         gives, a time that is not positive.
     """
-    of_class("vessel", vessel, Vessel, "as of `load_vessel`")
-    kinds = standards()
+    check_class("vessel", vessel, Vessel, "as of `load_vessel`")
+    kinds = standard_manoeuvres()
     if not isinstance(name, str) or name not in kinds:
-        raise ShipidError(f"no manoeuvre is called {name!r}: {choices(name, kinds)}", path="NAME")
+        raise ShipidError(f"no manoeuvre is called {name!r}: {suggest_name(name, kinds)}", path="NAME")
     kind = kinds[name]
-    angles = numbers("angles", angles).ravel().tolist()
+    angles = as_float_array("angles", angles).ravel().tolist()
     _check_angles(name, angles, kind.angles)
     if not isinstance(side, str) or side not in get_args(Side):
         raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
     if not isinstance(approach, str) or approach not in APPROACHES:
-        raise ShipidError(f"{approach!r} is no approach: {choices(approach, APPROACHES)}", path="--approach")
+        raise ShipidError(f"{approach!r} is no approach: {suggest_name(approach, APPROACHES)}", path="--approach")
     for option, value in (("--duration", duration), ("--step", step)):
-        if value is not None and not 0 < number(option.strip("-"), value) < np.inf:
+        if value is not None and not 0 < check_number(option.strip("-"), value) < np.inf:
             raise ShipidError(f"{value:g} s must be positive and finite", path=option)
     length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
-    asked = service_speed(vessel) if speed is None else number("speed", speed)
+    asked = vessel_service_speed(vessel) if speed is None else check_number("speed", speed)
     controls = Controls(vessel)
-    n_rpm = (shaft_speed(controls, asked) if n is None else number("n", n)) / RPM
+    n_rpm = (shaft_speed(controls, asked) if n is None else check_number("n", n)) / RPM
     passing = length / asked  # s for one length
-    interval = _round(passing / ROWS) if step is None else step * STEPS
-    lead = in_rows(LEAD * passing, interval)
+    interval = _round_to_125(passing / ROWS) if step is None else step * STEPS
+    lead = round_to_rows(LEAD * passing, interval)
     if duration is not None and "duration" in kind.model_fields and duration <= lead:  # else of a level
         words = f"{duration:g} s is over before the first order, at {lead:g} s of the log"
         raise ShipidError(f"{words}: give more", path="--duration")
@@ -139,7 +139,7 @@ def _check_angles(name: str, angles: Sequence[float], wanted: Sequence[str]) -> 
     """Refuse angles [deg] that are not as wanted; warn of a helm that may be in rad."""
     most = len(wanted)
     if len(angles) > most:
-        raise ShipidError(f"{name} takes {most or 'no'} {plural(most, 'angle')}", path="ANGLES")
+        raise ShipidError(f"{name} takes {most or 'no'} {plural_word(most, 'angle')}", path="ANGLES")
     if any(angle <= 0 for angle in angles):
         raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
     for place, angle in enumerate(angles):
@@ -168,7 +168,7 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     return n
 
 
-def _round(value: float) -> float:
+def _round_to_125(value: float) -> float:
     """The number 1, 2 or 5 times a power of ten with the smallest ratio to `value`."""
     decade = 10.0 ** np.floor(np.log10(value))
     steps = np.array([1, 2, 5, 10]) * decade

@@ -8,24 +8,24 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from shipid.arguments import of_class, steps_in
-from shipid.checked import Checked
+from shipid.arguments import check_class, whole_steps
+from shipid.checked import CheckedModel
 from shipid.engine.integrate import Method
-from shipid.errors import DocumentError, ShipidError, choices
-from shipid.physics.signals import ACTUAL, is_output, measurable
+from shipid.errors import DocumentError, ShipidError, suggest_name
+from shipid.physics.signals import ACTUAL, is_output, measurable_signals
 from shipid.simulation import gusts
 from shipid.simulation.approach import Controls
-from shipid.simulation.draw import Draw, limits
+from shipid.simulation.draw import ManoeuvreDraw, range_limits
 from shipid.simulation.gusts import Gusts
-from shipid.simulation.log import column_of
+from shipid.simulation.log import state_column
 from shipid.simulation.manoeuvre import Manoeuvre, order_keys, order_unit
-from shipid.simulation.perform import perform
-from shipid.simulation.sea import Sea, draw_components, share_outside, table_range, wave_loads
-from shipid.simulation.sensors import Sensor, measure
-from shipid.units import DEGREE, percent
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.sea import Sea, draw_components, share_outside, wave_loads, wave_table_range
+from shipid.simulation.sensors import Sensor, measure_record
+from shipid.units import DEGREE, percent_text
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import uniform
+from shipid.vessel.perturb import uniform_draw
 
 Array = np.ndarray
 NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
@@ -34,7 +34,7 @@ WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_s
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
 
 
-class Truth(Checked, BaseModel):
+class Truth(CheckedModel, BaseModel):
     """The `[truth]` block of a study: a vessel, its manoeuvres, weather, sea and sensors.
 
     Every quantity is drawn uniformly from its range by hash(seed, manoeuvre, quantity), so that additional manoeuvres
@@ -62,18 +62,20 @@ class Truth(Checked, BaseModel):
     sensors: dict[str, Sensor] = Field(
         default={}, description="logged column -> sensor model; an output (propeller.thrust) is logged where it has one"
     )
-    manoeuvre: Annotated[list[Draw], Field(min_length=1, description="kinds, drawn by their shares")] = [Draw()]
+    manoeuvre: Annotated[list[ManoeuvreDraw], Field(min_length=1, description="kinds, drawn by their shares")] = [
+        ManoeuvreDraw()
+    ]
 
     @model_validator(mode="after")
     def _fits(self) -> Truth:
-        if not steps_in(self.interval, self.step):
+        if not whole_steps(self.interval, self.step):
             raise ValueError(f"interval {self.interval:g} s must be a multiple of step {self.step:g} s")
         if self.duration < self.interval:
             raise ValueError(f"duration {self.duration:g} s holds no interval of {self.interval:g} s")
         for name in ("wind_speed", "current_speed"):
-            limits(name, getattr(self, name))
+            range_limits(name, getattr(self, name))
         for name, value in self.environment.items():
-            limits(f"environment.{name}", value)
+            range_limits(f"environment.{name}", value)
         return self
 
     @property
@@ -84,7 +86,7 @@ class Truth(Checked, BaseModel):
 
 def check_truth(truth: Truth, vessel: Vessel) -> None:
     """Raise DocumentError for manoeuvres, weather, sensors or a sea that this vessel cannot be simulated with."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     if truth.waves is not None:
         _check_sea(truth, truth.waves, vessel)
     if truth.current_speed != (0.0, 0.0) and "V_c" not in model.environment:
@@ -92,8 +94,8 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
     if truth.gusts is not None and "V_w" not in model.environment:
         raise DocumentError(f"{truth.vessel} has no [wind]: take a vessel that has, or no gusts", path="truth.gusts")
     _check_environment(truth, vessel)
-    columns = [column_of(name) for name in model.state]
-    columns += [*model.commands, *measurable(model.environment), *model.outputs]
+    columns = [state_column(name) for name in model.state]
+    columns += [*model.commands, *measurable_signals(model.environment), *model.outputs]
     unknown = next((name for name in truth.sensors if name not in columns), None)
     controls = Controls(vessel)
     for place, block in enumerate(truth.manoeuvre):
@@ -101,22 +103,22 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
             for end in (0.0, 1.0):  # of every range
                 block.manoeuvre(truth.length, lambda _, end=end: end).check(controls)  # type: ignore[misc]
         except DocumentError as error:
-            raise DocumentError(error.message, path=_in_block(error.path, place)) from None
+            raise DocumentError(error.message, path=_path_in_block(error.path, place)) from None
     if unknown is not None:
-        raise DocumentError(f"no logged column: {choices(unknown, columns)}", path=f"truth.sensors.{unknown}")
+        raise DocumentError(f"no logged column: {suggest_name(unknown, columns)}", path=f"truth.sensors.{unknown}")
 
 
-def _further(vessel: Vessel) -> dict[str, str]:
+def _further_signals(vessel: Vessel) -> dict[str, str]:
     """Signal -> key in `[truth.environment]`, of what a vessel feels and no other key of the block gives."""
-    return {name: order_keys(name)[1] for name in dynamics(vessel).environment if name not in WEATHER}
+    return {name: order_keys(name)[1] for name in vessel_dynamics(vessel).environment if name not in WEATHER}
 
 
 def _check_environment(truth: Truth, vessel: Vessel) -> None:
     """Raise DocumentError for a key that the vessel does not feel, or a signal that it feels without a key."""
-    keys, path = _further(vessel), "truth.environment"
+    keys, path = _further_signals(vessel), "truth.environment"
     unknown = next((key for key in truth.environment if key not in keys.values()), None)
     if unknown is not None:
-        remedy = choices(unknown, keys.values()) if keys else "remove it"
+        remedy = suggest_name(unknown, keys.values()) if keys else "remove it"
         message = f"no term of {truth.vessel} takes it, or another key of [truth] gives it: {remedy}"
         raise DocumentError(message, path=f"{path}.{unknown}")
     missing = next((name for name, key in keys.items() if key not in truth.environment), None)
@@ -126,23 +128,23 @@ def _check_environment(truth: Truth, vessel: Vessel) -> None:
 
 
 def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
-    if not dynamics(vessel).drawn:
+    if not vessel_dynamics(vessel).drawn:
         raise DocumentError(f"{truth.vessel} has no [waves]: take a vessel that has, or no waves", path="truth.waves")
-    low, high = table_range(vessel)
+    low, high = wave_table_range(vessel)
     lost = share_outside(sea, low, high)
     if lost > MOST_LOST:
-        message = f"{sea.T_p:g} s: {percent(lost)} of the sea's energy lies outside the tables of {truth.vessel}"
-        remedy = f"{low:g} to {high:g} rad/s; at most {percent(MOST_LOST)} may"
+        message = f"{sea.T_p:g} s: {percent_text(lost)} of the sea's energy lies outside the tables of {truth.vessel}"
+        remedy = f"{low:g} to {high:g} rad/s; at most {percent_text(MOST_LOST)} may"
         raise DocumentError(f"{message}, {remedy}", path="truth.waves.T_p")
 
 
-def _in_block(path: str | None, place: int) -> str:
+def _path_in_block(path: str | None, place: int) -> str:
     """Path in the study document of an error in a manoeuvre: `manoeuvre.n_rpm` -> `truth.manoeuvre.0.n_rpm`."""
     inside = f".{path.removeprefix('manoeuvre.')}" if path is not None and path.startswith("manoeuvre.") else ""
     return f"truth.manoeuvre.{place}{inside}"
 
 
-def vessel_of(truth: Truth, vessel: Vessel) -> Vessel:
+def truth_vessel(truth: Truth, vessel: Vessel) -> Vessel:
     """The vessel with the values and blocks of `truth.set`; DocumentError names the path of an error there."""
     try:
         return vessel.with_values(truth.set) if truth.set else vessel
@@ -150,7 +152,7 @@ def vessel_of(truth: Truth, vessel: Vessel) -> Vessel:
         raise DocumentError(error.message, path=f"truth.set.{error.path}") from None
 
 
-def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
+def simulate_truth(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Simulate and log all manoeuvres: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
     Mean wind, current and wave direction are constant in a run. Every run starts upright, so the first ten seconds of
@@ -162,17 +164,17 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
 
     Raises ShipidError for a truth that is none, DocumentError if it does not fit the vessel or a manoeuvre diverges.
     """
-    of_class("truth", truth, Truth, "such as Truth.model_validate(...)")
-    vessel = vessel_of(truth, vessel)
+    check_class("truth", truth, Truth, "such as Truth.model_validate(...)")
+    vessel = truth_vessel(truth, vessel)
     check_truth(truth, vessel)
-    environment, chi = _weather(truth, vessel)
+    environment, chi = _draw_weather(truth, vessel)
     keys = [(truth.seed, "manoeuvre", number) for number in range(truth.manoeuvres)]
     if truth.gusts is not None and "V_w" in environment:
-        instants = np.arange(steps_in(truth.length, truth.step) + 1, dtype=float)
+        instants = np.arange(whole_steps(truth.length, truth.step) + 1, dtype=float)
         mean = environment["V_w"]
-        environment["V_w"] = mean + gusts.series(truth.gusts, mean, truth.step * instants, keys)
+        environment["V_w"] = mean + gusts.gust_series(truth.gusts, mean, truth.step * instants, keys)
     try:
-        frame = perform(
+        frame = perform_manoeuvres(
             vessel,
             draw_manoeuvres(truth),
             step=truth.step,
@@ -186,7 +188,7 @@ def simulate(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     except ShipidError as error:
         raise DocumentError(error.message, path="truth") from None
     frame = frame.drop(columns=[name for name in frame if str(name).startswith(ACTUAL)])
-    return measure(frame, truth.sensors, truth.interval, truth.seed) if truth.sensors else frame
+    return measure_record(frame, truth.sensors, truth.interval, truth.seed) if truth.sensors else frame
 
 
 def draw_manoeuvres(truth: Truth) -> list[Manoeuvre]:
@@ -196,25 +198,25 @@ def draw_manoeuvres(truth: Truth) -> list[Manoeuvre]:
     for number in range(truth.manoeuvres):
 
         def at(quantity: str, number: int = number) -> float:
-            return uniform(truth.seed, "manoeuvre", number, quantity)
+            return uniform_draw(truth.seed, "manoeuvre", number, quantity)
 
         place = int(np.searchsorted(ends, at("kind") * ends[-1], side="right"))
         result.append(truth.manoeuvre[place].manoeuvre(truth.length, at))
     return result
 
 
-def _weather(truth: Truth, vessel: Vessel) -> tuple[dict[str, Array], Array]:
+def _draw_weather(truth: Truth, vessel: Vessel) -> tuple[dict[str, Array], Array]:
     """What the vessel feels, channel -> (manoeuvres,) [SI], and the wave directions (manoeuvres,) [rad, towards]."""
 
     def between(quantity: str, limits: tuple[float, float], unit: float = 1.0) -> Array:
         low, high = limits
-        draws = [uniform(truth.seed, "manoeuvre", number, quantity) for number in range(truth.manoeuvres)]
+        draws = [uniform_draw(truth.seed, "manoeuvre", number, quantity) for number in range(truth.manoeuvres)]
         return np.asarray((low + (high - low) * np.array(draws)) * unit)
 
     around = (0.0, 360.0)
     further = {
-        name: between(name, limits(key, truth.environment[key]), order_unit(name))
-        for name, key in _further(vessel).items()
+        name: between(name, range_limits(key, truth.environment[key]), order_unit(name))
+        for name, key in _further_signals(vessel).items()
     }
     weather = further | {
         "V_w": between("V_w", truth.wind_speed),
@@ -222,4 +224,4 @@ def _weather(truth: Truth, vessel: Vessel) -> tuple[dict[str, Array], Array]:
         "V_c": between("V_c", truth.current_speed),
         "beta_c": between("beta_c", around, DEGREE),
     }
-    return {name: weather[name] for name in dynamics(vessel).environment}, between("chi", around, DEGREE)
+    return {name: weather[name] for name in vessel_dynamics(vessel).environment}, between("chi", around, DEGREE)

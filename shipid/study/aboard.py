@@ -22,7 +22,7 @@ from shipid.predictor import Predictor
 from shipid.report.content import Line
 from shipid.study.apply import Band, Forecast, dataset_of, instants_along, predict_instants, tables_along
 from shipid.study.store import read_predictor
-from shipid.units import length_text, level_text, listed, percent, plural
+from shipid.units import join_names, length_text, level_text, percent_text, plural_word
 
 Array = np.ndarray
 TRACK = ["run", "t", "north", "east"]
@@ -166,8 +166,8 @@ def summed_up(played: Played) -> list[Line]:
     """Summary of a replay, as lines that say what they are about."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
-    early = f"{played.skipped} {plural(played.skipped, 'instant')} before there was a past"
-    many = f"{len(instants)} {plural(len(instants), 'prediction')} in {runs} {plural(runs, 'run')}"
+    early = f"{played.skipped} {plural_word(played.skipped, 'instant')} before there was a past"
+    many = f"{len(instants)} {plural_word(len(instants), 'prediction')} in {runs} {plural_word(runs, 'run')}"
     lines = [Line("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
     limits = (
         f"not in the log, taken as 0: {', '.join(played.assumed)}" if played.assumed else "",
@@ -179,7 +179,7 @@ def summed_up(played: Played) -> list[Line]:
     latency = 1e3 * instants["latency"].to_numpy()
     words = f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms"
     lines.append(Line("detail", words))
-    share = f"{outside.sum()} of {len(outside)} instants ({percent(outside.mean())})"
+    share = f"{outside.sum()} of {len(outside)} instants ({percent_text(outside.mean())})"
     lines.append(Line("alarm", f"alarm: at {share} outside of the training"))
     lines += [Line("detail", text) for text in _spans(instants)]
     for place, text in enumerate(_promise(played)):
@@ -218,7 +218,7 @@ def _promise(played: Played) -> list[str]:
         lines.append(f"  {moment:g} s ahead: {words}")
     if none:
         why = "it is wider than a ship can go in that time, as where an input that did not vary in training now does"
-        lines.append(f"  {listed(none)} s ahead: no useful band: {why}")
+        lines.append(f"  {join_names(none)} s ahead: no useful band: {why}")
     return lines
 
 
@@ -234,9 +234,9 @@ def _band_in_words(instants: pd.DataFrame, band: Band, why: str) -> str:
     adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
     inside = "all in alarm, where nothing is promised"
     if promised.any():
-        inside = f"{percent(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
+        inside = f"{percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
     line = (
-        f"band of {level_text(band.level)}{of}{adapts}: it held {percent(held[judged].mean())} of the {judged.sum()} "
+        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held[judged].mean())} of the {judged.sum()} "
         f"whole paths that can be judged, {inside}"
     )
     if promised.any() and share_interval(held[promised], instants["run"].to_numpy()[promised])[1] < band.level:

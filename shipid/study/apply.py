@@ -11,7 +11,7 @@ import pandas as pd
 from shipid.data.causal import causal_columns
 from shipid.data.dataset import Dataset, clock_slack, in_force, pieces, read_dataset, sample
 from shipid.data.windows import Instants, coarse_in_words, from_frame, future_of, gaps_in_words, past_of, without_rows
-from shipid.errors import DataError, ResultError, choices
+from shipid.errors import DataError, ResultError, suggest_name
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapted, adaptive, factor
 from shipid.hybrid.physics import check_columns
@@ -133,7 +133,7 @@ def _known_cell(folder: Path, cell: str) -> Path:
     if not available:
         raise ResultError("holds no finished cells: is it the folder of a run?", file=folder)
     if cell not in available:
-        raise ResultError(f"no such cell: {choices(cell, available)}", file=folder, path=f"--cell {cell}")
+        raise ResultError(f"no such cell: {suggest_name(cell, available)}", file=folder, path=f"--cell {cell}")
     return cell_file(folder, cell)
 
 

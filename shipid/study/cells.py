@@ -10,16 +10,16 @@ import numpy as np
 
 from shipid.data.windows import Windows, covered
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import DataError, legible
+from shipid.errors import DataError, shorten_line
 from shipid.hybrid.method import Case, Corrector, Fitted, Journal, Task, fit_all
-from shipid.metrics import lengths, position_error, share_of, summary
+from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, Way
 from shipid.study.foundations import Prediction, predictions
 from shipid.study.plan import Batch, Unit
 from shipid.study.prepare import Prepared, apart, at_instants, instants_of, outside_of, physics_of, window_memory
 from shipid.study.store import Cell
-from shipid.units import percent
+from shipid.units import percent_text
 from shipid.version import __version__
 
 NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms"), np.nan)  # of no physics
@@ -164,7 +164,7 @@ def evaluate_cell(
     row |= {"minutes": covered(work.windows) / 60, "seconds": result.seconds + one.seconds + seconds}
     row["trials"] = result.trials
     if result.corrector is None:
-        return Cell(row | _failed("failed", legible(result.sentence or one.sentence or "no training converged")))
+        return Cell(row | _failed("failed", shorten_line(result.sentence or one.sentence or "no training converged")))
     if not any(other.fitted for other in prepared.foundations if other.family == foundation.family):
         errors = result.left_out if result.left_out is not None else errors  # fair: the physics saw none of these runs
     predictor = _predictor(work, foundation, way, result.corrector, origin)
@@ -179,7 +179,7 @@ def evaluate_cell(
 
 def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
     """A, A_90, A_rms [m] of the paths (T, S, 2) of the physics alone on the test windows."""
-    known: Mapping[str, Any] = summary(position_error(paths, test.future))
+    known: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
     return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"]}
 
 
@@ -194,21 +194,23 @@ def _tested(prepared: Prepared, one: Prediction, predictor: Predictor, way: Way)
     test, study = prepared.test, prepared.study
     failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
     if failed.any():
-        share = f"physics diverges on {percent(failed.mean(), 1)} of the test windows"
+        share = f"physics diverges on {percent_text(failed.mean(), 1)} of the test windows"
         return _failed("diverged", share if np.isfinite(one.paths).all() else one.sentence), None
     instants = instants_of(study, predictor.vessel, prepared.data, test, one.estimates)
     predictor.check_restored(instants, one.test_paths, way.method.corrector)
     paths = predictor.predict(instants, one.test_paths)
-    failed = ~(lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(axis=0)  # where physics has diverged, too
+    failed = ~(vector_lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(
+        axis=0
+    )  # where physics has diverged, too
     if failed.any():
-        where = f"{percent(failed.mean(), 1)} of the test windows"
+        where = f"{percent_text(failed.mean(), 1)} of the test windows"
         return _failed("diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"), None
-    error = summary(position_error(paths, test.future))
+    error = summarise_errors(position_error(paths, test.future))
     outcome = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"], "coverage": np.nan, "width": np.nan}
     level = study.bands.level
     if predictor.bands is not None and predictor.bands.promises(level):
         region = predictor.band(paths, instants, level)
-        outcome["coverage"] = share_of(region.holds(test.future - paths), test.run)
+        outcome["coverage"] = coverage_share(region.holds(test.future - paths), test.run)
         outcome["width"] = float(region.radius.mean())
     return {**outcome, "status": "ok", "sentence": one.sentence}, paths
 

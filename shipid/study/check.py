@@ -11,7 +11,7 @@ from shipid.study import seals, store
 from shipid.study.lock import current_writer
 from shipid.study.plan import Plan
 from shipid.study.seals import Fault
-from shipid.units import plural
+from shipid.units import plural_word
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def check_folder(folder: Path) -> Checked:
 
 
 def _count_words(faults: list[Fault]) -> str:
-    return f"{len(faults)} {plural(len(faults), 'fault')}"
+    return f"{len(faults)} {plural_word(len(faults), 'fault')}"
 
 
 def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> list[str]:
@@ -57,8 +57,8 @@ def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> lis
         lines.append(f"{name}at work: {writer}")
     left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]
     if left:
-        folders = f"{len(left)} {plural(len(left), 'temporary folder')}"
-        lines.append(f"{folders} of killed runs: the next run removes {plural(len(left), 'it', 'them')}")
+        folders = f"{len(left)} {plural_word(len(left), 'temporary folder')}"
+        lines.append(f"{folders} of killed runs: the next run removes {plural_word(len(left), 'it', 'them')}")
     for before, after in pairwise(store.provenance(folder).get("sessions", [])):
         lines.append(f"{name}computed in parts: {'; '.join(store.differences(before, after))}")
     return lines

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from shipid.users import of_users, written
+from shipid.users import is_user_code, unwrap_callable
 
 UNKNOWN = "unknown"  # digest of what is in no file
 INSTALLED = ("site-packages", "dist-packages")
@@ -43,7 +43,7 @@ def users_code(kinds: tuple[Callable[..., Any], ...]) -> str:
     Those of a notebook have none. As `code_digest`: the files at the first call in this process.
     """
     files: set[Path] = set()
-    for kind in map(written, filter(of_users, kinds)):
+    for kind in map(unwrap_callable, filter(is_user_code, kinds)):
         with suppress(OSError, TypeError):  # of a notebook
             files |= _with_imported(Path(inspect.getfile(inspect.unwrap(kind))).resolve(), kind.__module__.count("."))
     texts = [file.read_bytes() for file in sorted(files)]

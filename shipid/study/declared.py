@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from shipid import document as documents
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, unknowns
 from shipid.observer import Observer, bank
 from shipid.study.schema import ROLES, Study, separate_family
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import Family, Variant, members, resolve
+from shipid.vessel.perturb import Family, Variant, draw_members, resolve_families
 
 NO_MODEL = "none"
 NO_METHOD = "alone"  # of the rows of A in comparisons of runs, whose N_D is 0: no data improve it
@@ -73,7 +73,7 @@ def named_vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> 
     """A vessel that the study names at a path: one that is known, or read now and known from now on."""
     if name not in known:
         try:
-            document = documents.find(name, "models", file.parent)
+            document = documents.find_document(name, "models", file.parent)
         except DocumentError as error:
             raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
         known[name] = load_vessel(str(document))
@@ -82,7 +82,7 @@ def named_vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> 
 
 def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[Foundation, ...]:
     """Every member of every family; an identified family has the members of the family that it extends."""
-    families = resolve(study.family, file)
+    families = resolve_families(study.family, file)
     foundations: list[Foundation] = []
     for index, family in enumerate(families):
         assert family.base is not None  # written out by resolve
@@ -93,7 +93,7 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
         words = family.description or ""
         if family.identify is None and family.observer is None:
             foundations += [
-                Foundation(v.name, v.family, v.member, v, vessel, words) for v in members(family, vessel, file)
+                Foundation(v.name, v.family, v.member, v, vessel, words) for v in draw_members(family, vessel, file)
             ]
             continue
         root = _root(study.family, index, file)
@@ -102,7 +102,7 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
         observer = None if family.observer is None else _observer(study, family, index, vessel, file)
         ways = (IDENTIFIED if settings else "", OBSERVED if observer else "")
         described = words or ", ".join(filter(None, (parent.description, *ways)))
-        for variant in members(parent, vessel, file):
+        for variant in draw_members(parent, vessel, file):
             name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
             foundations.append(
                 Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer)
@@ -148,7 +148,9 @@ def _observer(study: Study, family: Family, index: int, vessel: Vessel, file: Pa
     """
     coarse = study.data is not None and study.data.path == "velocity"
     default: dict[str, Any] = {"measured": ["psi", "u", "v", "r"], "current": 0.0} if coarse else {}
-    settings: Observer = documents.parse(Observer, default | (family.observer or {}), file, f"family.{index}.observer")
+    settings: Observer = documents.parse_model(
+        Observer, default | (family.observer or {}), file, f"family.{index}.observer"
+    )
     try:
         bank(vessel, settings)
     except DocumentError as error:
@@ -160,7 +162,7 @@ def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Pa
     """What a family identifies; horizon, step and method are those of the study's prediction unless it says else."""
     ahead, prefix = study.prediction, f"family.{index}.identify"
     default = {"horizon": ahead.ahead, "step": ahead.step, "method": ahead.integrator}
-    settings: Identify = documents.parse(Identify, default | (family.identify or {}), file, prefix)
+    settings: Identify = documents.parse_model(Identify, default | (family.identify or {}), file, prefix)
     try:
         unknowns(vessel, settings)
     except DocumentError as error:
@@ -187,9 +189,9 @@ def methods_of(study: Study, foundations: Sequence[Foundation], file: Path) -> t
             if pattern in refused:
                 message = f"{pattern!r} has an observer, which {block.kind} does not take: name the family it extends"
                 raise DocumentError(message, file=file, path=f"{path}.families")
-            matching = documents.match(pattern, families)
+            matching = documents.match_paths(pattern, families)
             if not matching:
-                message = f"{pattern!r} is no family: {choices(pattern, families)}"
+                message = f"{pattern!r} is no family: {suggest_name(pattern, families)}"
                 raise DocumentError(message, file=file, path=f"{path}.families")
             met.update(matching)
         if not method.meets_none:
@@ -218,11 +220,11 @@ def check_claims(study: Study, models: Sequence[Foundation], file: Path) -> None
     named = [*study.claims.roles.items(), *(("aside", name) for name in study.claims.aside)]
     for role, name in named:
         if name not in families:
-            message = f"{name!r} is not a family: {choices(name, set(families))}"
+            message = f"{name!r} is not a family: {suggest_name(name, set(families))}"
             raise DocumentError(message, file=file, path=f"claims.{role}")
     names = [block.name for block in study.method]
     if study.claims.method is not None and study.claims.method not in names:
-        message = f"{study.claims.method!r} is not a method: {choices(study.claims.method, names)}"
+        message = f"{study.claims.method!r} is not a method: {suggest_name(study.claims.method, names)}"
         raise DocumentError(message, file=file, path="claims.method")
     roles = study.claims.roles
     for role, family in roles.items():

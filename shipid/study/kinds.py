@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, pieces_by_run
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, declared_kind
 from shipid.logs.segments import kind_of
-from shipid.physics.signals import is_shaft, steers
+from shipid.physics.signals import is_shaft, is_steering
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def _random(rows: pd.DataFrame) -> bool:
 
 def _levels(rows: pd.DataFrame) -> Array:
     """Angles [rad] at which the helm is held for a while, one after another."""
-    names = [name for name in map(str, rows.columns) if steers(name)]
+    names = [name for name in map(str, rows.columns) if is_steering(name)]
     if not names or len(rows) < SHORTEST:
         return np.empty(0)
     t, helm = rows["t"].to_numpy(), rows[names].to_numpy().mean(axis=1)

@@ -22,10 +22,10 @@ from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.held import nothing_varies
 from shipid.data.windows import cut_windows
-from shipid.errors import DataError, Diverges, DocumentError, ShipidError
+from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
-from shipid.physics.signals import SIGNALS, is_shaft, signal_of, steers
-from shipid.simulation.approach import Controls, service_speed
+from shipid.physics.signals import SIGNALS, is_shaft, is_steering, signal_of
+from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
 from shipid.study.declared import NO_MODEL
@@ -33,10 +33,10 @@ from shipid.study.first_look import Look, first_look
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
 from shipid.study.survey import Survey, separation, survey, typical_runs
-from shipid.units import GRAVITY, RPM, plural
-from shipid.vessel.dynamics import dynamics
+from shipid.units import GRAVITY, RPM, plural_word
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import order_of
+from shipid.vessel.perturb import derivative_order
 from shipid.vessel.schema import SHARED, term_blocks
 
 INACCURATE = "inaccurate"
@@ -163,7 +163,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     ahead, step, why = _horizon_and_step(first, seen)
     usable = _runs_that_hold(dataset, ahead, step, 0.0)
     if len(usable) <= LEAST_RUNS:
-        few = f"{len(usable)} {plural(len(usable), 'run')} of {ahead:g} s or more"
+        few = f"{len(usable)} {plural_word(len(usable), 'run')} of {ahead:g} s or more"
         remedy = "cut the log into its manoeuvres, [[segment]]s of the mapping (`shipid data segment` proposes them)"
         raise DataError(f"{few}, a study needs {LEAST_RUNS + 1}, one of them for the test: {remedy}", file=data)
     short = [run for run in seen.runs.index if run not in usable]
@@ -199,10 +199,10 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     warnings += _already_seen(families, tests)
     try:
         choices, plan = _first_that_runs(fixed, every, families, out, vessels, dataset)
-    except Diverges as error:
+    except DivergenceError as error:
         if not warnings:
             raise
-        raise Diverges(f"{error.message}; but first: {warnings[0]}", file=error.file, path=error.path) from None
+        raise DivergenceError(f"{error.message}; but first: {warnings[0]}", file=error.file, path=error.path) from None
     how: dict[str, Any] = {"ahead": ahead, "step": plan.study.prediction.step, "path": true_path.value}
     looks = {name: first_look(vessel, dataset, others, **how) for name, vessel in vessels.items()}
     warnings += [look.sentence for look in looks.values() if look.wrong]
@@ -224,7 +224,7 @@ def _failed_checks(seen: Survey, data: Path) -> list[str]:
         return []
     counts = Counter(seen.failed["check"])
     first = seen.failed.iloc[0]
-    words = ", ".join(f"{name} ({count} {plural(count, 'run')})" for name, count in counts.items())
+    words = ", ".join(f"{name} ({count} {plural_word(count, 'run')})" for name, count in counts.items())
     return [f"`shipid data check {data}` fails: {words}. In {first['run']!r} {first['sentence']}"]
 
 
@@ -259,7 +259,7 @@ def _first_that_runs(
         plan = _build(choices, out, vessels)
         try:
             _check_that_runs(plan, obtain(plan) if dataset is None else dataset)
-        except Diverges as error:
+        except DivergenceError as error:
             last = error
         else:
             return choices, plan
@@ -340,7 +340,7 @@ def _families(vessels: Mapping[str, Vessel], runs: Sequence[str]) -> list[dict[s
     """Every vessel as it is, with the runs that it was identified from; the first made inaccurate, too."""
     families: list[dict[str, Any]] = []
     for named, vessel in vessels.items():
-        known = documents.read(vessel.file).get("provenance", {}).get("runs", [])
+        known = documents.read_document(vessel.file).get("provenance", {}).get("runs", [])
         seen = [run for run in runs if run in known]
         name = _family_name(vessel.key, [family["name"] for family in families])
         family = {"name": name, "description": f"{vessel.name}, as it is", "base": named}
@@ -366,7 +366,7 @@ def _inaccurate_blocks(vessel: Vessel) -> list[dict[str, Any]]:
     hull = [path for path in vessel.parameters if path.startswith("hull.")]
     steering = [path for path in hull if path.rpartition(".")[2] in STEERING]
     blocks: list[dict[str, Any]] = []
-    if any((order_of(path) or 0) >= 3 for path in hull):
+    if any((derivative_order(path) or 0) >= 3 for path in hull):
         blocks.append({"remove": [HIGHER]})
     if steering or (hull and not blocks):
         blocks.append({"parameters": steering or _coefficients(hull), "factor": 0.6})
@@ -382,7 +382,7 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: the manoeuvres are timed in ship lengths", file=vessel.file)
-    service, controls = service_speed(vessel), Controls(vessel)
+    service, controls = vessel_service_speed(vessel), Controls(vessel)
     if not controls.differential:
         _ = controls.helm  # DocumentError where nothing turns the ship
     try:
@@ -458,7 +458,7 @@ def _truth(
     yield Choice("truth.duration", float(f"{ahead + INSTANTS * step:.6g}"), f"s: {INSTANTS} instants and the horizon")
     yield Choice("truth.step", fine, f"s: the ship takes {length / service:.3g} s for its length")
     yield Choice("truth.interval", step, "s between logged rows")
-    if "V_w" in dynamics(vessel).environment:
+    if "V_w" in vessel_dynamics(vessel).environment:
         yield wind_for(length)
     yield _turning_orders(controls, service, rpm)
 
@@ -492,7 +492,7 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
             row = SIGNALS[signal_of(name)]
             usual = [value / row.factor for value in row.usual]
             key = single if signal_of(name) in apart else common
-            orders[key] = [-HELM_DEG, HELM_DEG] if steers(name) else usual
+            orders[key] = [-HELM_DEG, HELM_DEG] if is_steering(name) else usual
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water"
     why += ", each shaft by itself: their difference steers" if controls.differential else ", and hard over either way"
@@ -505,7 +505,7 @@ def _degraded_families(named: str, vessel: Vessel) -> list[dict[str, Any]]:
     """Nominal, moderate and high: the families of experiment 1 (method, section 4), as far as the vessel has them."""
     hull = [path for path in vessel.parameters if path.startswith("hull.")]
     drag = [path for path in hull if path.rpartition(".")[2] in DRAG]
-    damping = ["hull.*[order >= 1]", *drag] if any(order_of(path) for path in hull) else _coefficients(hull)
+    damping = ["hull.*[order >= 1]", *drag] if any(derivative_order(path) for path in hull) else _coefficients(hull)
     heavy = [path for path in INERTIA if path in vessel.parameters]
     if not damping:
         raise ShipidError("has no [hull] numbers to degrade: declare families by hand", file=vessel.file)

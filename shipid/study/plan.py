@@ -16,14 +16,14 @@ from typing import Any
 import tomlkit
 
 from shipid import document as documents
-from shipid.arguments import by_name
+from shipid.arguments import check_mapping
 from shipid.document import Document
-from shipid.errors import DataError, DocumentError, choices
-from shipid.files import as_argument
+from shipid.errors import DataError, DocumentError, suggest_name
+from shipid.files import quote_argument
 from shipid.logs.importing import digest_of, sha256_of
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.manoeuvre import KINDS
-from shipid.simulation.truth import Truth, check_truth, vessel_of
+from shipid.simulation.truth import Truth, check_truth, truth_vessel
 from shipid.study.code import users_code
 from shipid.study.declared import (
     NO_MODEL,
@@ -37,10 +37,10 @@ from shipid.study.declared import (
 )
 from shipid.study.ranges import LONGEST_NAME, check_memory, check_ranges, check_seeds, window_numbers
 from shipid.study.schema import Data, Study, check_version
-from shipid.users import of_users
+from shipid.users import is_user_code
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, resolve
-from shipid.vessel.schema import functions
+from shipid.vessel.perturb import Family, resolve_families
+from shipid.vessel.schema import equation_functions
 
 WITH = "+"  # between a foundation and a method
 OF_PART = "/"  # between the name of a part and that of its source
@@ -173,7 +173,9 @@ def _shared_pairs(
 def _digest_with(plan: Plan, document: Document) -> str:
     vessels = sorted({vessel.digest for vessel in vessels_of(plan)})
     methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in plan.methods]
-    return documents.digest({"study": document, "vessels": vessels, "sources": dict(plan.sources), "methods": methods})
+    return documents.digest_document(
+        {"study": document, "vessels": vessels, "sources": dict(plan.sources), "methods": methods}
+    )
 
 
 def digest_without_seed(plan: Plan) -> str:
@@ -217,10 +219,10 @@ def own_code(plan: Plan) -> dict[str, dict[str, str]]:
     kinds = {way.name: type(way.method) for way in plan.methods}
     every: dict[str, Mapping[str, tuple[Callable[..., Any], ...]]] = {
         METHOD_CODE: {name: (kind, getattr(kind, "corrector", kind)) for name, kind in kinds.items()},
-        TERM_CODE: {key: held for one in vessels_of(plan) for key, held in functions(one.document).items()},
+        TERM_CODE: {key: held for one in vessels_of(plan) for key, held in equation_functions(one.document).items()},
     }
     own = {
-        what: {name: users_code(held) for name, held in named.items() if any(map(of_users, held))}
+        what: {name: users_code(held) for name, held in named.items() if any(map(is_user_code, held))}
         for what, named in every.items()
     }
     return {what: digests for what, digests in own.items() if digests}
@@ -231,7 +233,11 @@ def run_command(plan: Plan) -> str:
 
     A line before it says what the script is where the user wrote a part and no script has started this process.
     """
-    name = plan.name if documents.bundled("studies").get(plan.name) == Path(plan.file) else as_argument(plan.file)
+    name = (
+        plan.name
+        if documents.bundled_documents("studies").get(plan.name) == Path(plan.file)
+        else quote_argument(plan.file)
+    )
     changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in plan.changes.items())
     program = program_of(plan)
     missing = program != "shipid" and not _script()
@@ -350,15 +356,17 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
 
     Raises DocumentError with file, dotted path and remedy.
     """
-    by_name("changes", changes or {}, "a dotted path to a value", DocumentError)
-    file = documents.find(str(name), "studies")
-    document = documents.read(file)
+    check_mapping("changes", changes or {}, "a dotted path to a value", DocumentError)
+    file = documents.find_document(str(name), "studies")
+    document = documents.read_document(file)
     for path in changes or {}:
         head = str(path).split(".", 1)[0]
         if head not in Study.model_fields:
-            raise DocumentError(f"--set: no such block: {choices(head, Study.model_fields)}", file=file, path=str(path))
+            raise DocumentError(
+                f"--set: no such block: {suggest_name(head, Study.model_fields)}", file=file, path=str(path)
+            )
     try:
-        document = documents.replace(document, changes or {})
+        document = documents.replace_values(document, changes or {})
     except DocumentError as error:
         raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
     return build_plan(document, file, changes=changes)
@@ -380,7 +388,7 @@ def build_plan(
 
 def _named(error: DocumentError, document: Document, changes: Sequence[str]) -> DocumentError:
     """The error with paths by which a person finds the block, families and methods by name; whether --set made it."""
-    path = error.path and documents.by_name(document, error.path)
+    path = error.path and documents.path_with_names(document, error.path)
     others = [_named(other, document, changes) for other in error.others if isinstance(other, DocumentError)]
     changed = any(f"{place}.".startswith(f"{change}.") for place in (error.path, path) for change in changes)
     message = f"--set: {error.message}" if changed else error.message
@@ -396,7 +404,7 @@ def _built(
 ) -> Plan:
     documents.check_values(document, file)
     check_version(document, file)
-    study = documents.parse(Study, document, file).in_its_world()
+    study = documents.parse_model(Study, document, file).in_its_world()
     check_ranges(document, file)
     check_seeds(study, file)
     known = dict(vessels or {})
@@ -413,13 +421,13 @@ def _built(
         _check_amounts(study, study.truth, file)
         base = named_vessel(study.truth.vessel, file, "truth.vessel", known)
         try:
-            truth = vessel_of(study.truth, base)
+            truth = truth_vessel(study.truth, base)
             check_truth(study.truth, truth)
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=error.path) from None
     digests = _sources(study.data, file) if sources is None else sources
     mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
-    families = tuple(resolve(study.family, file))
+    families = tuple(resolve_families(study.family, file))
     plan = completed_plan(
         Plan(
             *(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine),
@@ -489,10 +497,10 @@ def _changed(document: Document, changes: Mapping[str, Any], where: str, file: P
     """A document with changes; DocumentError that names the key of the change where it reaches nothing."""
     for path, value in changes.items():
         if path.split(".", 1)[0] not in set(Study.model_fields) - set(OF_PARTS):
-            message = f"no such block: {choices(path, set(Study.model_fields) - set(OF_PARTS))}"
+            message = f"no such block: {suggest_name(path, set(Study.model_fields) - set(OF_PARTS))}"
             raise DocumentError(message, file=file, path=f"{where}.{path}")
         try:
-            document = documents.replace(document, {path: value})
+            document = documents.replace_values(document, {path: value})
         except DocumentError as error:
             raise DocumentError(error.message, file=file, path=f"{where}.{path}") from None
     return document

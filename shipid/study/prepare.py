@@ -31,25 +31,25 @@ from shipid.data.windows import (
     run_folds,
 )
 from shipid.engine.casadi import memory_along
-from shipid.errors import DataError, Diverges, DocumentError, choices
+from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
 from shipid.hybrid.physics import Physics, assumed, check_columns
 from shipid.logs.catalogue import fetch
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import declared_kind
 from shipid.logs.mapping import read_mapping
-from shipid.metrics import Summary, position_error, summary
+from shipid.metrics import ErrorSummary, position_error, summarise_errors
 from shipid.observer import Estimates, Observer, at_windows, observe, tune_observer
-from shipid.simulation.manoeuvre import name_of
-from shipid.simulation.truth import draw_manoeuvres, simulate
+from shipid.simulation.manoeuvre import kind_name
+from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of
 from shipid.study.plan import Batch, Plan, beside, mapping_of, past_steps
 from shipid.study.ranges import check_memory, window_numbers
 from shipid.study.schema import Study
-from shipid.units import percent, plural
-from shipid.vessel.dynamics import dynamics
+from shipid.units import percent_text, plural_word
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, draw
+from shipid.vessel.perturb import Family, draw_variant
 
 Array = np.ndarray
 MOST_REDRAWS = 100
@@ -86,9 +86,9 @@ class Prepared:
         """Command columns of the runs."""
         return tuple(self.data.commands)
 
-    def accuracy(self, foundation: str) -> Summary:
+    def accuracy(self, foundation: str) -> ErrorSummary:
         """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
-        return summary(position_error(self.test_paths[foundation], self.test.future))
+        return summarise_errors(position_error(self.test_paths[foundation], self.test.future))
 
     @cached_property
     def naive(self) -> Array:
@@ -122,9 +122,11 @@ def obtain(plan: Plan) -> Dataset:
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
         with _located(plan):
-            frame = simulate(study.truth, plan.truth)
+            frame = simulate_truth(study.truth, plan.truth)
         runs = map(str, frame["run"].unique())
-        kinds = {run: declared_kind(name_of(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
+        kinds = {
+            run: declared_kind(kind_name(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)
+        }
         manoeuvres = {run: kind for run, kind in kinds.items() if kind is not None}
         known = {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []}
         return Dataset(frame, {**known, "manoeuvres": manoeuvres})
@@ -161,8 +163,8 @@ def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:
     """Refuse amounts of data that the runs left to train do not give, or whose single run cannot be cut into parts."""
     left, amounts = len(rest.spans), plan.study.grid.N_D
     if left < max(amounts):
-        there = f"only {left} {plural(left, 'run is', 'runs are')} left for training"
-        tested = f"{tests} {plural(tests, 'tests', 'test')} (split.test)"
+        there = f"only {left} {plural_word(left, 'run is', 'runs are')} left for training"
+        tested = f"{tests} {plural_word(tests, 'tests', 'test')} (split.test)"
         raise DocumentError(f"{max(amounts)}: {there}, {tested}", path="grid.N_D")
     for batch in plan.batches:
         if batch.N_D == 1:
@@ -253,7 +255,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
 def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
     """Put the commands in the order of the first vessel, others last: a drawn network depends on it as on a seed."""
     vessel = next((one.base for one in plan.foundations if one.base is not None), None)
-    order = () if vessel is None else dynamics(vessel).commands
+    order = () if vessel is None else vessel_dynamics(vessel).commands
     places = {name: place for place, name in enumerate(order)}
     commands = sorted(dataset.commands, key=lambda name: (places.get(name, len(order)), name))
     others = [name for name in dataset.frame if name not in commands]
@@ -301,12 +303,12 @@ def _test_runs(study: Study, windows: Windows) -> list[str]:
     wanted, runs = study.split.test, windows.spans
     if isinstance(wanted, int):
         if wanted >= len(runs):
-            there = f"there {plural(len(runs), 'is only one run', f'are only {len(runs)} runs')}"
+            there = f"there {plural_word(len(runs), 'is only one run', f'are only {len(runs)} runs')}"
             raise DocumentError(f"{wanted}: {there}", path="split.test")
         return list(nested_runs(runs, [wanted], study.split.seed)[wanted])
     if unknown := next((name for name in wanted if name not in runs), None):
         star = " (a * is not read here)" if "*" in unknown else ""
-        message = f"{unknown!r} is no run with windows{star}: {choices(unknown, runs)}"
+        message = f"{unknown!r} is no run with windows{star}: {suggest_name(unknown, runs)}"
         raise DocumentError(message, path="split.test")
     return wanted
 
@@ -335,7 +337,7 @@ def _roll_out(
             if share:
                 drawn = _redraw(foundation, families[foundation.family], share, plan.file)
                 assert drawn.variant is not None
-                words = f"{foundation.name} diverged on {percent(share, 1)} of the training windows"
+                words = f"{foundation.name} diverged on {percent_text(share, 1)} of the training windows"
                 notes.append(f"{words}: redrawn, counter {drawn.variant.counter}")
                 again.append(drawn)
             else:
@@ -499,10 +501,10 @@ def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> 
     counter = foundation.variant.counter + 1
     if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
-        words = f"{foundation.name} diverges on {percent(share, 1)} of the training windows{tries}"
+        words = f"{foundation.name} diverges on {percent_text(share, 1)} of the training windows{tries}"
         remedy = "take a smaller [prediction] step, rk4, or narrower factors"
-        raise Diverges(f"{words}: {remedy}", path=f"family.{foundation.family}")
-    return replace(foundation, variant=draw(family, foundation.member, foundation.base, counter, file))
+        raise DivergenceError(f"{words}: {remedy}", path=f"family.{foundation.family}")
+    return replace(foundation, variant=draw_variant(family, foundation.member, foundation.base, counter, file))
 
 
 def not_measured(vessel: Vessel, windows: Windows) -> list[str]:

@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 
 from shipid import document as documents
-from shipid.capacity import too_much
+from shipid.capacity import excess_memory_words
 from shipid.document import Document
 from shipid.errors import DocumentError
 from shipid.simulation.truth import LONGEST
@@ -52,12 +52,12 @@ RANGES: dict[str, tuple[float, float, str]] = {
 def check_ranges(document: Document, file: Path | str) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
     meant = document.get(UNUSUAL, [])
-    for path, value in documents.leaves(document):
+    for path, value in documents.document_leaves(document):
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
-        limits = next((row for pattern, row in RANGES.items() if documents.match(pattern, [path])), None)
-        named = documents.by_name(document, path)
-        if limits is None or any(documents.match(str(one), [path, named]) for one in meant):
+        limits = next((row for pattern, row in RANGES.items() if documents.match_paths(pattern, [path])), None)
+        named = documents.path_with_names(document, path)
+        if limits is None or any(documents.match_paths(str(one), [path, named]) for one in meant):
             continue
         least, most, unit = limits
         if not least <= value <= most:
@@ -87,5 +87,5 @@ def window_numbers(prediction: Prediction, past: int, columns: int, foundations:
 
 def check_memory(numbers: float, words: str, path: str, file: Path | str) -> None:
     """Raise DocumentError with the number that causes it where so many numbers exceed this machine's memory."""
-    if fault := too_much(numbers):
+    if fault := excess_memory_words(numbers):
         raise DocumentError(f"{words} {fault}", file=file, path=path)

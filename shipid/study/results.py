@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.arguments import path_of
+from shipid.arguments import as_path
 from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError
 from shipid.files import read_arrays, read_json
 from shipid.hybrid.bands import Bands
-from shipid.metrics import error_by_axis, over_time, position_error
+from shipid.metrics import error_by_axis, error_of_windows, position_error
 from shipid.predictor import checked_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
@@ -125,7 +125,7 @@ class Results:
 
     def path_errors(self, path: np.ndarray) -> np.ndarray:
         """(R,) mean error [m] of a path (T, S, 2) [m] in each test manoeuvre."""
-        return self.by_run(over_time(position_error(path, self.test.future)))
+        return self.by_run(error_of_windows(position_error(path, self.test.future)))
 
     @cached_property
     def errors(self) -> dict[str, np.ndarray]:
@@ -147,7 +147,7 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError for a folder
     without a finished cell, and where a row is not as it was written.
     """
-    folder = path_of("folder", folder)
+    folder = as_path("folder", folder)
     plan = store.stored_plan(folder)
     if not plan.parts:
         return _cells(folder, plan)
@@ -178,7 +178,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
 
     say : called with a few words on how far it is.
     """
-    folder = path_of("folder", folder)
+    folder = as_path("folder", folder)
     plan = store.stored_plan(folder)
     if plan.parts:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)

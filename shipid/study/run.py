@@ -15,11 +15,11 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from shipid.arguments import of_class, path_of, whole_number
-from shipid.capacity import cores
+from shipid.arguments import as_path, check_class, check_whole_number
+from shipid.capacity import usable_cores
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.engine.engines import check_device
-from shipid.engine.native import engine, engine_so_far
+from shipid.engine.native import engine_description, noted_engine
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads
 from shipid.hybrid.journal import Journal
@@ -34,7 +34,7 @@ from shipid.study.prepare import Prepared, describe, obtain, prepare, runs_by_am
 from shipid.study.sessions import Code, Sessions, check_workers, machine, session_at_worker, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
-from shipid.users import of_users
+from shipid.users import is_user_code
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 Computed = Iterator[tuple[Unit, list[store.Cell]]]
@@ -89,9 +89,9 @@ def run_study(
     Raises ShipidError before any work for a plan that is none, for a number of workers below 1, where local workers
     lack the code that a user wrote, such as that of a notebook, and where another process works in the folder.
     """
-    of_class("plan", plan, Plan, "as of `read_plan`")
-    folder = path_of("folder", folder)
-    workers = None if workers is None else whole_number("workers", workers, 1)
+    check_class("plan", plan, Plan, "as of `read_plan`")
+    folder = as_path("folder", folder)
+    workers = None if workers is None else check_whole_number("workers", workers, 1)
     check_device(device)
     if scheduler is None:
         import_for_workers()
@@ -103,7 +103,7 @@ def run_study(
 
 def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "cpu") -> Iterator[Event]:
     """Make the folder of a study with what shards share: its runs, and what the physics alone says of them."""
-    folder = path_of("folder", folder)
+    folder = as_path("folder", folder)
     with store.open_folder(folder, plan):
         for name, part in plan.parts.items():
             yield from prepare_study(part.plan, store.check_part(folder, name, part.plan), device=device)
@@ -168,7 +168,7 @@ def _dataset(plan: Plan, folder: Path, sessions: Sessions) -> Dataset:
     if not seals.is_sealed(folder, DATA):
         dataset = obtain(plan)
         store.check_place(folder, plan.digest)
-        sessions.note_engine(engine_so_far())
+        sessions.note_engine(noted_engine())
         write_dataset(dataset, folder / store.DATASET)
         seals.write_seal(folder, DATA, [folder / store.DATASET])
     return read_dataset(folder / store.DATASET)
@@ -177,7 +177,7 @@ def _dataset(plan: Plan, folder: Path, sessions: Sessions) -> Dataset:
 def _write_common(plan: Plan, folder: Path, prepared: Prepared, sessions: Sessions) -> None:
     """Store what all batches share, so that a report needs nothing else."""
     store.check_place(sessions.folder, plan.digest)
-    sessions.note_engine(engine_so_far())
+    sessions.note_engine(noted_engine())
     if seals.is_sealed(folder, COMMON):
         return
     test, fixed = prepared.test, [one for one in prepared.foundations if not one.fitted]
@@ -199,13 +199,13 @@ def _compute(
     make_folder(place / store.JOURNALS)
     if means.scheduler is None:
         work = partial(_on_pool, plan, prepared, journals, means.device)
-        for unit, (now, results) in on_workers(work, units, means.workers or cores()):
+        for unit, (now, results) in on_workers(work, units, means.workers or usable_cores()):
             sessions.note_engine(now)
             yield unit, results
         return
     writer = cache(journals)  # of this process alone: workers send what it writes
     tasks = ((unit.key, (unit, _searches(unit, writer(unit.key)))) for unit in units)
-    own = [way.method for way in plan.methods if of_users(type(way.method))]
+    own = [way.method for way in plan.methods if is_user_code(type(way.method))]
 
     def write(key: str, name: str, *given: Any) -> None:
         getattr(writer(key), name)(*given)
@@ -226,7 +226,7 @@ def _on_pool(
 ) -> tuple[str | None, list[store.Cell]]:
     """A unit on a worker of this machine: the engine that the worker has by now, and the results."""
     results = run_unit(plan, prepared, unit, device, journals(unit.key))
-    return engine_so_far(), results
+    return noted_engine(), results
 
 
 def _on_cluster(
@@ -236,7 +236,7 @@ def _on_cluster(
     plan, prepared, device, code = shared
     session = session_at_worker(plan, device, code)
     results = run_unit(plan, prepared, task[0], device, SentSearches(task[1], line))
-    return [session, {**session, "engine": engine()}], results
+    return [session, {**session, "engine": engine_description()}], results
 
 
 def _searches(unit: Unit, journal: Journal) -> dict[str, Known]:

@@ -8,12 +8,12 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
 
-from shipid.arguments import steps_in
+from shipid.arguments import whole_steps
 from shipid.data.windows import Commands, PathSource
 from shipid.document import Document
 from shipid.engine.integrate import Method as Integrator
-from shipid.errors import DocumentError, choices
-from shipid.physics.signals import SIGNALS, named
+from shipid.errors import DocumentError, suggest_name
+from shipid.physics.signals import SIGNALS, rows_of_role
 from shipid.predictor import MOST_STEPS
 from shipid.simulation.truth import Truth
 from shipid.vessel.perturb import Family
@@ -25,7 +25,7 @@ INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the
 
 def published_keys() -> dict[str, tuple[str, float]]:
     """Key of a published envelope -> signal, factor to SI: `n`, and `n_rpm` in the unit that sailors read."""
-    names = (*INPUTS, *named("command"))
+    names = (*INPUTS, *rows_of_role("command"))
     read = {name: SIGNALS[name] for name in names if SIGNALS[name].shown}
     in_words = {f"{name}_{row.read_in.partition('/')[0]}": (name, row.factor) for name, row in read.items()}
     return {name: (name, 1.0) for name in names} | in_words
@@ -85,7 +85,7 @@ class Prediction(Strict):
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Prediction:
-        if not 2 <= steps_in(self.ahead, self.step) <= MOST_STEPS:
+        if not 2 <= whole_steps(self.ahead, self.step) <= MOST_STEPS:
             most = f"{MOST_STEPS:,}"
             raise ValueError(f"ahead = {self.ahead:g} s must be 2 to {most} steps of {self.step:g} s")
         return self
@@ -182,7 +182,7 @@ class Published(Strict):
     def _sensible(self) -> Published:
         for key, limits in self.envelope.items():
             if key not in published_keys():
-                raise ValueError(f"envelope.{key} is no input of a study: {choices(key, published_keys())}")
+                raise ValueError(f"envelope.{key} is no input of a study: {suggest_name(key, published_keys())}")
             if len(limits) != 3 or limits != sorted(limits):
                 raise ValueError(f"envelope.{key}: give [min, mean, max], not {limits}")
         return self

@@ -14,18 +14,18 @@ import numpy as np
 import pandas as pd
 from scipy.stats import kendalltau
 
-from shipid.arguments import of_class, one_of, whole_number
+from shipid.arguments import check_choice, check_class, check_whole_number
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.evidence import SIGNIFICANT, holm_correction
 from shipid.hybrid.physics import check_columns
 from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, Variant, members
+from shipid.vessel.perturb import Family, Variant, draw_members
 
 Array = np.ndarray
 Cut = tuple[Windows, Windows, list[str]]  # what `partition` gives
@@ -46,7 +46,7 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     if not chosen:
         known = name in [family.name for family in plan.families]
         fault = "draws no factor from a range" if known else "is no family"
-        hint = choices(name, [family.name for family in drawn])
+        hint = suggest_name(name, [family.name for family in drawn])
         raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
     return chosen
 
@@ -77,13 +77,13 @@ def screen(
 
     Raises ShipidError for a plan or a dataset that is none, and an engine that does not exist.
     """
-    of_class("plan", plan, Plan, "as of `read_plan`")
-    of_class("dataset", dataset, Dataset, "as of `read_dataset`")
-    of_class("wanted", wanted, Sequence, "such as `plan.families`")
+    check_class("plan", plan, Plan, "as of `read_plan`")
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`")
+    check_class("wanted", wanted, Sequence, "such as `plan.families`")
     for family in wanted:
-        of_class("family", family, Family, "as of `plan.families`")
-        one_of(f"base of the family {family.name!r}", family.base, plan.vessels)
-    count = whole_number("count", count, 1)
+        check_class("family", family, Family, "as of `plan.families`")
+        check_choice(f"base of the family {family.name!r}", family.base, plan.vessels)
+    count = check_whole_number("count", count, 1)
     pool, test, _ = partition(plan, dataset) if cut is None else cut
     size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
     for family in wanted:
@@ -92,7 +92,7 @@ def screen(
         for first in range(0, count, size):
             numbers = range(first, min(first + size, count))
             named = family.model_copy(update={"members": count})
-            variants = members(named, base, plan.file, numbers)
+            variants = draw_members(named, base, plan.file, numbers)
             yield _rows(plan, dataset, (pool, test), base, variants, device, engine)
 
 

@@ -13,16 +13,16 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from shipid.capacity import cores, processor
-from shipid.engine.native import engine
-from shipid.errors import ShipidError, legible
+from shipid.capacity import processor_name, usable_cores
+from shipid.engine.native import engine_description
+from shipid.errors import ShipidError, shorten_line
 from shipid.hybrid.device import vectors
 from shipid.physics import TERMS
 from shipid.study import store
 from shipid.study.code import UNKNOWN, code_digest
 from shipid.study.plan import USER_SCRIPT, Plan, own_code
 from shipid.study.workers import on_workers
-from shipid.units import listed
+from shipid.units import join_names
 from shipid.version import __version__
 
 PACKAGES = (
@@ -73,7 +73,7 @@ def session_on(device: str, code: Code) -> dict[str, Any]:
     others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
     return {
         "shipid": f"{__version__}, code {code_digest()}",  # the code may differ and the version not
-        "engine": engine(),
+        "engine": engine_description(),
         "processor": computer["processor"],
         "python": computer["python"],
         "device": device,
@@ -89,7 +89,7 @@ def machine() -> dict[str, Any]:
         with suppress(PackageNotFoundError):  # an extra that is not installed
             packages[name] = version(name)
     system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
-    return {**system, "processor": f"{processor()}, {vectors()}", "cores": cores(), "packages": packages}
+    return {**system, "processor": f"{processor_name()}, {vectors()}", "cores": usable_cores(), "packages": packages}
 
 
 def session_at_worker(plan: Plan, device: str, code: Code) -> dict[str, Any]:
@@ -118,11 +118,11 @@ def check_workers(plan: Plan) -> None:
         in_script = isinstance(error, AttributeError) and any(
             type(way.method).__module__ == MAIN for way in plan.methods
         )
-        failed = "" if in_script or not why else legible(f"{type(error).__name__}: {error}".removesuffix(": "))
+        failed = "" if in_script or not why else shorten_line(f"{type(error).__name__}: {error}".removesuffix(": "))
     lacking = {what: digest for what, digest in here.items() if there.get(what) != digest}
     if not lacking:
         return
-    named, known = listed([*lacking]), UNKNOWN not in lacking.values()
+    named, known = join_names([*lacking]), UNKNOWN not in lacking.values()
     if failed and known:
         raise ShipidError(f"a worker cannot import the {named}: {failed}")
     if there.keys() >= lacking.keys() and known:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from shipid.errors import ResultError
-from shipid.files import read_json, temporary_folder, whole
+from shipid.files import read_json, replace_whole, temporary_folder
 from shipid.study import seals, store
 from shipid.study.lock import sole_writer
 from shipid.study.plan import Plan, Unit
@@ -77,7 +77,7 @@ def _take_unit(folder: Path, place: Path, unit: Unit) -> None:
         return
     for name in (*files, f"{store.JOURNALS}/{unit.key}.log"):
         if (place / name).is_file():
-            with whole(folder / name) as temporary:
+            with replace_whole(folder / name) as temporary:
                 shutil.copyfile(place / name, temporary)
     seals.write_seal(folder, unit.key, [folder / name for name in files])
 

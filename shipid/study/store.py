@@ -19,14 +19,14 @@ from shipid import document as documents
 from shipid.data.windows import Windows
 from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.files import (
-    as_argument,
+    arrays_with_prefix,
     make_folder,
     open_file,
-    part_of,
+    quote_argument,
     read_arrays,
     read_json,
-    sweep,
-    sync,
+    sweep_temporary,
+    sync_to_disk,
     temporary_folder,
     write_arrays,
     write_json,
@@ -40,9 +40,9 @@ from shipid.study import seals
 from shipid.study.declared import Foundation
 from shipid.study.lock import sole_writer
 from shipid.study.plan import METHOD_CODE, TERM_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
-from shipid.units import listed, plural
+from shipid.units import join_names, plural_word
 from shipid.version import __version__
-from shipid.vessel.load import check_vessel
+from shipid.vessel.load import check_document
 
 STUDY, VESSELS, PROVENANCE, FOUNDATIONS = "study.toml", "vessels.json", seals.PROVENANCE, "foundations.json"
 DATASET, TEST, ENVELOPE = "dataset.parquet", "test.npz", "envelope.json"
@@ -95,7 +95,7 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
         raise ResultError("is a file: choose another --out", file=folder)
     try:
         make_folder(folder.parent)
-        sweep(folder.parent)
+        sweep_temporary(folder.parent)
         if not (folder / STUDY).exists():
             if os.path.realpath(folder) == os.getcwd():  # it is made anew, under the feet of this process
                 raise ResultError("is the working folder: name a new one by --out, such as --out run", file=folder)
@@ -114,7 +114,7 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
 
 def _other_study(folder: Path, plan: Plan) -> str:
     """What a folder holds that is of another digest: where the documents are equal, what was changed since."""
-    if documents.read(folder / STUDY) != plan.document:
+    if documents.read_document(folder / STUDY) != plan.document:
         return f"holds the results of another study than {plan.file}: choose another --out"
     stored, record = read_json(folder / VESSELS), provenance(folder)
     try:
@@ -122,9 +122,9 @@ def _other_study(folder: Path, plan: Plan) -> str:
     except (TypeError, KeyError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     changed += [f"the {name}" for name, digest in plan.sources.items() if record["sources"].get(name) != digest]
-    what = listed(changed) if changed else f"a default of a method, or of shipid (this is {__version__}),"
+    what = join_names(changed) if changed else f"a default of a method, or of shipid (this is {__version__}),"
     words = f"holds results from before {what} changed: choose another --out"
-    return f"{words}, or go on with it as it was: `{program_of(plan)} study resume {as_argument(folder)}`"
+    return f"{words}, or go on with it as it was: `{program_of(plan)} study resume {quote_argument(folder)}`"
 
 
 def check_readable(folder: Path) -> None:
@@ -186,19 +186,21 @@ def check_place(folder: Path, digest: str) -> None:
 def sweep_run(folder: Path) -> None:
     """Remove what processes that are gone were writing into the folder of a run."""
     for place in (folder, *(folder / name for name in FOLDERS)):
-        sweep(place)
+        sweep_temporary(place)
 
 
 def _mend(folder: Path, plan: Plan) -> None:
     """Write study and vessels again where they cannot be read; ResultError where they can and were changed."""
     try:
-        changed = documents.digest(documents.read(folder / STUDY)) != documents.digest(plan.document)
+        changed = documents.digest_document(documents.read_document(folder / STUDY)) != documents.digest_document(
+            plan.document
+        )
     except DocumentError:
         write_text(folder / STUDY, plan_text(plan))
         changed = False
     try:
         stored = read_json(folder / VESSELS)
-        digests = {name: documents.digest(entry["document"]) for name, entry in stored.items()}
+        digests = {name: documents.digest_document(entry["document"]) for name, entry in stored.items()}
         changed = changed or digests != {name: vessel.digest for name, vessel in plan.vessels.items()}
     except (ResultError, TypeError, KeyError, AttributeError):
         _write_vessels(folder, plan)
@@ -218,7 +220,7 @@ def _make(folder: Path, plan: Plan) -> None:
         _describe(above / folder.name, plan)
         try:
             os.rename(above / folder.name, folder)
-            sync(folder.parent)
+            sync_to_disk(folder.parent)
         except OSError as error:
             if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
                 raise
@@ -247,12 +249,12 @@ def stored_plan(folder: Path) -> Plan:
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     record = provenance(folder)
     try:
-        document = documents.read(folder / STUDY)
+        document = documents.read_document(folder / STUDY)
     except DocumentError as error:
         raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
     stored, file = read_json(folder / VESSELS), folder / VESSELS
     try:
-        vessels = {name: check_vessel(entry["document"], entry["file"]) for name, entry in stored.items()}
+        vessels = {name: check_document(entry["document"], entry["file"]) for name, entry in stored.items()}
         file = folder / STUDY
         plan = build_plan(document, Path(record["file"]), vessels, record["sources"], record["changes"])
     except DocumentError as error:
@@ -276,9 +278,11 @@ def _needed_script(folder: Path, record: Mapping[str, Any], document: documents.
     lacking += sorted({kinds.get(name, name) for name in record.get(METHOD_CODE, {})} - METHODS.keys())
     if not lacking:
         return ""
-    words = f"{listed(lacking)}, which a user wrote, {plural(len(lacking), 'is', 'are')} not known to this process"
-    script = f"open the run by the script that puts {plural(len(lacking), 'it', 'them')} into TERMS or METHODS"
-    return f"{words}: {script}: `{record.get('program', 'shipid')} study report {as_argument(folder)}`"
+    words = (
+        f"{join_names(lacking)}, which a user wrote, {plural_word(len(lacking), 'is', 'are')} not known to this process"
+    )
+    script = f"open the run by the script that puts {plural_word(len(lacking), 'it', 'them')} into TERMS or METHODS"
+    return f"{words}: {script}: `{record.get('program', 'shipid')} study report {quote_argument(folder)}`"
 
 
 def provenance(folder: Path) -> dict[str, Any]:
@@ -307,7 +311,7 @@ def write_patches(folder: Path, foundations: Iterable[Foundation]) -> int:
     count = 0
     for one in foundations:
         if one.base is not None and one.variant is not None and one.identify is None:
-            named = documents.bundled("models").get(one.variant.base) == Path(one.base.file)
+            named = documents.bundled_documents("models").get(one.variant.base) == Path(one.base.file)
             base = one.variant.base if named else str(Path(one.base.file).absolute())
             write_text(folder / f"{one.name}.toml", replace(one.variant, base=base).document())
             count += 1
@@ -382,7 +386,7 @@ def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """A sentence per entry in which two sessions differ."""
-    one, other = dict(documents.leaves(before)), dict(documents.leaves(now))
+    one, other = dict(documents.document_leaves(before)), dict(documents.document_leaves(now))
     changed = [name for name in {**one, **other} if one.get(name) != other.get(name)]
     return [f"{name} was {one.get(name)}, now {other.get(name)}" for name in changed]
 
@@ -458,13 +462,13 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]
     windows = Windows(
         run=arrays["run"],
         t=arrays["t"],
-        columns=part_of(arrays, "column "),
+        columns=arrays_with_prefix(arrays, "column "),
         future=arrays["future"],
-        planned=part_of(arrays, "planned "),
-        past=part_of(arrays, "past "),
-        states=part_of(arrays, "states "),
+        planned=arrays_with_prefix(arrays, "planned "),
+        past=arrays_with_prefix(arrays, "past "),
+        states=arrays_with_prefix(arrays, "states "),
         horizon=meta["horizon"],
         step=meta["step"],
         shared_clock=meta["shared"],
     )
-    return windows, part_of(arrays, "physics "), arrays["naive"]
+    return windows, arrays_with_prefix(arrays, "physics "), arrays["naive"]

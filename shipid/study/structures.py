@@ -42,11 +42,11 @@ from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LEVEL, LinearFit, Statistics, statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
 from shipid.report.structures import StructuresContent
-from shipid.simulation.measured import Measured, measure_all
+from shipid.simulation.measured import MeasuredManoeuvre, measure_all
 from shipid.study.new import proposed_horizon
 from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.ranges import UNUSUAL, contradictions
+from shipid.vessel.ranges import UNUSUAL, find_contradictions
 
 Array = NDArray[np.float64]
 Report = Callable[[str], object]
@@ -134,7 +134,9 @@ class Compared:
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
         vessel = self.fits[self.chosen].vessel
-        odd = list(contradictions(vessel.document, vessel.parameters))  # refused where it is read, unless it is named
+        odd = list(
+            find_contradictions(vessel.document, vessel.parameters)
+        )  # refused where it is read, unless it is named
         document = {
             **vessel.document,
             **({UNUSUAL: [*vessel.document.get(UNUSUAL, []), *odd]} if odd else {}),
@@ -142,7 +144,7 @@ class Compared:
             "source": f"structure {self.chosen} identified from {len(self.runs)} runs of dataset {self.digest} by "
             f"shipid {__version__}, on {self.vessel.key}, digest {self.vessel.digest}",
         }
-        return tomlkit.dumps(documents.plain(document))
+        return tomlkit.dumps(documents.plain_values(document))
 
 
 def _length(ahead: float) -> str:
@@ -377,9 +379,9 @@ TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES]
 TITLES = [f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}" for kind, angles, side in TRIALS]
 
 
-def _measured(vessel: Vessel) -> dict[str, Measured]:
+def _measured(vessel: Vessel) -> dict[str, MeasuredManoeuvre]:
     """Title -> every standard manoeuvre that the vessel can perform."""
-    ship, done = with_gear(vessel), dict[str, Measured]()
+    ship, done = with_gear(vessel), dict[str, MeasuredManoeuvre]()
     try:
         return dict(zip(TITLES, measure_all(ship, TRIALS, engine="repeated"), strict=True))
     except ShipidError as error:  # one of them: the others may be performed
@@ -422,13 +424,13 @@ def _manoeuvres(
     return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
 
 
-def _values(one: Measured) -> dict[str, float]:
+def _values(one: MeasuredManoeuvre) -> dict[str, float]:
     """The measures that are compared."""
     measures = {row["measure"]: float(row["value"]) for row in one.measures}
     return {name: measures[name] for name in SHOWN[one.standard.kind] if name in measures}
 
 
-def _measure(title: str, known: dict[str, dict[str, Measured]]) -> Measure:
+def _measure(title: str, known: dict[str, dict[str, MeasuredManoeuvre]]) -> Measure:
     """Measures of one manoeuvre; `known` holds all manoeuvres of vessels by digest, which come from one approach."""
 
     def measure(one: Vessel) -> dict[str, float]:

@@ -9,7 +9,7 @@ import pandas as pd
 
 from shipid.data.checks import check_dataset, way
 from shipid.data.dataset import Dataset, pieces, pieces_by_run
-from shipid.physics.signals import steers
+from shipid.physics.signals import is_steering
 from shipid.study.kinds import kinds_of, longest
 
 OF_A_KIND = 3  # runs of a kind from which one may be set aside: two are left that train
@@ -38,7 +38,7 @@ class Survey:
 def survey(dataset: Dataset) -> Survey:
     """Look at every run of a dataset: how long, how fast, what manoeuvre, in which order."""
     by_run, kinds, checks = pieces_by_run(dataset), kinds_of(dataset), check_dataset(dataset)
-    angles = [name for name in dataset.commands if steers(name)]
+    angles = [name for name in dataset.commands if is_steering(name)]
     runs = {}
     for run, parts in by_run.items():
         rows = longest(parts)

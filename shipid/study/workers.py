@@ -19,7 +19,7 @@ from queue import SimpleQueue
 from typing import Any, TypeVar, cast
 
 from shipid.errors import ShipidError
-from shipid.interrupts import uninterrupted
+from shipid.interrupts import hold_interrupts
 
 METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocessing; forks are less safe elsewhere
 LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in which a forkserver has its socket
@@ -63,7 +63,7 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
     _check_guard()
     left, workers, doing, processes = iter(tasks), ExitStack(), {}, {}
     try:
-        with uninterrupted(), _one_thread():  # half a process would complain
+        with hold_interrupts(), _one_thread():  # half a process would complain
             for task in islice(left, count):
                 connection, process = _start(workers)
                 with _alive(process):

@@ -8,14 +8,14 @@ from typing import Any
 from shipid.document import Document
 from shipid.physics import ACTUATORS, TERMS
 from shipid.physics.grammar import Grammar
-from shipid.physics.inertia import added_mass, rigid_body
+from shipid.physics.inertia import added_mass_entries, rigid_body_entries
 from shipid.physics.signals import SIGNALS
-from shipid.vessel.schema import SHARED, Parameter, actuators, parameters, term_blocks, term_parameters
+from shipid.vessel.schema import SHARED, Parameter, active_actuators, function_parameters, term_blocks, term_parameters
 
 Binding = dict[str, str | list[str] | dict[str, str] | float]
 
 
-def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
+def bind_block(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
     """Keyword -> dotted path, list or table of paths, or default value, for one physics function.
 
     path, block : of the document. declared : parameters of the function.
@@ -43,29 +43,31 @@ def bind(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -
     return result
 
 
-def bindings(document: Document) -> dict[str, Binding]:
+def bind_document(document: Document) -> dict[str, Binding]:
     """Dotted path of every block that the equations use -> the binding of its function's keywords."""
-    result = {"inertia": bind("inertia", document["inertia"], parameters(rigid_body))}
-    result["added_mass"] = bind("added_mass", document.get("added_mass", {}), parameters(added_mass))
+    result = {"inertia": bind_block("inertia", document["inertia"], function_parameters(rigid_body_entries))}
+    result["added_mass"] = bind_block(
+        "added_mass", document.get("added_mass", {}), function_parameters(added_mass_entries)
+    )
     for path, key, block in term_blocks(document):
-        result[path] = bind(path, block, term_parameters(TERMS[key]))
-        for command, actuator in actuators(block):
+        result[path] = bind_block(path, block, term_parameters(TERMS[key]))
+        for command, actuator in active_actuators(block):
             where = f"{path}.actuator.{command}"
-            result[where] = bind(where, actuator, parameters(ACTUATORS[actuator["kind"]].advance))
+            result[where] = bind_block(where, actuator, function_parameters(ACTUATORS[actuator["kind"]].advance))
     return result
 
 
-def units(document: Document) -> dict[str, str]:
+def parameter_units(document: Document) -> dict[str, str]:
     """Dotted path -> unit of every parameter, in the order of use."""
-    known = {"inertia": parameters(rigid_body), "added_mass": parameters(added_mass)}
+    known = {"inertia": function_parameters(rigid_body_entries), "added_mass": function_parameters(added_mass_entries)}
     moved: dict[str, str] = {}
     for path, key, block in term_blocks(document):
         known[path] = term_parameters(TERMS[key])
-        for command, actuator in actuators(block):
-            known[f"{path}.actuator.{command}"] = parameters(ACTUATORS[actuator["kind"]].advance)
+        for command, actuator in active_actuators(block):
+            known[f"{path}.actuator.{command}"] = function_parameters(ACTUATORS[actuator["kind"]].advance)
             moved[f"{path}.actuator.{command}"] = SIGNALS[command].unit
     rows: list[tuple[str, str]] = []
-    for where, binding in bindings(document).items():
+    for where, binding in bind_document(document).items():
         declared = {parameter.name: parameter for parameter in known[where]}
         table = next((parameter for parameter in declared.values() if parameter.kind == "open"), None)
         for keyword, target in binding.items():
@@ -73,7 +75,9 @@ def units(document: Document) -> dict[str, str]:
             assert parameter is not None
             unit = parameter.unit
             if isinstance(target, str):
-                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else _of(unit, moved.get(where))))
+                rows.append(
+                    (target, unit.unit(keyword) if isinstance(unit, Grammar) else _resolve_unit(unit, moved.get(where)))
+                )
             elif isinstance(target, list):
                 rows += [(path, str(unit)) for path in target]
             elif isinstance(target, dict):
@@ -82,7 +86,7 @@ def units(document: Document) -> dict[str, str]:
     return dict(rows)
 
 
-def _of(unit: str, moved: str | None) -> str:
+def _resolve_unit(unit: str, moved: str | None) -> str:
     """The unit of a number; of one of an actuator that is `of the command`, with the unit of what is moved."""
     if moved is None or not unit.endswith("of the command"):
         return unit

@@ -12,32 +12,32 @@ import numpy as np
 from casadi import SX
 
 from shipid import document as documents
-from shipid.arguments import of_class
-from shipid.errors import DocumentError, ShipidError, choices
+from shipid.arguments import check_class
+from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics import ACTUATORS, GIVEN, TERMS, Term
-from shipid.physics.frames import current, heave_rate, kinematics, vector
+from shipid.physics.frames import column_vector, current_velocity, heave_rate, position_rates
 from shipid.physics.helm import Helmsman
-from shipid.physics.inertia import added_mass, coriolis, matrix, rigid_body
-from shipid.physics.returned import returned
-from shipid.physics.signals import named, units
-from shipid.units import plural
-from shipid.users import begins_at, of_users
-from shipid.vessel.bindings import Binding, bindings
-from shipid.vessel.bindings import units as units_of
+from shipid.physics.inertia import added_mass_entries, coriolis_force, mass_matrix, rigid_body_entries
+from shipid.physics.returned import check_returned
+from shipid.physics.signals import rows_of_role, signal_units
+from shipid.units import plural_word
+from shipid.users import definition_location, is_user_code
+from shipid.vessel.bindings import Binding, bind_document
+from shipid.vessel.bindings import parameter_units as units_of
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import (
     BEHIND,
-    actuators,
-    behind,
-    functions,
-    signals,
-    structural,
+    active_actuators,
+    equation_functions,
+    function_signals,
+    structural_keys,
     term_blocks,
     term_parameters,
+    upstream_signals,
     vessel_model,
 )
-from shipid.vessel.schema import parameters as declared
-from shipid.vessel.terms import called, check_term, no_signal, states_of
+from shipid.vessel.schema import function_parameters as declared
+from shipid.vessel.terms import call_user_function, check_term, no_signal, term_states
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
@@ -46,7 +46,7 @@ LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of e
 PLANE, HEAVE = (0, 1, 5), 2
 CORIOLIS = {"full": PLANE, "mmg": (0, 1), "none": ()}  # axes on which added mass turns with the ship by formula
 HELM = "(helm)"  # prefix of the states of a helmsman: no thruster has such a name
-WASH = 3  # numbers that a propeller gives to what is behind it, `shipid.physics.propeller.wash`
+WASH = 3  # numbers that a propeller gives to what is behind it, `shipid.physics.propeller.propeller_wash`
 UNROLL_UP_TO = 32  # components: beyond it a sum is mapped, not written out
 
 
@@ -109,42 +109,46 @@ class Dynamics:
 _compiled: dict[tuple[Any, ...], Dynamics] = {}
 
 
-def dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
+def vessel_dynamics(vessel: Vessel, helmsman: Helmsman | None = None) -> Dynamics:
     """Equations of a vessel; vessels of one structure (all members of a family) share one object.
 
     With a helmsman, its inputs take the place of the commands; DocumentError if its orders do not fit the vessel.
     ShipidError for what is no vessel.
     """
-    of_class("vessel", vessel, Vessel, "as of `load_vessel`")  # here all that simulate, fit or identify come by
-    key = (vessel.structure, helmsman, *functions(vessel.document).values())  # a notebook may put another into TERMS
+    check_class("vessel", vessel, Vessel, "as of `load_vessel`")  # here all that simulate, fit or identify come by
+    key = (
+        vessel.structure,
+        helmsman,
+        *equation_functions(vessel.document).values(),
+    )  # a notebook may put another into TERMS
     if key not in _compiled:
-        _compiled[key] = _assemble(vessel, helmsman)
+        _compiled[key] = _assemble_dynamics(vessel, helmsman)
     return _compiled[key]
 
 
-def _symbols(name: str, entries: Sequence[str]) -> tuple[SX, dict[str, SX]]:
+def _named_symbols(name: str, entries: Sequence[str]) -> tuple[SX, dict[str, SX]]:
     """A symbolic vector, and its entries by name."""
     vector = SX.sym(name, len(entries))
     return vector, dict(zip(entries, ca.vertsplit(vector) if entries else [], strict=True))
 
 
-def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
+def _assemble_dynamics(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     axes = vessel.axes
     rows = list(axes)
     terms = list(term_blocks(vessel.document))
     for _, key, _ in terms:  # a notebook may have put another into TERMS since the vessel was read
         check_term(key)
-    if any(of_users(function) for held in functions(vessel.document).values() for function in held):
-        documents.parse(vessel_model(), vessel.document, vessel.file)
-        if (bindings(vessel.document), units_of(vessel.document)) != (vessel.bound, vessel.units):
+    if any(is_user_code(function) for held in equation_functions(vessel.document).values() for function in held):
+        documents.parse_model(vessel_model(), vessel.document, vessel.file)
+        if (bind_document(vessel.document), units_of(vessel.document)) != (vessel.bound, vessel.units):
             raise ShipidError("its terms take other numbers than when it was read: load it again", file=vessel.file)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
-    hidden = _hidden(terms)
-    ordered = _orders_taken(terms)
-    state, state_of = _symbols("state", [*names, *(name for entries in hidden.values() for name in entries)])
-    commands, input_of = _symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
-    environment, weather = _symbols("environment", _environment(vessel))
-    parameters, value_of = _symbols("parameters", list(vessel.parameters))
+    hidden = _hidden_states(terms)
+    ordered = _command_names(terms)
+    state, state_of = _named_symbols("state", [*names, *(name for entries in hidden.values() for name in entries)])
+    commands, input_of = _named_symbols("commands", tuple(helmsman.inputs) if helmsman else ordered)
+    environment, weather = _named_symbols("environment", _needed_environment(vessel))
+    parameters, value_of = _named_symbols("parameters", list(vessel.parameters))
     tau_extra, dt = SX.sym("tau_extra", len(axes)), SX.sym("dt")
     bound = vessel.bound
 
@@ -152,11 +156,11 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     orders, helm_after = dict(input_of), list(helm.values())
     if helmsman:
         seen = {name: state_of[name] for name in names}
-        orders = _ordered(helmsman, ordered, helmsman.orders(seen, input_of, helm), vessel)
+        orders = _orders_by_command(helmsman, ordered, helmsman.orders(seen, input_of, helm), vessel)
         if helmsman.advance:
             after = helmsman.advance(seen, input_of, helm, dt)
             helm_after = [after[name] for name in helm]
-    lags, actual, lags_after = _actuators(terms, bound, orders, value_of, dt)
+    lags, actual, lags_after = _assemble_actuators(terms, bound, orders, value_of, dt)
     memory = {**{f"{HELM}.{name}": symbol for name, symbol in helm.items()}, **lags}
 
     eta, nu = SX(6, 1), SX(6, 1)
@@ -164,27 +168,29 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         eta[axis], nu[axis] = state[position], state[len(axes) + position]
     nu_c, nu_c_dot = SX(6, 1), SX(6, 1)
     if "current" in vessel.document:
-        nu_c, nu_c_dot = current(eta, nu, weather["V_c"], weather["beta_c"], heaves=HEAVE in axes)
+        nu_c, nu_c_dot = current_velocity(eta, nu, weather["V_c"], weather["beta_c"], heaves=HEAVE in axes)
     nu_r = nu - nu_c
     states_of = {path: ca.vertcat(*(state_of[name] for name in entries)) for path, entries in hidden.items()}
     available = {"eta": eta, "nu": nu, "nu_r": nu_r, "psi": eta[5], **weather, **actual}
 
-    M_RB = matrix(rigid_body(**_values(bound["inertia"], value_of)))
-    M_A = matrix(added_mass(**_values(bound["added_mass"], value_of)))
+    M_RB = mass_matrix(rigid_body_entries(**_symbol_arguments(bound["inertia"], value_of)))
+    M_A = mass_matrix(added_mass_entries(**_symbol_arguments(bound["added_mass"], value_of)))
     kept = CORIOLIS[vessel.document.get("added_mass", {}).get("coriolis", "full")]
     force = _added_mass_force(M_A, nu_r, kept)
     if vessel.document["inertia"].get("coriolis", "full") == "full":
-        force -= coriolis(M_RB, nu_r)  # with the water's own motion of M_RB nu_c_dot: that of nu (Fossen 2021, 10.3)
+        force -= coriolis_force(
+            M_RB, nu_r
+        )  # with the water's own motion of M_RB nu_c_dot: that of nu (Fossen 2021, 10.3)
     if HEAVE in axes:
-        force += _upright(eta, nu_r, M_RB[0, 0])
-    available |= _gives(terms, available, bound, value_of, outputs=False)
+        force += _upright_correction(eta, nu_r, M_RB[0, 0])
+    available |= _component_outputs(terms, available, bound, value_of, outputs=False)
     summed, mapped = _sum_of_terms(terms, available, states_of, bound, value_of)
-    shown = _gives(terms, available, bound, value_of, outputs=True)
+    shown = _component_outputs(terms, available, bound, value_of, outputs=True)
     inverse = ca.inv_minor if len(rows) <= 3 else ca.inv  # four masses multiplied overflow single precision
     through_water = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     acceleration = through_water + nu_c_dot[rows]
     more = [
-        _rates(key, {**available, "state": states_of[path]}, _values(bound[path], value_of))
+        _state_rates(key, {**available, "state": states_of[path]}, _symbol_arguments(bound[path], value_of))
         for path, key, _ in terms
         if path in states_of
     ]
@@ -195,7 +201,7 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         return ca.Function(name, [*inputs, *extra], [ca.densify(result)], [*INPUTS, *last], ["result"], {"cse": True})
 
     return Dynamics(
-        rates=function("rates", ca.vertcat(kinematics(eta, nu)[rows], acceleration, *more), tau_extra),
+        rates=function("rates", ca.vertcat(position_rates(eta, nu)[rows], acceleration, *more), tau_extra),
         advance=function("advance", ca.vertcat(*helm_after, *lags_after), dt),
         orders=function("orders", ca.vertcat(*(orders[name] for name in ordered))),
         measured=function("measured", ca.vertcat(SX(0, 1), *shown.values())),
@@ -205,23 +211,23 @@ def _assemble(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         ),
         state=names,
         hidden=tuple(name for entries in hidden.values() for name in entries),
-        memory={**dict.fromkeys(memory, "-"), **units(lags)},
+        memory={**dict.fromkeys(memory, "-"), **signal_units(lags)},
         commands=tuple(input_of),
         environment=tuple(weather),
         parameters=tuple(vessel.parameters),
         ordered=ordered,
-        outputs=units(shown),
+        outputs=signal_units(shown),
         helmsman=helmsman,
     )
 
 
-def _orders_taken(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[str, ...]:
+def _command_names(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> tuple[str, ...]:
     """Commands of the terms, named by the last part of the path of the block: `port.n`."""
     return tuple(
         f"{path.rsplit('.', 1)[-1]}.{signal}"
         for path, key, _ in terms
-        for signal in signals(TERMS[key].function)
-        if signal in named("command")
+        for signal in function_signals(TERMS[key].function)
+        if signal in rows_of_role("command")
     )
 
 
@@ -232,12 +238,12 @@ def _added_mass_force(M_A: SX, nu_r: SX, kept: tuple[int, ...]) -> SX:
     inertial frame, on w_dot + p v - q u, and what is coupled to it has no others.
     """
     heave = nu_r[0] * nu_r[4] - nu_r[1] * nu_r[3]
-    plane = ca.diag(vector(*(1 if axis in PLANE else 0 for axis in range(6))))
-    turning = ca.diag(vector(*(1 if axis in kept else 0 for axis in range(6))))
-    return M_A @ vector(0, 0, heave, 0, 0, 0) - turning @ coriolis(plane @ M_A @ plane, plane @ nu_r)
+    plane = ca.diag(column_vector(*(1 if axis in PLANE else 0 for axis in range(6))))
+    turning = ca.diag(column_vector(*(1 if axis in kept else 0 for axis in range(6))))
+    return M_A @ column_vector(0, 0, heave, 0, 0, 0) - turning @ coriolis_force(plane @ M_A @ plane, plane @ nu_r)
 
 
-def _upright(eta: SX, nu: SX, m: SX) -> SX:
+def _upright_correction(eta: SX, nu: SX, m: SX) -> SX:
     """Correction (6) of heave forces, which act vertically and not along the inclined body axis.
 
     The momentum of heave m h rotates with the body axes: -m q h in surge and m p h in sway. Buoyancy and wave pressure,
@@ -245,25 +251,25 @@ def _upright(eta: SX, nu: SX, m: SX) -> SX:
     rolling ship have a mean along the body axes, which the table of mean drift already includes.
     """
     h = heave_rate(eta, nu)
-    return vector(m * nu[4] * h, -m * nu[3] * h, 0, 0, 0, 0)
+    return column_vector(m * nu[4] * h, -m * nu[3] * h, 0, 0, 0, 0)
 
 
-def _hidden(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:
+def _hidden_states(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[str, list[str]]:
     """Path of each term with additional states -> their names, `path.name`."""
-    found = {path: states_of(key, block) for path, key, block in terms}
+    found = {path: term_states(key, block) for path, key, block in terms}
     return {path: [f"{path}.{name}" for name in names] for path, names in found.items() if names}
 
 
-def _rates(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
+def _state_rates(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
     """d(state)/dt of the additional states of a term."""
     function, where, count = TERMS[key].rates, f"rates of {key}", available["state"].numel()
     assert function is not None
-    value, given = _called(where, key, function, available, keywords)
-    words = f"{count} {plural(count, 'number')}, one for each of its states"
-    return returned(where, function, value, given, count, words)
+    value, given = _call_term(where, key, function, available, keywords)
+    words = f"{count} {plural_word(count, 'number')}, one for each of its states"
+    return check_returned(where, function, value, given, count, words)
 
 
-def _called(
+def _call_term(
     where: str, key: str, function: Callable[..., Any], available: Mapping[str, SX], keywords: Mapping[str, Any]
 ) -> tuple[Any, list[Any]]:
     """What a function of a term returns for its signals, selected by name, and those keywords that it takes; and these.
@@ -273,21 +279,23 @@ def _called(
     others = {parameter.name for parameter in term_parameters(TERMS[key])}
     others -= {parameter.name for parameter in declared(function)}
     kept = {keyword: value for keyword, value in keywords.items() if keyword not in others}
-    unknown = next((name for name in signals(function) if name not in available), None)
+    unknown = next((name for name in function_signals(function) if name not in available), None)
     if unknown is not None:
-        raise ShipidError(f"{where}: {no_signal(unknown, tuple(available))}{begins_at(function)}")
-    taken = [available[name] for name in signals(function)]
-    return called(where, function, *taken, **kept), [*taken, *kept.values()]
+        raise ShipidError(f"{where}: {no_signal(unknown, tuple(available))}{definition_location(function)}")
+    taken = [available[name] for name in function_signals(function)]
+    return call_user_function(where, function, *taken, **kept), [*taken, *kept.values()]
 
 
-def _ordered(helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any], vessel: Vessel) -> dict[str, SX]:
+def _orders_by_command(
+    helmsman: Helmsman, ordered: Sequence[str], given: Mapping[str, Any], vessel: Vessel
+) -> dict[str, SX]:
     """Order of each command, from the helmsman's orders by command or by signal."""
     names = {name for name in given if name in ordered or any(name == o.rsplit(".", 1)[-1] for o in ordered)}
     unknown = sorted(set(given) - names)
     result = {name: given.get(name, given.get(name.rsplit(".", 1)[-1])) for name in ordered}
     missing = [name for name, order in result.items() if order is None]
     if missing or (unknown and not names):
-        message = f"{helmsman.name} gives no order for {', '.join(missing) or choices(unknown[0], ordered)}"
+        message = f"{helmsman.name} gives no order for {', '.join(missing) or suggest_name(unknown[0], ordered)}"
         raise DocumentError(message, file=vessel.file)
     return {name: SX(order) for name, order in result.items()}
 
@@ -309,8 +317,8 @@ def _sum_of_terms(
         extra = _of_component(path, term, block, available)
         if path in states_of:
             extra["state"] = states_of[path]
-        wrench = partial(_wrench, key, {**available, **extra}, _values(bound[path], value_of))
-        widths, arrays = _components(key, block)
+        wrench = partial(_term_wrench, key, {**available, **extra}, _symbol_arguments(bound[path], value_of))
+        widths, arrays = _component_arrays(key, block)
         if arrays is not None and len(arrays) <= UNROLL_UP_TO:
             for row in arrays:
                 total += wrench(dict(zip(widths, row, strict=True)))
@@ -324,12 +332,12 @@ def _sum_of_terms(
 def _of_component(path: str, term: Term, block: Mapping[str, Any], available: Mapping[str, SX]) -> dict[str, SX]:
     """Signals of one component: commands, as its actuators have reached them, and what one that it is behind gives."""
     component = path.rsplit(".", 1)[-1]
-    mine = {name: f"{component}.{name}" for name in named("command")}
-    mine |= {name: f"{block[BEHIND]}.{name}" for name in behind(term)}
+    mine = {name: f"{component}.{name}" for name in rows_of_role("command")}
+    mine |= {name: f"{block[BEHIND]}.{name}" for name in upstream_signals(term)}
     return {name: available[source] for name, source in mine.items() if source in available}
 
 
-def _gives(
+def _component_outputs(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     available: Mapping[str, SX],
     bound: Mapping[str, Binding],
@@ -344,48 +352,48 @@ def _gives(
             if (name in GIVEN) != outputs:
                 here = {**available, **_of_component(path, TERMS[key], block, available)}
                 where = f"{name} of {key}"
-                value, given = _called(where, key, function, here, _values(bound[path], value_of))
+                value, given = _call_term(where, key, function, here, _symbol_arguments(bound[path], value_of))
                 if value is not None:  # an output whose parameters the block lacks
                     count = 1 if outputs else WASH
-                    result[f"{path.rsplit('.', 1)[-1]}.{name}"] = returned(where, function, value, given, count)
+                    result[f"{path.rsplit('.', 1)[-1]}.{name}"] = check_returned(where, function, value, given, count)
     return result
 
 
-def _components(key: str, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
+def _component_arrays(key: str, block: Mapping[str, Any]) -> tuple[dict[str, int], np.ndarray | None]:
     """Arguments that a term sums over, with their widths, and their values (num_components, num_entries).
 
     No values where they are drawn outside; one empty row for a term that sums over nothing.
     """
     term = TERMS[key]
-    keys = {name: block[name] for name in structural(term)}
+    keys = {name: block[name] for name in structural_keys(term)}
     if term.drawn is not None:
-        return dict(called(f"drawn of {key}", term.drawn, **keys)), None
+        return dict(call_user_function(f"drawn of {key}", term.drawn, **keys)), None
     if term.components is None:
         return {}, np.zeros((1, 0))
-    columns = called(f"components of {key}", term.components, **keys)
+    columns = call_user_function(f"components of {key}", term.components, **keys)
     try:
         return dict.fromkeys(columns, 1), np.column_stack([np.array(values, float) for values in columns.values()])
     except (AttributeError, TypeError, ValueError):
         message = f"components of {key} must return a table, argument -> numbers (C,), equally many"
-        raise ShipidError(f"{message}, not {columns!r}{begins_at(term.components)}") from None
+        raise ShipidError(f"{message}, not {columns!r}{definition_location(term.components)}") from None
 
 
-def _wrench(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> SX:
+def _term_wrench(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> SX:
     """Wrench of one term for its signals, selected by name; `entries` are those of one component."""
     function = TERMS[key].function
-    value, given = _called(key, key, function, {**available, **entries}, keywords)
-    return returned(key, function, value, given, 6, "a wrench (6)")
+    value, given = _call_term(key, key, function, {**available, **entries}, keywords)
+    return check_returned(key, function, value, given, 6, "a wrench (6)")
 
 
-def _environment(vessel: Vessel) -> tuple[str, ...]:
+def _needed_environment(vessel: Vessel) -> tuple[str, ...]:
     """Environment channels that the terms of a vessel need."""
-    wanted = {name for _, key, _ in term_blocks(vessel.document) for name in signals(TERMS[key].function)}
+    wanted = {name for _, key, _ in term_blocks(vessel.document) for name in function_signals(TERMS[key].function)}
     if "current" in vessel.document:
         wanted |= {"V_c", "beta_c"}
-    return tuple(name for name in named("environment") if name in wanted)
+    return tuple(name for name in rows_of_role("environment") if name in wanted)
 
 
-def _actuators(
+def _assemble_actuators(
     terms: list[tuple[str, str, Mapping[str, Any]]],
     bound: Mapping[str, Binding],
     orders: Mapping[str, SX],
@@ -397,18 +405,18 @@ def _actuators(
     actual = dict(orders)
     advanced = []
     for path, _, block in terms:
-        for command, actuator in actuators(block):
+        for command, actuator in active_actuators(block):
             name = f"{path.rsplit('.', 1)[-1]}.{command}"
             member = ACTUATORS[actuator["kind"]]
             memory[name] = SX.sym(name)
-            keywords = _values(bound[f"{path}.actuator.{command}"], value_of)
+            keywords = _symbol_arguments(bound[f"{path}.actuator.{command}"], value_of)
             taken = {parameter.name for parameter in declared(member.output)}
             actual[name] = member.output(memory[name], **{k: v for k, v in keywords.items() if k in taken})
             advanced.append(member.advance(orders[name], memory[name], dt, **keywords))
     return memory, actual, advanced
 
 
-def _values(binding: Binding, value_of: Mapping[str, SX]) -> dict[str, Any]:
+def _symbol_arguments(binding: Binding, value_of: Mapping[str, SX]) -> dict[str, Any]:
     """Keyword arguments of a physics function, with paths replaced by their symbols."""
 
     def resolve(target: Any) -> Any:

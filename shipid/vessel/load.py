@@ -14,26 +14,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import BaseModel, ConfigDict, FiniteFloat
 
 from shipid import document as documents
-from shipid.arguments import path_of
+from shipid.arguments import as_path
 from shipid.document import Document
-from shipid.errors import DocumentError, choices
+from shipid.errors import DocumentError, suggest_name
 from shipid.files import open_file
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES, MOTIONS
-from shipid.physics.inertia import mass
-from shipid.physics.signals import ACTUAL, row_of
+from shipid.physics.inertia import total_mass
+from shipid.physics.signals import ACTUAL, signal_row
 from shipid.physics.waves import TABLES
-from shipid.vessel.bindings import Binding, bindings, units
-from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, contradiction, out_of_range
+from shipid.vessel.bindings import Binding, bind_document, parameter_units
+from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, first_contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
     TABLE,
-    behind,
-    components,
-    kinds,
+    kind_blocks,
+    kinds_of_group,
     term_blocks,
     term_model,
+    upstream_signals,
     vessel_model,
 )
 
@@ -64,7 +64,7 @@ class Vessel:
     @cached_property
     def digest(self) -> str:
         """Digest of the document, so that a patch knows its base."""
-        return documents.digest(self.document)
+        return documents.digest_document(self.document)
 
     @property
     def name(self) -> str:
@@ -90,24 +90,26 @@ class Vessel:
     @cached_property
     def bound(self) -> dict[str, Binding]:
         """Dotted path of every block that the equations use -> what binds its numbers to a physics function."""
-        return bindings(self.document)
+        return bind_document(self.document)
 
     @cached_property
     def units(self) -> dict[str, str]:
         """Dotted path -> unit of every parameter, in document order of use; not to be changed."""
-        return units(self.document)
+        return parameter_units(self.document)
 
     @cached_property
     def parameters(self) -> dict[str, float]:
         """Dotted path -> value of every number that the equations use; not to be changed."""
-        return {path: float(documents.get(self.document, path)) for path in self.units}
+        return {path: float(documents.value_at_path(self.document, path)) for path in self.units}
 
     @property
     def above_zero(self) -> frozenset[str]:
         """Dotted paths of the parameters that must be above 0, such as `inertia.m`."""
         model = vessel_model()
         return frozenset(
-            path for path in self.units if not documents.suits(model, documents.replace(self.document, {path: 0.0}))
+            path
+            for path in self.units
+            if not documents.is_valid_for(model, documents.replace_values(self.document, {path: 0.0}))
         )
 
     @property
@@ -123,14 +125,16 @@ class Vessel:
             {name: self.parameters[target] if isinstance(target, str) else target for name, target in block.items()}
             for block in (self.bound["inertia"], self.bound["added_mass"])
         ]
-        M = mass(*numbers)
+        M = total_mass(*numbers)
         return [[M[row][column] for column in self.axes] for row in self.axes]
 
     @cached_property
     def structure(self) -> str:
         """Digest of the document without its parameters' values: vessels of one structure compile once."""
-        without_values = documents.replace(_without_words(self.document), dict.fromkeys(self.parameters, 0))
-        return documents.digest([without_values, list(self.parameters)])  # the order is that of the input vector
+        without_values = documents.replace_values(_without_words(self.document), dict.fromkeys(self.parameters, 0))
+        return documents.digest_document(
+            [without_values, list(self.parameters)]
+        )  # the order is that of the input vector
 
     def with_values(self, values: Mapping[str, Any]) -> Vessel:
         """A copy of the vessel with numbers replaced or blocks added at dotted paths; checked like any document.
@@ -140,7 +144,7 @@ class Vessel:
         if not hasattr(values, "items") or not all(isinstance(path, str) for path in values.keys()):  # noqa: SIM118
             message = f"values must be a mapping of dotted paths, such as {{'inertia.m': 4e5}}, not {values!r}"
             raise DocumentError(message, file=self.file)
-        values = {path: documents.plain(value) for path, value in values.items()}
+        values = {path: documents.plain_values(value) for path, value in values.items()}
         least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
         odd = {
             path: value
@@ -148,15 +152,15 @@ class Vessel:
             if type(value) is not float or not least < abs(value) < most  # 0 among them; most are not: quick
         }
         documents.check_values(odd, self.file)
-        document = documents.replace(self.document, values, self.file)
+        document = documents.replace_values(self.document, values, self.file)
         numbers = all(type(value) in (float, int) for value in values.values())
-        if numbers and values.keys() <= self.units.keys() and documents.suits(vessel_model(), document):
+        if numbers and values.keys() <= self.units.keys() and documents.is_valid_for(vessel_model(), document):
             vessel = Vessel(document, self.file)  # terms, names and units are as they were
             vessel.__dict__.update(bound=self.bound, units=self.units, structure=self.structure)
             vessel.__dict__["parameters"] = self.parameters | {path: float(value) for path, value in values.items()}
             _check_numbers(vessel)
             return vessel
-        return check_vessel(document, self.file)
+        return check_document(document, self.file)
 
 
 def load_vessel(name: str | Path, relative_to: str | Path | None = None) -> Vessel:
@@ -166,33 +170,35 @@ def load_vessel(name: str | Path, relative_to: str | Path | None = None) -> Vess
 
     A patch has `base` (a vessel), optionally `base_digest`, and `[set]` with dotted paths; see `shipid.vessel.perturb`.
     """
-    folder = None if relative_to is None else path_of("relative_to", relative_to, DocumentError)
-    vessel = _load(documents.find(name, "models", folder), ())
-    fault = contradiction(vessel.document, vessel.parameters)
+    folder = None if relative_to is None else as_path("relative_to", relative_to, DocumentError)
+    vessel = _load_file(documents.find_document(name, "models", folder), ())
+    fault = first_contradiction(vessel.document, vessel.parameters)
     if fault is not None:
         raise DocumentError(fault[1], file=vessel.file, path=fault[0])
     return vessel
 
 
-def _load(file: Path, above: tuple[Path, ...]) -> Vessel:
-    document = documents.read(file)
+def _load_file(file: Path, above: tuple[Path, ...]) -> Vessel:
+    document = documents.read_document(file)
     if "base" in document:
-        return _patched(document, file, above)
-    return check_vessel(_whole(document, file, above), str(file))
+        return _apply_patch(document, file, above)
+    return check_document(_with_base(document, file, above), str(file))
 
 
-def _whole(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
+def _with_base(document: Document, file: Path, above: tuple[Path, ...]) -> Document:
     """A document merged over the one that it `extends`, with its CSV tables read in."""
     document = _with_tables(document, file)
     if "extends" not in document:
         return document
-    under = _other(document.pop("extends"), "extends", file, above)
-    if "base" in documents.read(under):
+    under = _find_base(document.pop("extends"), "extends", file, above)
+    if "base" in documents.read_document(under):
         raise DocumentError(f"{under.stem!r} is a patch: extend a vessel", file=file, path="extends")
-    return documents.merge(_whole(documents.read(under), under, (*above, file.resolve())), document)
+    return documents.merge_documents(
+        _with_base(documents.read_document(under), under, (*above, file.resolve())), document
+    )
 
 
-def sources(vessel: Vessel) -> dict[str, str]:
+def term_sources(vessel: Vessel) -> dict[str, str]:
     """Dotted path of every term, acting or off -> source of its numbers; empty where its document names none.
 
     It is the source of the block, else that of the document that wrote the block; of several documents that extend one
@@ -200,25 +206,25 @@ def sources(vessel: Vessel) -> dict[str, str]:
     """
     lineage, file = [], Path(vessel.file)
     while True:
-        document = documents.read(file)
+        document = documents.read_document(file)
         if "base" in document:  # a patch changes numbers of blocks that others wrote
-            file = documents.find(document["base"], "models", file.parent)
+            file = documents.find_document(document["base"], "models", file.parent)
             continue
         lineage.append(document)
         if "extends" not in document:
             break
-        file = documents.find(document["extends"], "models", file.parent)
+        file = documents.find_document(document["extends"], "models", file.parent)
     return {
-        path: next(filter(None, (_source(document, path) for document in lineage)), "")
+        path: next(filter(None, (_block_source(document, path) for document in lineage)), "")
         for off in (False, True)
         for path, _, _ in term_blocks(vessel.document, off)
     }
 
 
-def _source(document: Document, path: str) -> str:
+def _block_source(document: Document, path: str) -> str:
     """The source that a document gives for a block; empty if the document does not contain the block."""
     try:
-        block = documents.get(document, path)
+        block = documents.value_at_path(document, path)
     except KeyError:
         return ""
     return str(block.get("source") or document.get("source", ""))
@@ -229,11 +235,13 @@ def _with_tables(document: Document, file: Path) -> Document:
     tables = {}
     for path, key, block in (*term_blocks(document), *term_blocks(document, off=True)):
         if key in TABLES and isinstance(block.get(TABLE), str):
-            tables[f"{path}.{TABLE}"] = _table(file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}")
-    return documents.replace(document, tables) if tables else dict(document)
+            tables[f"{path}.{TABLE}"] = _read_table_file(
+                file.parent / block[TABLE], TABLES[key], file, f"{path}.{TABLE}"
+            )
+    return documents.replace_values(document, tables) if tables else dict(document)
 
 
-def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
+def _read_table_file(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dict[str, list[float]]:
     """Columns of a CSV file with a header; lines that begin with # are comments."""
     import numpy as np
     import pandas as pd  # most vessels have no table, and it takes its time
@@ -249,7 +257,7 @@ def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dic
         raise DocumentError(f"{source}: not a CSV table with a header", file=file, path=path) from None
     missing = next((name for name in columns if name not in frame), None)
     if missing is not None:
-        message = f"{source}: has no column {missing!r}: {choices(missing, [str(name) for name in frame])}"
+        message = f"{source}: has no column {missing!r}: {suggest_name(missing, [str(name) for name in frame])}"
         raise DocumentError(message, file=file, path=path)
     numbers = frame[list(columns)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     if not np.isfinite(numbers).all():
@@ -258,10 +266,10 @@ def _table(source: Path, columns: tuple[str, ...], file: Path, path: str) -> dic
     return {name: numbers[:, i].tolist() for i, name in enumerate(columns)}
 
 
-def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
+def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
     """File of the vessel that a document extends or patches; DocumentError for a circular reference."""
     try:
-        other = documents.find(str(name), "models", file.parent)
+        other = documents.find_document(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
     if len(above) >= LONGEST_CHAIN:
@@ -272,7 +280,7 @@ def _other(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Path:
     return other
 
 
-class Patch(BaseModel):
+class VesselPatch(BaseModel):
     """A patch document: a base vessel, the digest it was made for, and values by dotted path."""
 
     model_config = ConfigDict(extra="forbid")
@@ -285,29 +293,31 @@ class Patch(BaseModel):
     provenance: dict[str, Any] = {}
 
 
-def _patched(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
-    patch: Patch = documents.parse(Patch, document, file)
-    base = _load(_other(patch.base, "base", file, above), (*above, file.resolve()))
+def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
+    patch: VesselPatch = documents.parse_model(VesselPatch, document, file)
+    base = _load_file(_find_base(patch.base, "base", file, above), (*above, file.resolve()))
     if patch.base_digest not in (None, base.digest):
         changed = f"the base {patch.base!r} has changed since (now {base.digest!r}); make the patch anew"
         raise DocumentError(f"{patch.base_digest!r}: {changed}", file=file, path="base_digest")
     for path in patch.set:
         if path not in base.parameters:
             raise DocumentError(
-                f"{patch.base} has no such parameter: {choices(path, base.parameters)}", file=file, path=f"set.{path}"
+                f"{patch.base} has no such parameter: {suggest_name(path, base.parameters)}",
+                file=file,
+                path=f"set.{path}",
             )
     changes = {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"}
     if patch.unusual:
         changes[UNUSUAL] = [*base.document.get(UNUSUAL, []), *patch.unusual]
-    named = documents.replace(base.document, changes)
-    return check_vessel(named, str(file))
+    named = documents.replace_values(base.document, changes)
+    return check_document(named, str(file))
 
 
-def check_vessel(document: Document, file: str) -> Vessel:
+def check_document(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
-    for path, group, block in components(document):
+    for path, group, block in kind_blocks(document):
         _check_component(path, group, block, file)
-    documents.parse(vessel_model(), document, file)
+    documents.parse_model(vessel_model(), document, file)
     vessel = Vessel(document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):
@@ -322,7 +332,9 @@ def check_vessel(document: Document, file: str) -> Vessel:
     _check_behind(vessel)
     _check_units(vessel)
     _check_numbers(vessel)
-    vessel.__dict__["digest"] = documents.digest(document)  # of what was checked, whatever becomes of the document
+    vessel.__dict__["digest"] = documents.digest_document(
+        document
+    )  # of what was checked, whatever becomes of the document
     return vessel
 
 
@@ -343,11 +355,11 @@ def _check_behind(vessel: Vessel) -> None:
     """DocumentError for a component behind one that is missing, off, or does not provide the needed signal."""
     terms = list(term_blocks(vessel.document))
     for path, key, block in terms:
-        for name in behind(TERMS[key]):
+        for name in upstream_signals(TERMS[key]):
             giving = [other.rsplit(".", 1)[-1] for other, kind, _ in terms if name in TERMS[kind].gives]
             if block[BEHIND] not in giving:
                 off = [other.rsplit(".", 1)[-1] for other, _, _ in term_blocks(vessel.document, off=True)]
-                remedy = "it is off" if block[BEHIND] in off else choices(block[BEHIND], giving)
+                remedy = "it is off" if block[BEHIND] in off else suggest_name(block[BEHIND], giving)
                 message = f"{block[BEHIND]!r} gives no {name}: {remedy}"
                 raise DocumentError(message, file=vessel.file, path=f"{path}.{BEHIND}")
 
@@ -361,7 +373,7 @@ def _check_sense(vessel: Vessel) -> None:
         if group == "added_mass" and AXES[MOTIONS.index(name[2])] == name[0] and value > 0:
             fault = f"{value:g}: added mass is on the force side, so {name} is negative"
         elif ".actuator." in path and name in ("low", "high"):
-            row = row_of(path.rsplit(".", 2)[-2])
+            row = signal_row(path.rsplit(".", 2)[-2])
             if row is not None and row.angle and abs(value) > MOST_RADIANS:
                 fault = f"{value:g}: is in rad, and that is more than a full turn"
             elif name == "high" and value <= (low := values.get(f"{group}.low", -math.inf)):
@@ -391,11 +403,11 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
         raise DocumentError(message, file=file, path=path)
     if not isinstance(block, Mapping):
         raise DocumentError(f"{block!r}: must be a table with a `kind`", file=file, path=path)
-    kind, valid = block.get("kind"), kinds(group)
+    kind, valid = block.get("kind"), kinds_of_group(group)
     if kind not in valid:
         message = "missing" if kind is None else f"{kind!r} is no kind of {group}"
-        raise DocumentError(f"{message}: {choices(kind, valid)}", file=file, path=f"{path}.kind")
-    documents.parse(term_model(f"{group}.{kind}"), block, file, path)
+        raise DocumentError(f"{message}: {suggest_name(kind, valid)}", file=file, path=f"{path}.kind")
+    documents.parse_model(term_model(f"{group}.{kind}"), block, file, path)
 
 
 def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
@@ -428,7 +440,7 @@ def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tupl
 
     missing = next((name for name in columns if name not in table), None)
     if missing is not None:
-        raise DocumentError(f"has no column {missing!r}: {choices(missing, table)}", file=file, path=path)
+        raise DocumentError(f"has no column {missing!r}: {suggest_name(missing, table)}", file=file, path=path)
     _check_lengths(path, table, file)
     omega, beta = (np.unique(table[name]) for name in ("omega", "beta_deg"))
     pairs = set(zip(table["omega"], table["beta_deg"], strict=True))
@@ -444,7 +456,7 @@ def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tupl
 def _check_units(vessel: Vessel) -> None:
     for path in vessel.units:
         try:
-            documents.get(vessel.document, path)
+            documents.value_at_path(vessel.document, path)
         except KeyError:
             group, name = path.rsplit(".", 1)
             message = f"missing: a term needs {name}, here or in the block of the term"

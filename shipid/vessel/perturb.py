@@ -29,10 +29,10 @@ from pydantic import (
 )
 
 from shipid import document as documents
-from shipid.arguments import of_class, whole_number
-from shipid.checked import Checked
-from shipid.errors import DocumentError, choices
-from shipid.physics.grammar import derivative, deviation
+from shipid.arguments import check_class, check_whole_number
+from shipid.checked import CheckedModel
+from shipid.errors import DocumentError, suggest_name
+from shipid.physics.grammar import hull_derivative, service_deviation
 from shipid.vessel.load import Vessel
 from shipid.vessel.ranges import UNUSUAL
 
@@ -42,7 +42,7 @@ _RELATIONS = {">=": operator.ge, "<=": operator.le, "==": operator.eq, ">": oper
 
 
 @dataclass(frozen=True)
-class Rule:
+class PerturbationRule:
     """One way of changing numbers, named by its key in a `[[family.perturb]]` block.
 
     argument : type of the key's value, for pydantic.
@@ -66,44 +66,46 @@ WITHOUT = (
 )
 
 
-def _removed(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[str, Any]:
-    return dict.fromkeys(select(patterns, base.parameters, file, where))
+def _removed_paths(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[str, Any]:
+    return dict.fromkeys(select_paths(patterns, base.parameters, file, where))
 
 
-def _set(values: Mapping[str, float], base: Vessel, file: Any, where: str) -> Mapping[str, float]:
+def _checked_values(values: Mapping[str, float], base: Vessel, file: Any, where: str) -> Mapping[str, float]:
     unknown = next((path for path in values if path not in base.parameters), None)
     if unknown is not None:
         switch = unknown.rpartition(".")[2] in ("off", "kind")
-        hint = WITHOUT if switch else choices(unknown, base.parameters)
+        hint = WITHOUT if switch else suggest_name(unknown, base.parameters)
         message = f"{base.key} has no parameter {unknown!r}: {hint}"
         raise DocumentError(message, file=file, path=where)
     return values
 
 
-def _times(number: float, factor: float | tuple[float, float], u: float) -> float:
+def _scale_number(number: float, factor: float | tuple[float, float], u: float) -> float:
     if not isinstance(factor, tuple):
         return number * factor
     low, high = factor
     return number * (low + (high - low) * u)
 
 
-def _rises(value: Any) -> Any:
+def _check_range(value: Any) -> Any:
     if isinstance(value, tuple) and value[0] > value[1]:
         raise ValueError(f"the range {list(value)} has low above high: give [low, high]")
     return value
 
 
-RULES: dict[str, Rule] = {
-    "remove": Rule(
+RULES: dict[str, PerturbationRule] = {
+    "remove": PerturbationRule(
         list[str],
         lambda _number, _none, _u: 0.0,
-        places=_removed,
+        places=_removed_paths,
         note="paths whose value becomes 0; * and [order >= 3]",
     ),
-    "set": Rule(dict[str, FiniteFloat], lambda _number, value, _u: value, places=_set, note="path -> new value"),
-    "factor": Rule(
-        Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(_rises)],
-        _times,
+    "set": PerturbationRule(
+        dict[str, FiniteFloat], lambda _number, value, _u: value, places=_checked_values, note="path -> new value"
+    ),
+    "factor": PerturbationRule(
+        Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(_check_range)],
+        _scale_number,
         drawn=lambda factor: isinstance(factor, tuple),
         note="a number is fixed, a pair is a range drawn from uniformly",
     ),
@@ -111,7 +113,7 @@ RULES: dict[str, Rule] = {
 """Key -> rule; a block with several applies them in this order. To add one, write its change and name it here."""
 
 
-class Perturbation(Checked, BaseModel):
+class Perturbation(CheckedModel, BaseModel):
     """One `[[family.perturb]]` block: keys of `RULES`, and which numbers they change.
 
     `given` holds what the block says for each rule, by its key.
@@ -134,11 +136,11 @@ class Perturbation(Checked, BaseModel):
         selecting = [key for key, rule in RULES.items() if rule.places is None]
         if bool(self.parameters) != any(key in self.given for key in selecting):
             raise ValueError(
-                f"`parameters` and {_either(selecting)} are needed together: which numbers, and by how much"
+                f"`parameters` and {_join_alternatives(selecting)} are needed together: which numbers, and by how much"
             )
         if not (self.parameters or any(self.given.values())):
             others = ", or ".join(f"`{key}`" for key in RULES if key not in selecting)
-            raise ValueError(f"has no rule: give `parameters` with {_either(selecting)}, or {others}")
+            raise ValueError(f"has no rule: give `parameters` with {_join_alternatives(selecting)}, or {others}")
         return self
 
     @classmethod
@@ -158,7 +160,7 @@ class Perturbation(Checked, BaseModel):
         return any(RULES[key].drawn(argument) for key, argument in self.given.items())
 
 
-def _either(keys: Iterable[str]) -> str:
+def _join_alternatives(keys: Iterable[str]) -> str:
     return " or ".join(f"`{key}`" for key in keys)
 
 
@@ -168,7 +170,7 @@ def perturbation_model() -> type[BaseModel]:
 
 
 @cache
-def _block_model(rules: tuple[tuple[str, Rule], ...]) -> type[BaseModel]:
+def _block_model(rules: tuple[tuple[str, PerturbationRule], ...]) -> type[BaseModel]:
     """Model of a block whose keys are these rules."""
     fields: dict[str, Any] = {
         key: (Annotated[rule.argument | None, Field(description=rule.note)], None) for key, rule in rules
@@ -177,7 +179,7 @@ def _block_model(rules: tuple[tuple[str, Rule], ...]) -> type[BaseModel]:
     return create_model("perturbation", __config__=ConfigDict(extra="forbid"), **shared, **fields)
 
 
-class Family(Checked, BaseModel):
+class Family(CheckedModel, BaseModel):
     """A `[[family]]` block of a study: so many members of one base, perturbed by the same rules."""
 
     model_config = ConfigDict(extra="forbid")
@@ -258,7 +260,7 @@ def patch_text(
     return tomlkit.dumps(patch)
 
 
-def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:
+def resolve_families(families: Sequence[Family], file: str | Path | None = None) -> list[Family]:
     """Families with `extends` written out; unknown or circular ones, and missing bases, raise DocumentError."""
     by_name: dict[str, Family] = {}
     for index, family in enumerate(families):
@@ -274,7 +276,7 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
         inherited, seen = 0, family.seen
         if family.extends is not None:
             if family.extends not in by_name:
-                hint = choices(family.extends, by_name)
+                hint = suggest_name(family.extends, by_name)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
             parent = written_out(by_name[family.extends], (*above, family.name))
             base, perturb, inherited = base or parent.base, [*parent.perturb, *perturb], len(parent.perturb)
@@ -292,7 +294,9 @@ def resolve(families: Sequence[Family], file: str | Path | None = None) -> list[
     return [written_out(family, ()) for family in families]
 
 
-def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str | Path | None = None) -> Variant:
+def draw_variant(
+    family: Family, member: int, base: Vessel, counter: int = 0, file: str | Path | None = None
+) -> Variant:
     """Draw one member of a resolved family; bit for bit the same on every machine.
 
     Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
@@ -303,12 +307,12 @@ def draw(family: Family, member: int, base: Vessel, counter: int = 0, file: str 
     return _draw_members(family, base, file, [member], counter)[0]
 
 
-def members(
+def draw_members(
     family: Family, base: Vessel, file: str | Path | None = None, numbers: Iterable[int] | None = None
 ) -> list[Variant]:
     """Members of a resolved family, all or those of the given numbers from 0, none redrawn.
 
-    Raises ShipidError for a number that is no whole number, and DocumentError as `draw` does.
+    Raises ShipidError for a number that is no whole number, and DocumentError as `draw_variant` does.
     """
     return _draw_members(family, base, file, range(family.members) if numbers is None else numbers)
 
@@ -322,13 +326,13 @@ def _draw_members(
 ) -> list[Variant]:
     """Members of these numbers from 0, each drawn again so often; DocumentError for one that is no valid vessel."""
     steps, original, result = _draw_steps(family, base, file), base.parameters, []
-    counter = whole_number("counter", counter)
+    counter = check_whole_number("counter", counter)
     if not isinstance(numbers, Iterable):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
-    for number in (whole_number("member", number) for number in numbers):  # of 1.0 is another hash
+    for number in (check_whole_number("member", number) for number in numbers):  # of 1.0 is another hash
         values: dict[str, float] = {}
         for path, change, argument, key in steps:
-            u = 0.0 if key is None else uniform(family.seed, family.name, number, key, counter)
+            u = 0.0 if key is None else uniform_draw(family.seed, family.name, number, key, counter)
             values[path] = change(values.get(path, original[path]), argument, u)
         try:
             base.with_values(values)
@@ -346,10 +350,12 @@ def _draw_members(
 
 def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[Step]:
     """What a member changes, in order; DocumentError for a path that the base does not have."""
-    of_class("family", family, Family, "such as Family(name=..., perturb=[...])")
-    of_class("base", base, Vessel, "as of `load_vessel`")
+    check_class("family", family, Family, "such as Family(name=..., perturb=[...])")
+    check_class("base", base, Vessel, "as of `load_vessel`")
     if family.extends is not None:
-        message = f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve`"
+        message = (
+            f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve_families`"
+        )
         raise DocumentError(message, file=file, path=f"family.{family.name}.extends")
     original, times, result = base.parameters, dict[str, int](), list[Step]()
     for index, block in enumerate(family.perturb, start=-family._inherited):
@@ -361,7 +367,7 @@ def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[S
                 chosen = rule.places(argument, base, file, f"{where}.{key}")
                 result += [(path, rule.change, of_path, None) for path, of_path in chosen.items()]
                 continue
-            paths = select(block.parameters, original, file, f"{where}.parameters")
+            paths = select_paths(block.parameters, original, file, f"{where}.parameters")
             names = {path: f"together {block.parameters[0]}" if block.together else path for path in paths}
             times.update({name: times.get(name, -1) + 1 for name in names.values()})
             keys = {
@@ -371,13 +377,13 @@ def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[S
     return result
 
 
-def uniform(*key: Any) -> float:
+def uniform_draw(*key: Any) -> float:
     """A number in [0, 1) that depends on the key alone: the first 53 bits of its SHA-256."""
     digest = hashlib.sha256(_BETWEEN.join(map(str, key)).encode()).digest()
     return (int.from_bytes(digest[:8], "big") >> 11) / 2.0**53
 
 
-def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
+def select_paths(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where: str) -> list[str]:
     """Paths that the patterns select, each once, in the order of `paths`; DocumentError if a pattern has no match."""
     chosen: set[str] = set()
     for pattern in patterns:
@@ -385,21 +391,21 @@ def select(patterns: Sequence[str], paths: Mapping[str, float], file: Any, where
         if parsed is None:
             message = f"{pattern!r} is not a selection: write a dotted path with * and, if wanted, [order >= 3]"
             raise DocumentError(message, file=file, path=where)
-        matching = documents.match(parsed["pattern"], list(paths))
+        matching = documents.match_paths(parsed["pattern"], list(paths))
         if parsed["order"] is not None:
             relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])
-            orders = {path: order_of(path) for path in matching}
+            orders = {path: derivative_order(path) for path in matching}
             matching = [path for path, order in orders.items() if order is not None and relation(order, limit)]
         if not matching:
-            raise DocumentError(f"{pattern!r} selects nothing: {choices(pattern, paths)}", file=file, path=where)
+            raise DocumentError(f"{pattern!r} selects nothing: {suggest_name(pattern, paths)}", file=file, path=where)
         chosen.update(matching)
     return [path for path in paths if path in chosen]
 
 
-def order_of(path: str) -> int | None:
+def derivative_order(path: str) -> int | None:
     """Number of factors of a derivative of hull or rudder; None for any other number."""
     name = path.rsplit(".", 1)[-1]
-    for formula in (derivative, deviation):
+    for formula in (hull_derivative, service_deviation):
         with suppress(ValueError):
             return formula(name).order
     return None

@@ -31,7 +31,7 @@ _SHARES = {"t_P": "a thrust deduction", "t_R": "a deduction of the rudder's drag
 
 
 @dataclass(frozen=True)
-class Size:
+class ShipSize:
     """The size of a ship by which numbers are judged: length L [m] and mass m [kg]."""
 
     L: float
@@ -39,51 +39,55 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Range:
+class MagnitudeRange:
     """Least and greatest magnitude of a number, and what it should be, in words."""
 
-    least: Callable[[Size], float]
-    most: Callable[[Size], float]
+    least: Callable[[ShipSize], float]
+    most: Callable[[ShipSize], float]
     words: str
 
 
-def _at_most(most: Callable[[Size], float], words: str) -> Range:
-    return Range(lambda _: 0.0, most, words)
+def _upper_range(most: Callable[[ShipSize], float], words: str) -> MagnitudeRange:
+    return MagnitudeRange(lambda _: 0.0, most, words)
 
 
-_NAMED: dict[str, Range] = {
-    "particulars.L_pp": Range(lambda _: 0.05, lambda _: 600.0, "a length between perpendiculars of 0.05 to 600 m"),
-    "inertia.m": Range(
+_NAMED: dict[str, MagnitudeRange] = {
+    "particulars.L_pp": MagnitudeRange(
+        lambda _: 0.05, lambda _: 600.0, "a length between perpendiculars of 0.05 to 600 m"
+    ),
+    "inertia.m": MagnitudeRange(
         lambda s: 1e-4 * WATER * s.L**3, lambda s: 0.5 * WATER * s.L**3, "a mass of 0.0001 to 0.5 rho L^3 in kg"
     ),
     **{
-        f"inertia.I_{axis}": Range(
+        f"inertia.I_{axis}": MagnitudeRange(
             lambda s: s.m * (0.01 * s.L) ** 2, lambda s: s.m * s.L**2, "a radius of gyration of 0.01 to 1 ship length"
         )
         for axis in "xyz"
     },
-    "constants.rho": Range(lambda _: 500.0, lambda _: 3000.0, "a density of water in kg/m^3"),
-    "constants.rho_a": Range(lambda _: 0.01, lambda _: 100.0, "a density of air in kg/m^3"),
-    "constants.g": Range(lambda _: 0.1, lambda _: 100.0, "an acceleration in m/s^2"),
+    "constants.rho": MagnitudeRange(lambda _: 500.0, lambda _: 3000.0, "a density of water in kg/m^3"),
+    "constants.rho_a": MagnitudeRange(lambda _: 0.01, lambda _: 100.0, "a density of air in kg/m^3"),
+    "constants.g": MagnitudeRange(lambda _: 0.1, lambda _: 100.0, "an acceleration in m/s^2"),
 }
-_BY_UNIT: dict[str, Range] = {
-    "m": _at_most(lambda s: 5 * s.L, "at most 5 ship lengths, in m"),
-    "m^2": _at_most(lambda s: 10 * s.L**2, "at most 10 squares of the ship length, in m^2"),
-    "m^3": _at_most(lambda s: 10 * s.L**3, "at most 10 cubes of the ship length, in m^3"),
-    "s": _at_most(lambda _: 1e4, "at most 10,000 s"),
-    "deg": _at_most(lambda _: 360.0, "an angle of at most 360 deg"),
-    "m s^-1": _at_most(lambda _: 100.0, "a speed of at most 100 m/s"),
-    "-": _at_most(lambda _: 100.0, "without unit, at most 100"),
-    **dict.fromkeys(("prime", "bis"), _at_most(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)")),
+_BY_UNIT: dict[str, MagnitudeRange] = {
+    "m": _upper_range(lambda s: 5 * s.L, "at most 5 ship lengths, in m"),
+    "m^2": _upper_range(lambda s: 10 * s.L**2, "at most 10 squares of the ship length, in m^2"),
+    "m^3": _upper_range(lambda s: 10 * s.L**3, "at most 10 cubes of the ship length, in m^3"),
+    "s": _upper_range(lambda _: 1e4, "at most 10,000 s"),
+    "deg": _upper_range(lambda _: 360.0, "an angle of at most 360 deg"),
+    "m s^-1": _upper_range(lambda _: 100.0, "a speed of at most 100 m/s"),
+    "-": _upper_range(lambda _: 100.0, "without unit, at most 100"),
+    **dict.fromkeys(
+        ("prime", "bis"), _upper_range(lambda _: 100.0, "without unit, at most 100 (is it written in 1e-5?)")
+    ),
 }
-_BY_NAME: dict[str, Range] = {
-    "D_p": _at_most(lambda s: 0.3 * s.L, "a diameter of at most 0.3 ship lengths, in m"),
-    "A_R": _at_most(lambda s: 0.05 * s.L**2, "a rudder of at most 0.05 squares of the ship length, in m^2"),
+_BY_NAME: dict[str, MagnitudeRange] = {
+    "D_p": _upper_range(lambda s: 0.3 * s.L, "a diameter of at most 0.3 ship lengths, in m"),
+    "A_R": _upper_range(lambda s: 0.05 * s.L**2, "a rudder of at most 0.05 squares of the ship length, in m^2"),
 }
-_ADDED: dict[str, Range] = {
-    "kg": _at_most(lambda s: 20 * s.m, "at most 20 times the mass"),
-    "kg m": _at_most(lambda s: 20 * s.m * s.L, "at most 20 times mass times length"),
-    "kg m^2": _at_most(lambda s: 20 * s.m * s.L**2, "at most 20 times mass times length squared"),
+_ADDED: dict[str, MagnitudeRange] = {
+    "kg": _upper_range(lambda s: 20 * s.m, "at most 20 times the mass"),
+    "kg m": _upper_range(lambda s: 20 * s.m * s.L, "at most 20 times mass times length"),
+    "kg m^2": _upper_range(lambda s: 20 * s.m * s.L**2, "at most 20 times mass times length squared"),
 }
 
 
@@ -94,25 +98,25 @@ def out_of_range(
 
     values, units : of every number that the equations use, by dotted path.
     """
-    meant, size = document.get(UNUSUAL, []), _size(document, values)
+    meant, size = document.get(UNUSUAL, []), _ship_size(document, values)
     tables: dict[str, list[float]] = {}
     for path, unit in units.items():
-        limits, value = _range(path, unit), abs(values[path])
+        limits, value = _range_of(path, unit), abs(values[path])
         if limits is not None:
             least, most = limits.least(size), limits.most(size)
-            if not least <= value <= most and not _is_meant(path, meant):
+            if not least <= value <= most and not _is_unusual(path, meant):
                 words = f"{values[path]:g}: expected {limits.words} ({least:.3g} to {most:.3g})"
-                return path, f"{words}; {_remedy(path)}"
+                return path, f"{words}; {_unusual_remedy(path)}"
         table, _, place = path.rpartition(".")
         if unit == "deg" and place.isdecimal():
             tables.setdefault(table, []).append(value)
     for path, angles in tables.items():
-        if len(angles) > 1 and max(angles) <= TURN and not _is_meant(path, meant):
-            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_remedy(path)}"
+        if len(angles) > 1 and max(angles) <= TURN and not _is_unusual(path, meant):
+            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_unusual_remedy(path)}"
     return None
 
 
-def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:
+def first_contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:
     """Dotted path of the first number that contradicts another one, and a sentence; None where none does.
 
     A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
@@ -120,17 +124,17 @@ def contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> t
     than broad, and broader than deep; a block coefficient is one; shares are below 1; a unit is on the side of its
     name; wind drives a ship where it goes; a ship at rest stays upright, and displaces her mass.
     """
-    first = next(iter(contradictions(document, values).items()), None)
-    return None if first is None else (first[0], f"{first[1]}; {_remedy(first[0])}")
+    first = next(iter(find_contradictions(document, values).items()), None)
+    return None if first is None else (first[0], f"{first[1]}; {_unusual_remedy(first[0])}")
 
 
-def contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, str]:
+def find_contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, str]:
     """Dotted path of every number that contradicts another one, unless `unusual` names it -> a sentence."""
     meant = document.get(UNUSUAL, [])
-    return {path: words for path, words in _contradictions(document, values) if not _is_meant(path, meant)}
+    return {path: words for path, words in _all_contradictions(document, values) if not _is_unusual(path, meant)}
 
 
-def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _all_contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     sizes = document.get("particulars") or {}
     block = sizes.get("C_b")
     if block is not None and not LEAST_BLOCK <= block <= 1:
@@ -138,7 +142,7 @@ def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) ->
     for less, more, words in (("B", "L_pp", "beam below the length"), ("T", "B", "draught below the beam")):
         if {less, more} <= sizes.keys() and sizes[less] >= sizes[more]:
             yield f"particulars.{less}", f"{sizes[less]:g} m: expected a {words}, {more} = {sizes[more]:g} m"
-    length = _size(document, values).L
+    length = _ship_size(document, values).L
     time = (length / GRAVITY) ** 0.5
     for path, value in values.items():
         if path.endswith((".actuator.delta.rate", ".actuator.alpha.rate")) and abs(value) > FASTEST / time:
@@ -146,15 +150,15 @@ def _contradictions(document: Mapping[str, Any], values: Mapping[str, float]) ->
             yield path, f"{value:g} rad/s: expected {most}, 4 rad in sqrt(L / g); is it in deg/s?"
         if ".actuator." in path and path.endswith(".T") and value > SLOWEST * time:
             yield path, f"{value:g} s: expected at most {SLOWEST * time:.3g} s, 100 sqrt(L / g)"
-        yield from _of_block(path, value, values)
+        yield from _thruster_contradictions(path, value, values)
     for name, unit in document.get("thruster", {}).items():
         if isinstance(unit, Mapping) and isinstance(unit.get("behind"), str):
-            yield from _wrong_place(name, unit["behind"], values, NEAR * length)
-    yield from _against_the_wind(values)
-    yield from _unstable(document, values)
+            yield from _rudder_contradictions(name, unit["behind"], values, NEAR * length)
+    yield from _wind_contradictions(values)
+    yield from _hydrostatic_contradictions(document, values)
 
 
-def _of_block(path: str, value: float, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _thruster_contradictions(path: str, value: float, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     """A number of a thruster that contradicts another one of it, its name, or what the number means."""
     block, _, key = path.rpartition(".")
     if key == "x":
@@ -171,7 +175,7 @@ def _of_block(path: str, value: float, values: Mapping[str, float]) -> Iterator[
         yield path, f"{value:g}: expected more than J_min, {least:g}"
 
 
-def _against_the_wind(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _wind_contradictions(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     """Coefficients of the wind in the signs of another convention, or over other angles."""
     for end in ("bow", "stern"):
         if values.get(path := f"wind.C_Dl_{end}", 0.0) < 0:
@@ -192,7 +196,7 @@ def _against_the_wind(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
         yield f"wind.C_Y.{beam}", f"{words}, which drives her to starboard"
 
 
-def _unstable(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
+def _hydrostatic_contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
     """Restoring that lets a ship at rest trim over, and a volume that is not that of her mass."""
     for path in ("restoring.hydrostatic.nabla", "hull.bis_derivatives.nabla"):
         rho = values.get("constants.rho", WATER)
@@ -208,7 +212,9 @@ def _unstable(document: Mapping[str, Any], values: Mapping[str, float]) -> Itera
         yield "restoring.hydrostatic.GM_L", words
 
 
-def _wrong_place(name: str, screw: str, values: Mapping[str, float], near: float) -> Iterator[tuple[str, str]]:
+def _rudder_contradictions(
+    name: str, screw: str, values: Mapping[str, float], near: float
+) -> Iterator[tuple[str, str]]:
     """A rudder ahead of its screw by more than `near` [m], or on the other side of the ship."""
     (x, y), (x_of, y_of) = ([values.get(f"thruster.{one}.{axis}", 0.0) for axis in "xy"] for one in (name, screw))
     if x and x_of and x > x_of + near:  # 0 where forces act by derivatives, not by places
@@ -218,23 +224,23 @@ def _wrong_place(name: str, screw: str, values: Mapping[str, float], near: float
         yield f"thruster.{name}.behind", f"{screw!r} at y = {y_of:g} m is on the other side: this is at y = {y:g} m"
 
 
-def _range(path: str, unit: str) -> Range | None:
+def _range_of(path: str, unit: str) -> MagnitudeRange | None:
     if path in _NAMED:
         return _NAMED[path]
     name = path.rpartition(".")[2]
     return _BY_NAME[name] if name in _BY_NAME else (_ADDED if path.startswith("added_mass.") else _BY_UNIT).get(unit)
 
 
-def _size(document: Mapping[str, Any], values: Mapping[str, float]) -> Size:
+def _ship_size(document: Mapping[str, Any], values: Mapping[str, float]) -> ShipSize:
     """Length and mass; the length of a ship of this mass where the document gives none."""
     m = abs(values["inertia.m"])
     usual = 5.4 * (m / WATER) ** (1 / 3)
-    return Size((document.get("particulars") or {}).get("L_pp") or usual, m)
+    return ShipSize((document.get("particulars") or {}).get("L_pp") or usual, m)
 
 
-def _is_meant(path: str, meant: Iterable[str]) -> bool:
-    return any(documents.match(pattern, [path]) for pattern in meant)
+def _is_unusual(path: str, meant: Iterable[str]) -> bool:
+    return any(documents.match_paths(pattern, [path]) for pattern in meant)
 
 
-def _remedy(path: str) -> str:
+def _unusual_remedy(path: str) -> str:
     return f'if it is meant, write {UNUSUAL} = ["{path}"] at the top of the vessel'

@@ -34,7 +34,7 @@ K_T_TERMS = (
 )  # fmt: skip
 
 
-def thrust_coefficient(J: Array, pitch: float) -> Array:
+def series_thrust_coefficient(J: Array, pitch: float) -> Array:
     """K_T [-] of a Wageningen B 4-55 screw at advance ratios J (N,) and pitch ratio P / D."""
     return np.asarray(
         sum(c * J**s * pitch**t * AREA_RATIO**u * float(BLADES) ** v for c, s, t, u, v in K_T_TERMS), dtype=float
@@ -48,13 +48,13 @@ def thrust_polynomial(pitch: float) -> tuple[float, float, float]:
     Within 0.01 of the series up to P / D = 1.4.
     """
     J = np.linspace(0.0, 1.6 * pitch, 200)
-    K_T = thrust_coefficient(J, pitch)
+    K_T = series_thrust_coefficient(J, pitch)
     J, K_T = J[K_T > 0], K_T[K_T > 0]
     k_2, k_1, k_0 = np.polyfit(J, K_T, 2).tolist()
     return k_0, k_1, k_2
 
 
-def friction(speed: float, length: float, nu: float) -> float:
+def ittc_friction(speed: float, length: float, nu: float) -> float:
     """C_F [-] of the ITTC-57 line at a speed [m/s] and length [m] in water of viscosity nu [m^2/s]."""
     return float(0.075 / (math.log10(speed * length / nu) - 2) ** 2)
 
@@ -67,12 +67,12 @@ def form_factor(L: float, B: float, T: float, C_b: float) -> float:
     return max(-0.095 + 25.6 * C_b / (max(L / B, 3.0) ** 2 * math.sqrt(B / T)), 0.0)
 
 
-def wetted_surface(L: float, B: float, T: float, C_b: float) -> float:
+def mumford_surface(L: float, B: float, T: float, C_b: float) -> float:
     """S [m^2] of Mumford."""
     return 1.025 * L * (C_b * B + 1.7 * T)
 
 
-def motora(L: float, B: float, T: float, C_b: float) -> tuple[float, float, float]:
+def motora_added_mass(L: float, B: float, T: float, C_b: float) -> tuple[float, float, float]:
     """Added mass in surge and sway over the mass [-], and radius of gyration of the added yaw inertia [m].
 
     Regressions by Zhou, Sheng and Feng (1983, Ship Engineering 6, 21-29) of the charts of Motora (1959).
@@ -117,10 +117,12 @@ def wave_resistance(L: float, B: float, T: float, C_b: float, speed: float) -> f
         * (run * L / B) ** 0.34574
         * (100 * volume / L**3) ** 0.16302
     )
-    return waves_of(L, B, T, volume, C_P, entrance, speed)
+    return wave_resistance_of_hull(L, B, T, volume, C_P, entrance, speed)
 
 
-def waves_of(L: float, B: float, T: float, volume: float, C_P: float, entrance: float, speed: float) -> float:
+def wave_resistance_of_hull(
+    L: float, B: float, T: float, volume: float, C_P: float, entrance: float, speed: float
+) -> float:
     """R_W over the displaced weight [-] as above, of a hull whose volume [m^3], C_P and angle of entrance are known.
 
     entrance : half the angle [deg] of the waterline at the bow. Lengths [m], speed [m/s].

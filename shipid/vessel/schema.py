@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
-from shipid.physics import ACTUATORS, GIVEN, TERMS, Memory, Term
+from shipid.physics import ACTUATORS, GIVEN, TERMS, ActuatorModel, Term
 from shipid.physics.grammar import POSITIVE, Grammar
-from shipid.physics.inertia import added_mass, rigid_body
-from shipid.physics.signals import named
-from shipid.physics.symbols import types_of
+from shipid.physics.inertia import added_mass_entries, rigid_body_entries
+from shipid.physics.signals import rows_of_role
+from shipid.physics.symbols import argument_types
 from shipid.vessel.ranges import UNUSUAL
 from shipid.vessel.terms import FIXED, POSITIONAL, check_term, split_keys
 
@@ -49,9 +49,9 @@ class Parameter:
 
 
 @cache
-def parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
+def function_parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     """Parameters of a physics function, in order, from its keyword-only arguments and `**` table."""
-    hints = types_of(function)
+    hints = argument_types(function)
     result = []
     for name, argument in inspect.signature(function).parameters.items():
         if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
@@ -77,13 +77,13 @@ def term_parameters(term: Term) -> tuple[Parameter, ...]:
     functions = (term.function, *term.gives.values(), *([term.rates] if term.rates else []))
     result: dict[str, Parameter] = {}
     for function in functions:
-        for parameter in parameters(function):
+        for parameter in function_parameters(function):
             result.setdefault(parameter.name, parameter)
     return tuple(result.values())
 
 
 @cache
-def signals(function: Callable[..., Any]) -> tuple[str, ...]:
+def function_signals(function: Callable[..., Any]) -> tuple[str, ...]:
     """Positional arguments of a physics function."""
     return tuple(
         name for name, argument in inspect.signature(function).parameters.items() if argument.kind in POSITIONAL
@@ -91,23 +91,23 @@ def signals(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 @cache
-def structural(term: Term) -> tuple[str, ...]:
+def structural_keys(term: Term) -> tuple[str, ...]:
     """Structural keys of a term that sums over components, such as the whole number `strips`, or a `table`."""
     source = term.components or term.drawn
     return tuple(inspect.signature(source).parameters) if source else ()
 
 
 @cache
-def behind(term: Term) -> tuple[str, ...]:
+def upstream_signals(term: Term) -> tuple[str, ...]:
     """Signals that a term takes from the component that its block says it is behind."""
-    return tuple(name for name in signals(term.function) if name in GIVEN)
+    return tuple(name for name in function_signals(term.function) if name in GIVEN)
 
 
 BEHIND = "behind"  # the key that names another component
 TABLE = "table"  # the structural key that names a file of columns; every other one is a whole number
 
 
-class Block(BaseModel):
+class VesselBlock(BaseModel):
     """Base model of a block of a vessel document: only declared keys, and `source`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)  # strict: the document itself is used, not a converted copy
@@ -119,7 +119,7 @@ _TURNING = Annotated[Literal["full", "none"], Field(description="whether the mas
 _Table = dict[str, Annotated[list[FiniteFloat], Field(min_length=4)]]
 
 
-def _number(parameter: Parameter) -> Any:
+def _number_type(parameter: Parameter) -> Any:
     return Annotated[FiniteFloat, Field(gt=0)] if parameter.positive else FiniteFloat
 
 
@@ -127,20 +127,20 @@ def _unit_note(parameter: Parameter) -> str:
     return parameter.unit if isinstance(parameter.unit, str) else "by name"
 
 
-def _checked_table(grammar: Grammar) -> Any:
+def _table_type(grammar: Grammar) -> Any:
     def check(table: dict[str, float]) -> dict[str, float]:
         grammar.check(table)
         return table
 
-    named = Field(json_schema_extra={"propertyNames": {"pattern": _whole(grammar.names)}})
+    named = Field(json_schema_extra={"propertyNames": {"pattern": _whole_pattern(grammar.names)}})
     return Annotated[dict[str, FiniteFloat], AfterValidator(check), named]
 
 
-def _whole(names: str) -> str:
+def _whole_pattern(names: str) -> str:
     return f"^(?:{names})$"
 
 
-def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[Block]:
+def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> type[VesselBlock]:
     """Pydantic model of the block that feeds a physics function; `extra` fields go beside its parameters."""
     fields: dict[str, Any] = dict(extra)
     validators: dict[str, Any] = {}
@@ -149,7 +149,7 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
         if parameter.kind == "open":
             grammar = parameter.unit
             assert isinstance(grammar, Grammar)
-            names: dict[str, Any] = {"patternProperties": {_whole(grammar.names): {"type": "number"}}}
+            names: dict[str, Any] = {"patternProperties": {_whole_pattern(grammar.names): {"type": "number"}}}
             editors = {**names, "additionalProperties": False}
             config = {"extra": "allow", "json_schema_extra": editors}
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
@@ -158,22 +158,22 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
         note = Field(description=_unit_note(parameter))
         if parameter.kind == "list":
             fields[parameter.name] = (
-                Annotated[GenericAlias(list, (_number(parameter),)), Field(min_length=2), note],
+                Annotated[GenericAlias(list, (_number_type(parameter),)), Field(min_length=2), note],
                 ...,
             )
         elif parameter.kind == "table":
             assert isinstance(parameter.unit, Grammar)
-            table = _checked_table(parameter.unit)
+            table = _table_type(parameter.unit)
             fields[parameter.name] = (
                 (Annotated[table | None, note], None) if parameter.optional else (Annotated[table, note], ...)
             )
         elif parameter.name in SHARED:
-            fields[parameter.name] = (Annotated[_number(parameter) | None, note], None)
+            fields[parameter.name] = (Annotated[_number_type(parameter) | None, note], None)
         elif parameter.default is not None:
-            fields[parameter.name] = (Annotated[_number(parameter), note], parameter.default)
+            fields[parameter.name] = (Annotated[_number_type(parameter), note], parameter.default)
         else:
-            fields[parameter.name] = (Annotated[_number(parameter), note], ...)
-    return create_model(name, __base__=Block, __cls_kwargs__=config, __validators__=validators, **fields)
+            fields[parameter.name] = (Annotated[_number_type(parameter), note], ...)
+    return create_model(name, __base__=VesselBlock, __cls_kwargs__=config, __validators__=validators, **fields)
 
 
 def _name_check(grammar: Grammar) -> Callable[[Any], Any]:
@@ -184,41 +184,41 @@ def _name_check(grammar: Grammar) -> Callable[[Any], Any]:
     return check
 
 
-def _dimension_model(name: str, units: Mapping[str, str]) -> type[Block]:
+def _dimension_model(name: str, units: Mapping[str, str]) -> type[VesselBlock]:
     fields: dict[str, Any] = {
         key: (Annotated[FiniteFloat, Field(gt=0, description=unit)] | None, None) for key, unit in units.items()
     }
-    return create_model(name, __base__=Block, **fields)
+    return create_model(name, __base__=VesselBlock, **fields)
 
 
-def term_model(key: str) -> type[Block]:
+def term_model(key: str) -> type[VesselBlock]:
     """Model of one kind of term: its parameters, its structural counts, its actuators, and `off`."""
     term = check_term(key)
-    known = named("command")
-    commands = tuple(signal for signal in signals(term.function) if signal in known)
+    known = rows_of_role("command")
+    commands = tuple(signal for signal in function_signals(term.function) if signal in known)
     return _term_model(key, term, commands, tuple(ACTUATORS.items()))
 
 
 @cache
 def _term_model(
-    key: str, term: Term, commands: tuple[str, ...], memories: tuple[tuple[str, Memory], ...]
-) -> type[Block]:
+    key: str, term: Term, commands: tuple[str, ...], memories: tuple[tuple[str, ActuatorModel], ...]
+) -> type[VesselBlock]:
     """Model of a term with these commands and kinds of actuator; kept by them, for a notebook may put in others."""
     group, kind = key.split(".")
     extra: dict[str, Any] = {"off": (bool, False)}
     if group not in FIXED:
         extra["kind"] = (Literal[kind], ...)
-    for name in structural(term):
+    for name in structural_keys(term):
         extra[name] = (_Table, ...) if name == TABLE else (Annotated[int, Field(ge=1, le=1000)], ...)
     if commands:
         fields: dict[str, Any] = {command: (_actuator_model(memories) | None, None) for command in commands}
-        extra["actuator"] = (create_model(f"{kind}_actuators", __base__=Block, **fields) | None, None)
-    if behind(term):
+        extra["actuator"] = (create_model(f"{kind}_actuators", __base__=VesselBlock, **fields) | None, None)
+    if upstream_signals(term):
         extra[BEHIND] = (Annotated[str, Field(description="the propeller in whose slipstream it is")], ...)
     return block_model(f"{group}_{kind}", term_parameters(term), **extra)
 
 
-def actuators(block: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def active_actuators(block: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Command and block of every actuator of a term that is not off."""
     for command, actuator in (block.get("actuator") or {}).items():
         if isinstance(actuator, Mapping) and not actuator.get("off", False):
@@ -226,17 +226,19 @@ def actuators(block: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
 
 
 @cache
-def _actuator_model(memories: tuple[tuple[str, Memory], ...]) -> Any:
+def _actuator_model(memories: tuple[tuple[str, ActuatorModel], ...]) -> Any:
     """Model of any kind of actuator."""
-    return _union(
+    return _union_by_kind(
         [
-            block_model(f"actuator_{kind}", parameters(memory.advance), kind=(Literal[kind], ...), off=(bool, False))
+            block_model(
+                f"actuator_{kind}", function_parameters(memory.advance), kind=(Literal[kind], ...), off=(bool, False)
+            )
             for kind, memory in memories
         ]
     )
 
 
-def _union(models: list[type[Block]]) -> Any:
+def _union_by_kind(models: list[type[VesselBlock]]) -> Any:
     if len(models) == 1:
         return models[0]
     union: Any = models[0]
@@ -245,27 +247,27 @@ def _union(models: list[type[Block]]) -> Any:
     return Annotated[union, Field(discriminator="kind")]
 
 
-def kinds(group: str) -> list[str]:
+def kinds_of_group(group: str) -> list[str]:
     """Kinds of term in a group."""
-    return [key.split(".")[1] for key in _of_group(group)]
+    return [key.split(".")[1] for key in _keys_of_group(group)]
 
 
-def _of_group(group: str) -> list[str]:
+def _keys_of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
 
-def _named(group: str, of: Mapping[str, type[Block]]) -> Any:
-    return _union([of[key] for key in _of_group(group)])
+def _kind_model(group: str, of: Mapping[str, type[VesselBlock]]) -> Any:
+    return _union_by_kind([of[key] for key in _keys_of_group(group)])
 
 
-def _fixed(group: str, of: Mapping[str, type[Block]]) -> Any:
-    fields: dict[str, Any] = {key.split(".")[1]: (of[key] | None, None) for key in _of_group(group)}
-    return create_model(group, __base__=Block, **fields)
+def _fixed_group_model(group: str, of: Mapping[str, type[VesselBlock]]) -> Any:
+    fields: dict[str, Any] = {key.split(".")[1]: (of[key] | None, None) for key in _keys_of_group(group)}
+    return create_model(group, __base__=VesselBlock, **fields)
 
 
 def vessel_model() -> type[BaseModel]:
     """Pydantic model of a whole vessel document; its JSON schema serves editors."""
-    return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(named("command")))
+    return _vessel_model(tuple(TERMS.items()), tuple(ACTUATORS.items()), tuple(rows_of_role("command")))
 
 
 @cache
@@ -281,17 +283,20 @@ def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseM
         UNUSUAL: (Annotated[list[str], Field(description="paths of numbers that may be outside their range")], []),
         "particulars": (_dimension_model("particulars", PARTICULARS) | None, None),
         "constants": (_dimension_model("constants", CONSTANTS) | None, None),
-        "inertia": (block_model("inertia", parameters(rigid_body), coriolis=(_TURNING, "full")), ...),
-        "added_mass": (block_model("added_mass", parameters(added_mass), coriolis=(_CORIOLIS, "full")) | None, None),
-        **{group: (_fixed(group, of) | None, None) for group in FIXED},
-        "wind": (_named("wind", of) | None, None),
-        "thruster": (GenericAlias(dict, (str, _named("thruster", of))), {}),
-        "current": (create_model("current", __base__=Block, **current) | None, None),
+        "inertia": (block_model("inertia", function_parameters(rigid_body_entries), coriolis=(_TURNING, "full")), ...),
+        "added_mass": (
+            block_model("added_mass", function_parameters(added_mass_entries), coriolis=(_CORIOLIS, "full")) | None,
+            None,
+        ),
+        **{group: (_fixed_group_model(group, of) | None, None) for group in FIXED},
+        "wind": (_kind_model("wind", of) | None, None),
+        "thruster": (GenericAlias(dict, (str, _kind_model("thruster", of))), {}),
+        "current": (create_model("current", __base__=VesselBlock, **current) | None, None),
     }
-    return create_model("vessel", __base__=Block, **fields)
+    return create_model("vessel", __base__=VesselBlock, **fields)
 
 
-def components(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
+def kind_blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
     """Dotted path, group and entry of every block that must name its `kind`, whatever it holds."""
     if "wind" in document:
         yield "wind", "wind", document["wind"]
@@ -301,14 +306,14 @@ def components(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
 
 
 @cache
-def _groups(terms: tuple[str, ...]) -> tuple[str, ...]:
+def _term_groups(terms: tuple[str, ...]) -> tuple[str, ...]:
     """Blocks of a document in which these terms lie."""
     return tuple(dict.fromkeys(group for group, _ in split_keys(terms)))
 
 
 def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Dotted path, TERMS key and block of every term of a vessel document that acts, or of those that are off."""
-    for group in _groups(tuple(TERMS)):
+    for group in _term_groups(tuple(TERMS)):
         block = document.get(group)
         if not isinstance(block, Mapping):
             continue
@@ -318,11 +323,11 @@ def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tupl
                 yield (f"{group}.{name}" if name else group), f"{group}.{entry.get('kind', name)}", entry
 
 
-def functions(document: Mapping[str, Any]) -> dict[str, tuple[Callable[..., Any], ...]]:
+def equation_functions(document: Mapping[str, Any]) -> dict[str, tuple[Callable[..., Any], ...]]:
     """TERMS key of every term that acts, `actuator.KIND` of its actuators -> the functions that are their equations."""
     found: dict[str, tuple[Callable[..., Any], ...]] = {}
     for _, key, block in term_blocks(document):
         found[key] = TERMS[key].functions
-        for _, actuator in actuators(block):
+        for _, actuator in active_actuators(block):
             found[f"actuator.{actuator['kind']}"] = ACTUATORS[actuator["kind"]].functions
     return found

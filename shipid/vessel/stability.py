@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from shipid.physics.signals import neutral, steers
-from shipid.vessel.dynamics import dynamics
+from shipid.physics.signals import is_steering, neutral_value
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 HELD = ("north", "east", "psi", "u")  # states that no transverse force depends on in calm water, and the speed
@@ -17,24 +17,24 @@ SHARE = 0.1  # of sway or yaw in a motion: a motion with less, such as roll or h
 TURNS = 2  # of the search for the motion that grows most to one side
 
 
-def growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:
+def yaw_growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:
     """Largest real part [1/s] of the eigenvalues of sway and yaw, with what moves with them, in calm water.
 
     It is negative where the ship is course-stable (Fossen 2021), and -inf where the equations give no number. Of the
-    two sides it is the one to which she turns more, see `growths`.
+    two sides it is the one to which she turns more, see `yaw_growths`.
 
     speed : straight ahead [m/s], above 0. orders : commands [SI], such as shaft speeds; rudders and azimuths are
     amidships, and every actuator has reached its order.
     """
-    return max(growths(vessel, speed, orders))
+    return max(yaw_growths(vessel, speed, orders))
 
 
-def growths(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> tuple[float, float]:
-    """As `growth`, of a small yaw to starboard and to port: they differ where the wake or the rudder's inflow does."""
+def yaw_growths(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> tuple[float, float]:
+    """As `yaw_growth`, of a small yaw to starboard and to port: they differ where the wake or the rudder's inflow does."""
     from scipy.linalg import eig  # a study is read without it
 
-    model = dynamics(vessel)
-    given = {name: neutral(name) if steers(name) else orders[name] for name in model.commands}
+    model = vessel_dynamics(vessel)
+    given = {name: neutral_value(name) if is_steering(name) else orders[name] for name in model.commands}
     names = (*model.state, *model.hidden)
     moving = [place for place, name in enumerate(names) if name not in HELD and not name.startswith(WATER)]
     straight = np.array([speed if name == "u" else 0.0 for name in names])

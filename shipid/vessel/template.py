@@ -16,25 +16,25 @@ from typing import Any
 
 import numpy as np
 
-from shipid.document import bundled, get, read
-from shipid.errors import ShipidError, choices
-from shipid.physics.signals import is_shaft, neutral
+from shipid.document import bundled_documents, read_document, value_at_path
+from shipid.errors import ShipidError, suggest_name
+from shipid.physics.signals import is_shaft, neutral_value
 from shipid.units import GRAVITY
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.regressions import (
     AREA_RATIO,
     BLADES,
     PITCHES,
     correlation_allowance,
     form_factor,
-    friction,
-    motora,
+    ittc_friction,
+    motora_added_mass,
+    mumford_surface,
     thrust_polynomial,
     wave_resistance,
-    wetted_surface,
 )
-from shipid.vessel.stability import growth
+from shipid.vessel.stability import yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -77,7 +77,7 @@ class Particulars:
 
     length, beam, draught : [m], length between perpendiculars. block : block coefficient [-].
     speed : service speed [m/s]. rpm : shaft speed of the screw at that speed [rpm].
-    propulsor : `propeller-rudder`, `azimuth` or `differential`, two screws without a rudder.
+    propulsor : `propeller-rudder`, `azimuth_values` or `differential`, two screws without a rudder.
     shafts : 1 or 2 of them; default 1 with a rudder, else 2.
     propeller_diameter : [m]. rudder_area : of each rudder [m^2].
     tunnel_thruster : whether a tunnel thruster is at the bow.
@@ -135,7 +135,7 @@ class Particulars:
 
 
 @dataclass(frozen=True)
-class Value:
+class TemplateValue:
     """A number of the document with its unit and where it comes from."""
 
     number: float
@@ -143,7 +143,7 @@ class Value:
     note: str
 
 
-Values = dict[str, Value]
+Values = dict[str, TemplateValue]
 
 
 @dataclass(frozen=True)
@@ -164,11 +164,11 @@ class FirstGuess:
 
 def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
     """Fill a vessel document from main particulars; ShipidError for a ship that the formulae do not know."""
-    _check(given)
-    body = "\n".join(_blocks(given, name))
-    vessel = check_vessel(tomllib.loads(body), file)
-    n = _shaft(vessel, given.service)
-    rate = growth(vessel, given.service, _orders(vessel, n))
+    _check_particulars(given)
+    body = "\n".join(_document_lines(given, name))
+    vessel = check_document(tomllib.loads(body), file)
+    n = _service_shaft(vessel, given.service)
+    rate = yaw_growth(vessel, given.service, _straight_orders(vessel, n))
     verdict = (
         f"course-{'stable' if rate < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({rate:+.4f} t))"
     )
@@ -177,10 +177,10 @@ def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
         f"# At {given.service:.3g} m/s the ship needs {60 * n:.4g} rpm and is {verdict}.",
         "# SI units; x forward, y starboard, z down, from amidships, where the centre of gravity is assumed to be.",
     ]
-    return FirstGuess("\n".join([*head, body]), vessel, n, rate, tuple(_remarks(given)))
+    return FirstGuess("\n".join([*head, body]), vessel, n, rate, tuple(_guess_remarks(given)))
 
 
-def _remarks(given: Particulars) -> Iterator[str]:
+def _guess_remarks(given: Particulars) -> Iterator[str]:
     """The most important assumptions of the guess, one sentence each."""
     if given.scale is None and given.reduction != 1.0:
         steered = "how fast rudder or azimuth turns"
@@ -199,10 +199,10 @@ def _remarks(given: Particulars) -> Iterator[str]:
         yield f"{unknown}: give the shaft speed at {given.service:.3g} m/s by --rpm"
 
 
-def _check(given: Particulars) -> None:
+def _check_particulars(given: Particulars) -> None:
     """ShipidError for particulars outside the range of the formulae."""
     if given.propulsor not in PROPULSORS:
-        raise ShipidError(f"propulsor {given.propulsor!r}: {choices(given.propulsor, PROPULSORS)}")
+        raise ShipidError(f"propulsor {given.propulsor!r}: {suggest_name(given.propulsor, PROPULSORS)}")
     if given.propulsor == "differential" and given.units != 2:
         raise ShipidError(
             "two screws steer by their difference: leave it out, or take another propulsor", path="--shafts"
@@ -210,14 +210,14 @@ def _check(given: Particulars) -> None:
     if given.rudder_area is not None and given.propulsor != "propeller-rudder":
         raise ShipidError(f"there is none with {given.propulsor}: leave it out", path="--rudder-area")
     if given.ship_type not in WIND:
-        raise ShipidError(f"ship type {given.ship_type!r}: {choices(given.ship_type, WIND)}")
-    for what, value, low, high in _ranges(given):
+        raise ShipidError(f"ship type {given.ship_type!r}: {suggest_name(given.ship_type, WIND)}")
+    for what, value, low, high in _formula_ranges(given):
         if value is not None and not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
             words = f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}{SIMILAR.get(what, '')}"
             raise ShipidError(words)
 
 
-def _ranges(given: Particulars) -> Iterator[tuple[str, float | None, float, float]]:
+def _formula_ranges(given: Particulars) -> Iterator[tuple[str, float | None, float, float]]:
     """Name, value, lower and upper limit of each quantity; sizes before the ratios derived from them."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     yield from (
@@ -239,17 +239,17 @@ def _ranges(given: Particulars) -> Iterator[tuple[str, float | None, float, floa
     )
 
 
-def inertia(given: Particulars) -> Values:
+def inertia_values(given: Particulars) -> Values:
     """Mass and yaw inertia."""
     m = given.rho * given.volume
     return {
-        "m": Value(m, "kg", "rho C_b L B T"),
-        "I_z": Value(m * (0.25 * given.length) ** 2, "kg m^2", "m (0.25 L)^2, a usual radius of gyration"),
-        "x_G": Value(0.0, "m", "assumed amidships"),
+        "m": TemplateValue(m, "kg", "rho C_b L B T"),
+        "I_z": TemplateValue(m * (0.25 * given.length) ** 2, "kg m^2", "m (0.25 L)^2, a usual radius of gyration"),
+        "x_G": TemplateValue(0.0, "m", "assumed amidships"),
     }
 
 
-def added_mass(given: Particulars) -> Values:
+def added_mass_values(given: Particulars) -> Values:
     """Clarke et al. (1983), surge by Soeding, in Brix (1993); of a beamy ship Motora's charts.
 
     Clarke's regressions are of ships four times as long as their beam and more. Of a beamier one they give a yaw
@@ -261,107 +261,111 @@ def added_mass(given: Particulars) -> Values:
     sway = prime * (1 + 0.16 * C_b * B / T - 5.1 * (B / L) ** 2)
     by_yaw, by_sway = prime * L * (0.67 * B / L - 0.0033 * (B / T) ** 2), prime * L * (1.1 * B / L - 0.041 * B / T)
     m = given.rho * given.volume
-    m_x, m_y, k_zz = motora(L, B, T, C_b)
+    m_x, m_y, k_zz = motora_added_mass(L, B, T, C_b)
     if -yaw < BEAMY * m * k_zz**2 or sway * yaw <= ((by_yaw + by_sway) / 2) ** 2:
         charts, symmetric = "Motora's charts, by Zhou et al. (1983)", "a beamy ship counts as alike fore and aft"
         return {
-            "X_udot": Value(-m * m_x, "kg", charts),
-            "Y_vdot": Value(-m * m_y, "kg", charts),
-            "Y_rdot": Value(0.0, "kg m", symmetric),
-            "N_vdot": Value(0.0, "kg m", symmetric),
-            "N_rdot": Value(-m * k_zz**2, "kg m^2", charts),
+            "X_udot": TemplateValue(-m * m_x, "kg", charts),
+            "Y_vdot": TemplateValue(-m * m_y, "kg", charts),
+            "Y_rdot": TemplateValue(0.0, "kg m", symmetric),
+            "N_vdot": TemplateValue(0.0, "kg m", symmetric),
+            "N_rdot": TemplateValue(-m * k_zz**2, "kg m^2", charts),
         }
     clarke = "Clarke et al. (1983)"
     surge = m / (math.pi * math.sqrt(L**3 / given.volume) - 14)
     return {
-        "X_udot": Value(-surge, "kg", "-m / (pi sqrt(L^3 / volume) - 14), Soeding in Brix (1993)"),
-        "Y_vdot": Value(sway, "kg", clarke),
-        "Y_rdot": Value(by_yaw, "kg m", clarke),
-        "N_vdot": Value(by_sway, "kg m", clarke),
-        "N_rdot": Value(yaw, "kg m^2", clarke),
+        "X_udot": TemplateValue(-surge, "kg", "-m / (pi sqrt(L^3 / volume) - 14), Soeding in Brix (1993)"),
+        "Y_vdot": TemplateValue(sway, "kg", clarke),
+        "Y_rdot": TemplateValue(by_yaw, "kg m", clarke),
+        "N_vdot": TemplateValue(by_sway, "kg m", clarke),
+        "N_rdot": TemplateValue(yaw, "kg m^2", clarke),
     }
 
 
-def hull(given: Particulars) -> Values:
+def hull_values(given: Particulars) -> Values:
     """Derivatives in the primes of [hull.mmg]: linear by Clarke et al. (1983), the others by Kijima et al. (1990)."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     s, full, slender = -math.pi * T / L, C_b * B / L, (1 - C_b) * T / B
-    added = {name: -value.number / (given.rho / 2 * L**2 * T) for name, value in added_mass(given).items()}
+    added = {name: -value.number / (given.rho / 2 * L**2 * T) for name, value in added_mass_values(given).items()}
     m_x, m_y, centre = added["X_udot"], added["Y_vdot"], (added["Y_rdot"] + added["N_vdot"]) / 2 / L
     clarke, kijima = "Clarke et al. (1983), x L / T", "Kijima et al. (1990)"
     masumoto = "Yoshimura and Masumoto (2012)"
     X_vv = min(1.15 * full - 0.18, 0.0)
     return {
-        "R_0": _resistance(given),
-        "X_vv": Value(X_vv, "prime", f"1.15 C_b B / L - 0.18, at most 0, {masumoto}"),
-        "X_vr": Value(1.91 * full - 0.08 - m_y, "prime", f"1.91 C_b B / L - 0.08 - m_y', {masumoto}: v = -U beta"),
-        "X_rr": Value(
+        "R_0": _resistance_value(given),
+        "X_vv": TemplateValue(X_vv, "prime", f"1.15 C_b B / L - 0.18, at most 0, {masumoto}"),
+        "X_vr": TemplateValue(
+            1.91 * full - 0.08 - m_y, "prime", f"1.91 C_b B / L - 0.08 - m_y', {masumoto}: v = -U beta"
+        ),
+        "X_rr": TemplateValue(
             -0.085 * full + 0.008 - centre,
             "prime",
             f"-0.085 C_b B / L + 0.008, {masumoto}, + (Y_rdot + N_vdot) / 2 in primes, which turn apart",
         ),
-        "X_vvvv": Value(
+        "X_vvvv": TemplateValue(
             min(max(-6.68 * full + 1.1, 0.0), -X_vv),
             "prime",
             f"-6.68 C_b B / L + 1.1, 0 to -X_vv: no drift drives her ahead, {masumoto}",
         ),
-        "Y_v": Value(s * (1 + 0.4 * C_b * B / T), "prime", clarke),
-        "Y_r": Value(s * (-0.5 + 2.2 * B / L - 0.08 * B / T) + m_x, "prime", f"{clarke}, + m_x', which turns apart"),
-        "Y_|v|v": Value(-2.5 * slender - 0.5, "prime", f"-2.5 (1 - C_b) T / B - 0.5, {kijima}"),
-        "Y_|r|r": Value(0.343 * C_b * T / B - 0.07, "prime", f"0.343 C_b T / B - 0.07, {kijima}"),
-        "Y_vrr": Value(-5.95 * slender, "prime", f"-5.95 (1 - C_b) T / B, {kijima}"),
-        "Y_vvr": Value(1.5 * C_b * T / B - 0.65, "prime", f"1.5 C_b T / B - 0.65, {kijima}"),
-        "N_v": Value(s * (0.5 + 2.4 * T / L), "prime", clarke),
-        "N_r": Value(s * (0.25 + 0.039 * B / T - 0.56 * B / L), "prime", clarke),
-        "N_|v|v": Value(0.96 * slender - 0.066, "prime", f"0.96 (1 - C_b) T / B - 0.066, {kijima}"),
-        "N_|r|r": Value(
+        "Y_v": TemplateValue(s * (1 + 0.4 * C_b * B / T), "prime", clarke),
+        "Y_r": TemplateValue(
+            s * (-0.5 + 2.2 * B / L - 0.08 * B / T) + m_x, "prime", f"{clarke}, + m_x', which turns apart"
+        ),
+        "Y_|v|v": TemplateValue(-2.5 * slender - 0.5, "prime", f"-2.5 (1 - C_b) T / B - 0.5, {kijima}"),
+        "Y_|r|r": TemplateValue(0.343 * C_b * T / B - 0.07, "prime", f"0.343 C_b T / B - 0.07, {kijima}"),
+        "Y_vrr": TemplateValue(-5.95 * slender, "prime", f"-5.95 (1 - C_b) T / B, {kijima}"),
+        "Y_vvr": TemplateValue(1.5 * C_b * T / B - 0.65, "prime", f"1.5 C_b T / B - 0.65, {kijima}"),
+        "N_v": TemplateValue(s * (0.5 + 2.4 * T / L), "prime", clarke),
+        "N_r": TemplateValue(s * (0.25 + 0.039 * B / T - 0.56 * B / L), "prime", clarke),
+        "N_|v|v": TemplateValue(0.96 * slender - 0.066, "prime", f"0.96 (1 - C_b) T / B - 0.066, {kijima}"),
+        "N_|r|r": TemplateValue(
             min(0.5 * full - 0.09, MOST_N_RR), "prime", f"0.5 C_b B / L - 0.09, at most {MOST_N_RR:g}, {kijima}"
         ),
-        "N_vrr": Value(0.5 * C_b * T / B - 0.05, "prime", f"0.5 C_b T / B - 0.05, {kijima}"),
-        "N_vvr": Value(
+        "N_vrr": TemplateValue(0.5 * C_b * T / B - 0.05, "prime", f"0.5 C_b T / B - 0.05, {kijima}"),
+        "N_vvr": TemplateValue(
             -(57.5 * full**2 - 18.4 * full + 1.6), "prime", f"-(57.5 (C_b B / L)^2 - 18.4 C_b B / L + 1.6), {kijima}"
         ),
     }
 
 
-def _resistance(given: Particulars) -> Value:
+def _resistance_value(given: Particulars) -> TemplateValue:
     """[(1 + k) C_F + C_A] S / (L T): ITTC-57, form factor of Watanabe, wetted surface of Mumford; without waves."""
     sizes = given.length, given.beam, given.draught, given.block
-    C_F, k, S = friction(given.service, given.length, NU), form_factor(*sizes), wetted_surface(*sizes)
+    C_F, k, S = ittc_friction(given.service, given.length, NU), form_factor(*sizes), mumford_surface(*sizes)
     C_A = correlation_allowance(given.length) if given.reduction == 1.0 else 0.0
     rough = f", C_A = {C_A:.2g} (Holtrop and Mennen 1982)" if C_A else ""
     note = f"((1 + k) C_F + C_A) S / (L T): ITTC-57, k = {k:.2f} (Watanabe), S = {S:.4g} m^2 (Mumford){rough}"
-    return Value(((1 + k) * C_F + C_A) * S / (given.length * given.draught), "-", note)
+    return TemplateValue(((1 + k) * C_F + C_A) * S / (given.length * given.draught), "-", note)
 
 
-def waves(given: Particulars) -> Values:
+def wave_resistance_values(given: Particulars) -> Values:
     """Wave resistance as a sixth power of the speed, through that of Holtrop and Mennen (1982) at the service speed."""
     sizes = given.length, given.beam, given.draught, given.block
     R_W = wave_resistance(*sizes, given.service) * given.rho * GRAVITY * given.volume
     note = f"wave resistance {R_W:.3g} N at {given.service:.3g} m/s (Holtrop and Mennen 1982), as u^6"
-    return {"R_4": Value(R_W / given.service**6, "kg m^-5 s^4", note)}
+    return {"R_4": TemplateValue(R_W / given.service**6, "kg m^-5 s^4", note)}
 
 
 def total_resistance(given: Particulars) -> float:
     """Resistance [N] at the service speed, as the document has it."""
     U, calm = given.service, given.rho / 2 * given.length * given.draught
-    return calm * _resistance(given).number * U**2 + waves(given)["R_4"].number * U**6
+    return calm * _resistance_value(given).number * U**2 + wave_resistance_values(given)["R_4"].number * U**6
 
 
-def wind(given: Particulars) -> Values:
+def wind_values(given: Particulars) -> Values:
     """Blendermann's coefficients of the type of ship, and guessed areas."""
     B, L_oa = given.beam, 1.05 * given.length
     names = ("C_Dt", "C_Dl_bow", "C_Dl_stern", "delta", "kappa")
     coefficients = {
-        name: Value(number, "-", f"Blendermann (1994), {given.ship_type}")
+        name: TemplateValue(number, "-", f"Blendermann (1994), {given.ship_type}")
         for name, number in zip(names, WIND[given.ship_type], strict=True)
     }
     return coefficients | {
-        "A_FW": Value(0.8 * B**2, "m^2", "0.8 B^2: a guess"),
-        "A_LW": Value(0.5 * L_oa * B, "m^2", "0.5 L_oa B: a guess"),
-        "L_oa": Value(L_oa, "m", "1.05 L: a guess"),
-        "s_L": Value(0.0, "m", "centroid of the lateral area amidships: a guess"),
-        "s_H": Value(0.25 * B, "m", "half its mean height: a guess"),
+        "A_FW": TemplateValue(0.8 * B**2, "m^2", "0.8 B^2: a guess"),
+        "A_LW": TemplateValue(0.5 * L_oa * B, "m^2", "0.5 L_oa B: a guess"),
+        "L_oa": TemplateValue(L_oa, "m", "1.05 L: a guess"),
+        "s_L": TemplateValue(0.0, "m", "centroid of the lateral area amidships: a guess"),
+        "s_H": TemplateValue(0.25 * B, "m", "half its mean height: a guess"),
     }
 
 
@@ -379,22 +383,22 @@ class Screw:
     notes: Mapping[str, str]
 
 
-def _wake(given: Particulars) -> tuple[float, str]:
+def _wake_fraction(given: Particulars) -> tuple[float, str]:
     """Wake fraction of Taylor."""
     if given.units == 2:
         return max(0.55 * given.block - 0.20, 0.0), "0.55 C_b - 0.20, Taylor, two screws"
     return 0.5 * given.block - 0.05, "0.5 C_b - 0.05, Taylor"
 
 
-def _deduction(given: Particulars, D: float) -> tuple[float, str]:
+def _thrust_deduction(given: Particulars, D: float) -> tuple[float, str]:
     """Thrust deduction."""
     if given.units == 2:
         t = 0.325 * given.block - 0.1885 * D / math.sqrt(given.beam * given.draught)
         return max(t, 0.05), "0.325 C_b - 0.1885 D_p / sqrt(B T), Holtrop and Mennen (1982), two screws"
-    return 0.6 * _wake(given)[0], "0.6 w_P0: a rule of thumb"
+    return 0.6 * _wake_fraction(given)[0], "0.6 w_P0: a rule of thumb"
 
 
-def screw(given: Particulars) -> Screw:
+def guess_screw(given: Particulars) -> Screw:
     """Screw whose thrust at the service speed is the resistance; ShipidError where none of the series does that.
 
     What is given of diameter and shaft speed is kept. Of the others the pitch gives way first, then the diameter.
@@ -404,46 +408,46 @@ def screw(given: Particulars) -> Screw:
     D = given.propeller_diameter or usual
     words = "given" if given.propeller_diameter else f"{share:g} T, at most {LARGEST_SCREW:g} m: a guess"
     if given.rpm is None:
-        n = _shaft_of(given, D, PITCH)
+        n = _shaft_speed_of_screw(given, D, PITCH)
         return Screw(D, n, PITCH, thrust_polynomial(PITCH), {"D_p": words, "K_T": f"P / D = {PITCH:g}: a guess"})
     n = given.rpm / 60
-    if given.propeller_diameter is None and not _drives(given, D, n, (PITCHES[0], STRONG_PITCH)):
+    if given.propeller_diameter is None and not _is_pitch_between(given, D, n, (PITCHES[0], STRONG_PITCH)):
         least, most = (share * given.draught for share in DIAMETERS)
-        wanted = _bisect(lambda size: _surplus(given, size, n, PITCH), least, most)
+        wanted = _bisect_root(lambda size: _thrust_surplus(given, size, n, PITCH), least, most)
         if least < wanted < most:
             D, words = wanted, f"drives {given.service:.3g} m/s at {60 * n:.4g} rpm with P / D = {PITCH:g}"
-    if not _drives(given, D, n, PITCHES):
-        low, high = sorted(60 * _shaft_of(given, D, pitch) for pitch in PITCHES)
+    if not _is_pitch_between(given, D, n, PITCHES):
+        low, high = sorted(60 * _shaft_speed_of_screw(given, D, pitch) for pitch in PITCHES)
         raise ShipidError(
             f"no screw of {D:.3g} m drives this ship at {given.service:.3g} m/s with {60 * n:.4g} rpm: {low:.3g} to "
             f"{high:.3g} rpm could. Is it the engine's speed, not the screw's? Is --speed another one?",
             path="--rpm",
         )
-    pitch = _bisect(lambda ratio: _surplus(given, D, n, ratio), *PITCHES)
+    pitch = _bisect_root(lambda ratio: _thrust_surplus(given, D, n, ratio), *PITCHES)
     balance = f"P / D = {pitch:.3g} balances the resistance at {given.service:.3g} m/s and {60 * n:.4g} rpm"
     return Screw(D, n, pitch, thrust_polynomial(pitch), {"D_p": words, "K_T": balance})
 
 
-def _drives(given: Particulars, D: float, n: float, pitches: tuple[float, float]) -> bool:
+def _is_pitch_between(given: Particulars, D: float, n: float, pitches: tuple[float, float]) -> bool:
     """Whether a pitch ratio between two gives a screw the thrust that the ship needs."""
-    weak, strong = (_surplus(given, D, n, pitch) for pitch in pitches)
+    weak, strong = (_thrust_surplus(given, D, n, pitch) for pitch in pitches)
     return weak <= 0 <= strong
 
 
-def _shaft_of(given: Particulars, D: float, pitch: float) -> float:
+def _shaft_speed_of_screw(given: Particulars, D: float, pitch: float) -> float:
     """Shaft speed [rev/s] at which a screw drives the ship at its service speed."""
-    return _bisect(lambda n: _surplus(given, D, n, pitch), 0.0, FASTEST)
+    return _bisect_root(lambda n: _thrust_surplus(given, D, n, pitch), 0.0, FASTEST)
 
 
-def _surplus(given: Particulars, D: float, n: float, pitch: float) -> float:
+def _thrust_surplus(given: Particulars, D: float, n: float, pitch: float) -> float:
     """Thrust less resistance [N] at the service speed with screws of diameter D [m] at n [rev/s]."""
     k_0, k_1, k_2 = thrust_polynomial(pitch)
-    J = min((1 - _wake(given)[0]) * given.service / (max(n, 1e-3) * D), J_MOST)
+    J = min((1 - _wake_fraction(given)[0]) * given.service / (max(n, 1e-3) * D), J_MOST)
     thrust = given.rho * n**2 * D**4 * (k_0 + J * (k_1 + J * k_2))
-    return given.units * (1 - _deduction(given, D)[0]) * thrust - total_resistance(given)
+    return given.units * (1 - _thrust_deduction(given, D)[0]) * thrust - total_resistance(given)
 
 
-def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
+def _bisect_root(function: Callable[[float], float], low: float, high: float) -> float:
     """Root of a function that is negative at low and positive at high; the upper end if it never is."""
     for _ in range(60):
         middle = (low + high) / 2
@@ -451,28 +455,30 @@ def _bisect(function: Callable[[float], float], low: float, high: float) -> floa
     return high
 
 
-def propeller(given: Particulars, side: int = 0) -> Values:
+def propeller_values(given: Particulars, side: int = 0) -> Values:
     """One screw behind the hull; side -1 is that to port of two."""
     L, B, T = given.length, given.beam, given.draught
-    chosen, (w_P0, wake), drift = screw(given), _wake(given), "KVLCC2, mean of both sides"
-    t_P, deduction = _deduction(given, chosen.D)
+    chosen, (w_P0, wake), drift = guess_screw(given), _wake_fraction(given), "KVLCC2, mean of both sides"
+    t_P, deduction = _thrust_deduction(given, chosen.D)
     series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {chosen.notes['K_T']}"
     return {
-        "x": Value(-0.48 * L, "m", "-0.48 L"),
-        **({"y": Value(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
-        "z": Value(0.65 * T, "m", "0.65 T below the waterline: a guess"),
-        "D_p": Value(chosen.D, "m", chosen.notes["D_p"]),
-        "k_astern": Value(0.7, "-", "thrust astern over ahead of a fixed screw: a guess"),
-        "t_P": Value(t_P, "-", deduction),
-        "w_P0": Value(w_P0, "-", wake),
-        "C_1": Value(2.0, "-", "KVLCC2, Yasukawa and Yoshimura (2015)"),
-        "C_2_plus": Value(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
-        "C_2_minus": Value(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
-        **{f'K_T."{name}"': Value(k, "-", series) for name, k in zip(("1", "J", "JJ"), chosen.K_T, strict=True)},
+        "x": TemplateValue(-0.48 * L, "m", "-0.48 L"),
+        **({"y": TemplateValue(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
+        "z": TemplateValue(0.65 * T, "m", "0.65 T below the waterline: a guess"),
+        "D_p": TemplateValue(chosen.D, "m", chosen.notes["D_p"]),
+        "k_astern": TemplateValue(0.7, "-", "thrust astern over ahead of a fixed screw: a guess"),
+        "t_P": TemplateValue(t_P, "-", deduction),
+        "w_P0": TemplateValue(w_P0, "-", wake),
+        "C_1": TemplateValue(2.0, "-", "KVLCC2, Yasukawa and Yoshimura (2015)"),
+        "C_2_plus": TemplateValue(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
+        "C_2_minus": TemplateValue(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
+        **{
+            f'K_T."{name}"': TemplateValue(k, "-", series) for name, k in zip(("1", "J", "JJ"), chosen.K_T, strict=True)
+        },
     }
 
 
-def rudder(given: Particulars, side: int = 0) -> Values:
+def rudder_values(given: Particulars, side: int = 0) -> Values:
     """One rudder behind a screw; side -1 is that to port of two."""
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     share, words = (1.0, "") if given.units == 1 else (0.6, ", 0.6 of it each")
@@ -480,48 +486,50 @@ def rudder(given: Particulars, side: int = 0) -> Values:
     A_R = given.rudder_area or area
     H_R = min(math.sqrt(1.6 * A_R), 0.9 * T)
     aspect = H_R**2 / A_R
-    epsilon = 2.26 - 1.82 * (1 - _wake(given)[0])
+    epsilon = 2.26 - 1.82 * (1 - _wake_fraction(given)[0])
     masumoto = "Yoshimura and Masumoto (2012)"
-    gamma_R = Value(2.06 * C_b * B / L + 0.14, "-", f"2.06 C_b B / L + 0.14, {masumoto}")
+    gamma_R = TemplateValue(2.06 * C_b * B / L + 0.14, "-", f"2.06 C_b B / L + 0.14, {masumoto}")
     gear = f"35 to -30 deg in 28 s, SOLAS II-1/29{given.faster[1]}"
     return {
-        "x": Value(-0.5 * L, "m", "aft perpendicular"),
-        **({"y": Value(side * 0.22 * B, "m", "behind its screw")} if side else {}),
-        "z": Value(T - 0.55 * H_R, "m", "middle of its height: a guess"),
-        "A_R": Value(
+        "x": TemplateValue(-0.5 * L, "m", "aft perpendicular"),
+        **({"y": TemplateValue(side * 0.22 * B, "m", "behind its screw")} if side else {}),
+        "z": TemplateValue(T - 0.55 * H_R, "m", "middle of its height: a guess"),
+        "A_R": TemplateValue(
             A_R,
             "m^2",
             "given" if given.rudder_area else f"L T / 100 (1 + 25 (B / L)^2), Det Norske Veritas' least{words}",
         ),
-        "H_R": Value(H_R, "m", "aspect ratio 1.6, at most 0.9 T: a guess"),
-        "f_alpha": Value(6.13 * aspect / (aspect + 2.25), "-", "6.13 a / (a + 2.25), a = H_R^2 / A_R, Fujii"),
-        "epsilon": Value(epsilon, "-", f"2.26 - 1.82 (1 - w_P0), {masumoto}"),
-        "kappa": Value(0.55 / epsilon, "-", f"0.55 / epsilon, {masumoto}"),
+        "H_R": TemplateValue(H_R, "m", "aspect ratio 1.6, at most 0.9 T: a guess"),
+        "f_alpha": TemplateValue(6.13 * aspect / (aspect + 2.25), "-", "6.13 a / (a + 2.25), a = H_R^2 / A_R, Fujii"),
+        "epsilon": TemplateValue(epsilon, "-", f"2.26 - 1.82 (1 - w_P0), {masumoto}"),
+        "kappa": TemplateValue(0.55 / epsilon, "-", f"0.55 / epsilon, {masumoto}"),
         "gamma_R_plus": gamma_R,
         "gamma_R_minus": gamma_R,
-        "ell_R": Value(-0.9 * L, "m", f"-0.9 L, {masumoto}"),
-        "t_R": Value(0.39, "-", masumoto),
-        "a_H": Value(0.627 * C_b - 0.153, "-", "0.627 C_b - 0.153, Quadvlieg (2013)"),
-        "x_H": Value(-0.45 * L, "m", "-0.45 L, Aoki et al. (2006)"),
-        "actuator.delta.T": Value(1.0 / given.faster[0], "s", f"1 s of a ship: a guess{_over(given)}"),
-        "actuator.delta.rate": Value(math.radians(STEERING * given.faster[0]), "rad/s", gear),
+        "ell_R": TemplateValue(-0.9 * L, "m", f"-0.9 L, {masumoto}"),
+        "t_R": TemplateValue(0.39, "-", masumoto),
+        "a_H": TemplateValue(0.627 * C_b - 0.153, "-", "0.627 C_b - 0.153, Quadvlieg (2013)"),
+        "x_H": TemplateValue(-0.45 * L, "m", "-0.45 L, Aoki et al. (2006)"),
+        "actuator.delta.T": TemplateValue(1.0 / given.faster[0], "s", f"1 s of a ship: a guess{_over_words(given)}"),
+        "actuator.delta.rate": TemplateValue(math.radians(STEERING * given.faster[0]), "rad/s", gear),
     }
 
 
-def _over(given: Particulars) -> str:
+def _over_words(given: Particulars) -> str:
     return given.faster[1].replace(" times ", " over ", 1)
 
 
-def azimuth(given: Particulars, side: int) -> Values:
+def azimuth_values(given: Particulars, side: int) -> Values:
     """One azimuth unit at the stern; of two, side -1 is that to port; 0 is one in the middle."""
-    unit = get(read(bundled("models")["gunnerus-28.9"]), "thruster.port")
+    unit = value_at_path(read_document(bundled_documents("models")["gunnerus-28.9"]), "thruster.port")
     D, k_T, size, strength = _azimuth_size(given, unit)
     placed = {
-        "x": Value(-0.46 * given.length, "m", "-0.46 L: a guess"),
-        "y": Value(side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess" if side else "in the middle"),
-        "z": Value(0.75 * given.draught, "m", "0.75 T: a guess"),
-        "D_p": Value(D, "m", size),
-        "k_T": Value(k_T, "-", strength),
+        "x": TemplateValue(-0.46 * given.length, "m", "-0.46 L: a guess"),
+        "y": TemplateValue(
+            side * 0.28 * given.beam, "m", "0.28 B off the middle: a guess" if side else "in the middle"
+        ),
+        "z": TemplateValue(0.75 * given.draught, "m", "0.75 T: a guess"),
+        "D_p": TemplateValue(D, "m", size),
+        "k_T": TemplateValue(k_T, "-", strength),
     }
     numbers: dict[str, float] = {}
     for name, number in unit.items():
@@ -529,11 +537,11 @@ def azimuth(given: Particulars, side: int) -> Values:
             {f'{name}."{key}"': one for key, one in number.items()} if isinstance(number, Mapping) else {name: number}
         )
         numbers |= {key: one for key, one in table.items() if isinstance(one, float) and key not in placed}
-    copied = {name: Value(number, "-", "unit of R/V Gunnerus") for name, number in numbers.items()}
+    copied = {name: TemplateValue(number, "-", "unit of R/V Gunnerus") for name, number in numbers.items()}
     gear = f"two turns a minute: a guess{given.faster[1]}"
     lag = {
-        "actuator.alpha.T": Value(0.5 / given.faster[0], "s", f"0.5 s of a ship: a guess{_over(given)}"),
-        "actuator.alpha.rate": Value(math.radians(AZIMUTHING * given.faster[0]), "rad/s", gear),
+        "actuator.alpha.T": TemplateValue(0.5 / given.faster[0], "s", f"0.5 s of a ship: a guess{_over_words(given)}"),
+        "actuator.alpha.rate": TemplateValue(math.radians(AZIMUTHING * given.faster[0]), "rad/s", gear),
     }
     return placed | copied | lag
 
@@ -556,7 +564,7 @@ def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, f
 
     needed, balanced = total_resistance(given), f"{given.service:.3g} m/s and {given.rpm:.4g} rpm"
     if known is None:
-        D = _bisect(lambda diameter: thrust(diameter) - needed, *(share * given.draught for share in DIAMETERS))
+        D = _bisect_root(lambda diameter: thrust(diameter) - needed, *(share * given.draught for share in DIAMETERS))
         size = f"balances the resistance at {balanced}"
     scale = needed / thrust(D) if thrust(D) > 0 else math.inf
     if not SCALES[0] <= scale <= SCALES[1]:
@@ -568,89 +576,89 @@ def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, f
     return D, scale, size, f"balances the resistance at {balanced}"
 
 
-def tunnel(given: Particulars) -> Values:
+def tunnel_values(given: Particulars) -> Values:
     """A tunnel thruster at the bow: F_2 n|n|, the thrust of a screw of 0.35 T with K_T 0.3."""
     D = min(0.35 * given.draught, 3.0)
     return {
-        "x": Value(0.4 * given.length, "m", "0.4 L: a guess"),
-        "z": Value(0.6 * given.draught, "m", "0.6 T: a guess"),
-        "F_1": Value(0.0, "N s", "thrust goes with n|n|"),
-        "F_2": Value(0.3 * given.rho * D**4, "N s^2", f"0.3 rho D^4, D = {D:.3g} m, 0.35 T up to 3 m: a guess"),
-        "F_3": Value(0.0, "N s^3", "thrust goes with n|n|"),
+        "x": TemplateValue(0.4 * given.length, "m", "0.4 L: a guess"),
+        "z": TemplateValue(0.6 * given.draught, "m", "0.6 T: a guess"),
+        "F_1": TemplateValue(0.0, "N s", "thrust goes with n|n|"),
+        "F_2": TemplateValue(0.3 * given.rho * D**4, "N s^2", f"0.3 rho D^4, D = {D:.3g} m, 0.35 T up to 3 m: a guess"),
+        "F_3": TemplateValue(0.0, "N s^3", "thrust goes with n|n|"),
     }
 
 
-def _blocks(given: Particulars, name: str) -> Iterator[str]:
+def _document_lines(given: Particulars, name: str) -> Iterator[str]:
     """The document, line by line."""
     known = "given" if given.speed is not None else "a Froude number of 0.2: a guess"
     main: Values = {
-        "L_pp": Value(given.length, "m", "given"),
-        "B": Value(given.beam, "m", "given"),
-        "T": Value(given.draught, "m", "given"),
-        "C_b": Value(given.block, "-", "given"),
-        "U_0": Value(given.service, "m s^-1", known),
+        "L_pp": TemplateValue(given.length, "m", "given"),
+        "B": TemplateValue(given.beam, "m", "given"),
+        "T": TemplateValue(given.draught, "m", "given"),
+        "C_b": TemplateValue(given.block, "-", "given"),
+        "U_0": TemplateValue(given.service, "m s^-1", known),
     }
-    yield f"name = {_quoted(name)}"
+    yield f"name = {_quote_toml(name)}"
     yield 'description = "A first guess from main particulars by regression formulae: no number of it is measured"'
     yield 'source = "shipid vessel new: the formula of each number is beside it"\ndof = 3\n'
-    yield from _block("particulars", main)
+    yield from _block_lines("particulars", main)
     water = "sea" if given.rho == RHO_SEA else "fresh water of a tank"
-    densities = {"rho": Value(given.rho, "kg m^-3", water), "rho_a": Value(RHO_AIR, "kg m^-3", "air")}
-    yield from _block("constants", densities)
-    yield from _block("inertia", inertia(given))
-    yield from _block("added_mass", added_mass(given), coriolis="mmg")
-    yield from _block("hull.mmg", hull(given))
-    yield from _block("hull.resistance", waves(given))
-    yield from _block("wind", wind(given), kind="blendermann")
-    yield from _thrusters(given)
+    densities = {"rho": TemplateValue(given.rho, "kg m^-3", water), "rho_a": TemplateValue(RHO_AIR, "kg m^-3", "air")}
+    yield from _block_lines("constants", densities)
+    yield from _block_lines("inertia", inertia_values(given))
+    yield from _block_lines("added_mass", added_mass_values(given), coriolis="mmg")
+    yield from _block_lines("hull.mmg", hull_values(given))
+    yield from _block_lines("hull.resistance", wave_resistance_values(given))
+    yield from _block_lines("wind", wind_values(given), kind="blendermann")
+    yield from _thruster_lines(given)
     if given.tunnel_thruster:
-        yield from _block("thruster.bow", tunnel(given), kind="tunnel")
+        yield from _block_lines("thruster.bow", tunnel_values(given), kind="tunnel")
 
 
-def _thrusters(given: Particulars) -> Iterator[str]:
+def _thruster_lines(given: Particulars) -> Iterator[str]:
     """What drives and steers the ship: names as in logs, `port` and `starboard` where there are two."""
     sides = ((-1, "port"), (1, "starboard")) if given.units == 2 else ((0, ""),)
     steered = "alpha" if given.propulsor == "azimuth" else "delta"
     for side, name in sides:
         if given.propulsor == "azimuth":
             words = {"kind": "azimuth", f"actuator.{steered}.kind": "first_order"}
-            yield from _block(f"thruster.{name or 'azimuth'}", azimuth(given, side), **words)
+            yield from _block_lines(f"thruster.{name or 'azimuth'}", azimuth_values(given, side), **words)
             continue
         behind = name or "propeller"
-        yield from _block(f"thruster.{behind}", propeller(given, side), kind="propeller")
+        yield from _block_lines(f"thruster.{behind}", propeller_values(given, side), kind="propeller")
         if given.propulsor == "differential":
             continue
         words = {"kind": "rudder", "behind": behind, f"actuator.{steered}.kind": "first_order"}
-        yield from _block(f"thruster.{name and f'{name}_'}rudder", rudder(given, side), **words)
+        yield from _block_lines(f"thruster.{name and f'{name}_'}rudder", rudder_values(given, side), **words)
 
 
-def _block(path: str, values: Values, **words: str) -> Iterator[str]:
+def _block_lines(path: str, values: Values, **words: str) -> Iterator[str]:
     yield f"[{path}]"
     yield 'source = "the formula or guess beside each number"'
-    yield from (f"{key} = {_quoted(word)}" for key, word in words.items())
+    yield from (f"{key} = {_quote_toml(word)}" for key, word in words.items())
     for key, value in values.items():
-        shown = _quoted(key) if "|" in key and '"' not in key else key
+        shown = _quote_toml(key) if "|" in key and '"' not in key else key
         yield f"{shown} = {float(f'{value.number:.6g}')!r}  # {value.unit}; {value.note}"
     yield ""
 
 
-def _quoted(text: str) -> str:
+def _quote_toml(text: str) -> str:
     """A string of TOML: that of JSON, but for DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _orders(vessel: Vessel, n: float) -> dict[str, float]:
+def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
-    return {name: n if is_shaft(name) else neutral(name) for name in dynamics(vessel).commands}
+    return {name: n if is_shaft(name) else neutral_value(name) for name in vessel_dynamics(vessel).commands}
 
 
-def _shaft(vessel: Vessel, speed: float) -> float:
+def _service_shaft(vessel: Vessel, speed: float) -> float:
     """Shaft speed [rev/s] at which thrust equals resistance, by bisection."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
 
     def surge(n: float) -> float:
-        orders = _orders(vessel, n)
+        orders = _straight_orders(vessel, n)
         memory, state = [orders[name] for name in model.memory], [0.0, 0.0, 0.0, speed, 0.0, 0.0]
         rates: Any = model.rates(state, memory, list(orders.values()), calm, values, np.zeros(3))
         return float(rates[3])
@@ -660,4 +668,4 @@ def _shaft(vessel: Vessel, speed: float) -> float:
         low, high = high, 2 * high
     if high >= 1e3:
         raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
-    return _bisect(surge, low, high)
+    return _bisect_root(surge, low, high)

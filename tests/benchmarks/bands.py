@@ -31,7 +31,7 @@ from shipid.identification.outcome import COMPARED, _measured
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, statistics
-from shipid.metrics import share_of, shares_by_run
+from shipid.metrics import coverage_by_run, coverage_share
 from shipid.predictor import limits_of
 from shipid.study.plan import Batch, model_label, read_plan, whole_unit
 from shipid.study.prepare import instants_of, obtain, partition, prepare
@@ -281,8 +281,8 @@ def recorded_figures(folder: Path) -> dict[str, Any]:
             for level in (0.8, 0.9):
                 held, wide = part[f"held {level}"].to_numpy(), part[f"end {level}"].mean()
                 run = part["test"].to_numpy()
-                share, (low, high) = share_of(held, run), share_interval(held, run)
-                least = shares_by_run(held, run).min()
+                share, (low, high) = coverage_share(held, run), share_interval(held, run)
+                least = coverage_by_run(held, run).min()
                 words = f"{share:.3f} [{low:.3f}, {high:.3f}], least of a run {least:.2f}, {wide:.2f} m at the end"
                 summary[f"real log, {commands}, {model}, {level:.0%}"] = words
     return summary

@@ -15,7 +15,7 @@ from shipid.engine.rollout import rollout
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, Statistics, statistics
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
@@ -60,7 +60,7 @@ def _noisy(vessel: Vessel, seed: int, strength: float) -> Dataset:
 
 def _shaken(vessel: Vessel, data: Dataset, rng: np.random.Generator, strength: float) -> dict[str, np.ndarray]:
     """Velocities of the runs with random accelerations, as forces on the mass that the ship has."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     table = {str(name): column.to_numpy() for name, column in data.frame.items() if name != "run"}
     table = {name: values.reshape(RUNS, STEPS + 1) for name, values in table.items()}
     still = np.zeros(len(model.environment))

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.engine.gradient import rollout_gradient, squared_distance
-from shipid.engine.native import compiler
+from shipid.engine.gradient import rollout_gradient, squared_distance_loss
+from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks.rollouts import inputs
@@ -30,7 +30,7 @@ def run() -> dict[str, Any]:
     given = inputs(WINDOWS)
     options: dict[str, Any] = {"step": 1.0, "num_steps": STEPS}
     truth = rollout(load_vessel("gunnerus-28.9"), *given, **options, keep=("north", "east"), engine="native")
-    loss = squared_distance(truth.states[1:, 0])
+    loss = squared_distance_loss(truth.states[1:, 0])
 
     def gradient(engine: str) -> np.ndarray:
         return rollout_gradient(vessel, *given, loss, **options, names=names, engine=engine).parameters
@@ -40,7 +40,7 @@ def run() -> dict[str, Any]:
 
     ways: dict[str, Any] = {"rollout": lambda: rolled("native"), "gradient": lambda: gradient("native")}
     figures: dict[str, Any] = {}
-    if compiler() is None:
+    if find_compiler() is None:
         ways = {"rollout": lambda: rolled("torch"), "gradient": lambda: gradient("torch")}
     else:
         rolled("native")

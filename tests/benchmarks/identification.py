@@ -23,7 +23,7 @@ from shipid.data.dataset import Dataset, write_dataset
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks.by_hand import DERIVATIVES, Model
 from tests.benchmarks.timing import best_of, clock
@@ -118,7 +118,7 @@ def _differences(vessel: Vessel, data: Dataset, fit: Problem, theta: np.ndarray)
 
 def by_hand(vessel: Vessel, data: Dataset, fit: Problem, begin: np.ndarray) -> Any:
     """`least_squares` (trf, defaults) with finite differences; its model is checked against shipid's first."""
-    model, model_equations = Model(vessel), dynamics(vessel)
+    model, model_equations = Model(vessel), vessel_dynamics(vessel)
     nu, orders = np.array([3.0, 0.4, -0.03]), (2.0, 0.3)
     commands = [orders[name.endswith("alpha")] for name in model_equations.commands]
     state = [0, 0, 0, *nu]

@@ -17,13 +17,13 @@ from shipid.engine.rollout import rollout
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.observer import MEASURED, Estimates, Observer, at_windows, observe
-from shipid.simulation.excitation import aprbs
-from shipid.simulation.log import logged
+from shipid.simulation.excitation import aprbs_series
+from shipid.simulation.log import log_columns
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.units import DEGREE, RPM
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import Family, members, resolve, uniform
+from shipid.vessel.perturb import Family, draw_members, resolve_families, uniform_draw
 
 Array = np.ndarray
 STEP, ROW, HORIZON, SETTLED = 0.05, 1.0, 30, 60.0
@@ -41,19 +41,19 @@ class World:
 def world(vessel: str, seed: int, *, runs: int, duration: float, waves: bool, current: bool, changing: bool) -> World:
     """Runs of a vessel, everything drawn by hash(seed, run, quantity): orders, weather, sea, current, start."""
     truth = load_vessel(vessel).with_values({"current.kind": "uniform"})
-    model, count = dynamics(truth), round(duration / STEP)
+    model, count = vessel_dynamics(truth), round(duration / STEP)
     length = float(truth.document["particulars"]["L_pp"])
     pace = float(min(length / 28.9, 1.0) ** 0.5)  # speeds and times of a model, by Froude
 
     def draw(name: str, low: float, high: float) -> Array:
-        return np.array([low + (high - low) * uniform(seed, "observer", run, name) for run in range(runs)])
+        return np.array([low + (high - low) * uniform_draw(seed, "observer", run, name) for run in range(runs)])
 
     def order(name: str, low: float, high: float) -> Array:
         if not changing:
             return np.tile(draw(name, low, high), (count, 1))
         t = STEP * np.arange(count)
         hold = 25.0 * pace, 70.0 * pace
-        series = [aprbs(t, hold=hold, levels=(low, high), key=(seed, run, name)) for run in range(runs)]
+        series = [aprbs_series(t, hold=hold, levels=(low, high), key=(seed, run, name)) for run in range(runs)]
         every = round(ROW / STEP)  # orders change in logged rows
         return np.repeat(np.stack(series, axis=1)[::every], every, axis=0)[:count]
 
@@ -77,7 +77,7 @@ def world(vessel: str, seed: int, *, runs: int, duration: float, waves: bool, cu
         keep=model.state,
     )  # fmt: skip
     assert not path.diverged.any()
-    log = logged(path, path.names)
+    log = log_columns(path, path.names)
     rows = len(log["u"])
     held = np.minimum(np.arange(rows) * every, count - 1)
     columns = {name: log[name] for name in MEASURED} | {name: values[held] for name, values in commands.items()}
@@ -95,8 +95,8 @@ def physics(names: tuple[str, ...]) -> dict[str, Vessel]:
     """Nominal model and perturbed variants of it, by name."""
     blocks = tomllib.loads((Path(__file__).parents[2] / "studies" / "simulation.toml").read_text())["family"]
     base = load_vessel("gunnerus-28.9")
-    families = resolve([Family(**block) for block in blocks if "base" in block or "extends" in block])
-    variants = [one for family in families for one in members(family, base)]
+    families = resolve_families([Family(**block) for block in blocks if "base" in block or "extends" in block])
+    variants = [one for family in families for one in draw_members(family, base)]
     return {one.name: base.with_values(one.values) for one in variants if one.name in names}
 
 

@@ -22,7 +22,7 @@ from unittest.mock import patch
 import numpy as np
 import torch
 
-from shipid.cli.terminal import draw
+from shipid.cli.terminal import draw_events
 from shipid.hybrid import ridge
 from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
@@ -98,7 +98,7 @@ def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
     terminal = patch.dict(os.environ, {"FORCE_COLOR": "1"})
     with tempfile.TemporaryDirectory() as folder, terminal, redirect_stdout(io.StringIO()):
         begun = time.perf_counter()
-        draw(noted(study.run_study(plan, Path(folder) / "run", workers=workers)))
+        draw_events(noted(study.run_study(plan, Path(folder) / "run", workers=workers)))
         return time.perf_counter() - begun, moments
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from shipid.engine.rollout import rollout
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks.by_numpy import Fleet
 from tests.benchmarks.timing import best_of
@@ -100,7 +100,7 @@ def _jit(flags: list[str]) -> dict[str, Any]:
 def _casadi(state: np.ndarray, commands: np.ndarray, environment: np.ndarray, options: dict[str, Any]) -> Any:
     """As a user of CasADi writes it for one ship: numbers in the equations, mapaccum over steps, two threads."""
     vessel = load_vessel("gunnerus-28.9")
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     x, c, e = ca.SX.sym("x", 6), ca.SX.sym("c", 4), ca.SX.sym("e", 2)
     rates = model.rates(x, ca.SX(0, 1), c, e, ca.SX(list(vessel.parameters.values())), ca.SX.zeros(3))
     one = ca.Function("step", [x, c, e], [x + rates])

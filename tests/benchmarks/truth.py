@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from shipid.engine import native
-from shipid.simulation.truth import Truth, simulate
+from shipid.simulation.truth import Truth, simulate_truth
 from shipid.study.plan import read_plan
 from tests.benchmarks.timing import best_of
 
@@ -24,11 +24,11 @@ def run() -> dict[str, Any]:
     vessel, declared = plan.truth, plan.study.truth
 
     def simulated(count: int) -> Any:
-        return simulate(Truth(**{**declared.model_dump(), "manoeuvres": count}), vessel)
+        return simulate_truth(Truth(**{**declared.model_dump(), "manoeuvres": count}), vessel)
 
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", folder)
-        native._library.cache_clear()
+        native._compile_rollout.cache_clear()
         begun = time.perf_counter()
         simulated(COUNTS[0])
         first = time.perf_counter() - begun

@@ -16,11 +16,11 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.hybrid.physics import Physics
 from shipid.simulation.approach import Controls
-from shipid.simulation.log import column_of
+from shipid.simulation.log import state_column
 from shipid.simulation.standard import shaft_speed
-from shipid.simulation.truth import Truth, draw_manoeuvres, simulate
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.simulation.truth import Truth, draw_manoeuvres, simulate_truth
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document, load_vessel
 from tests.strangers import strange_vessel
 
 SHIPS = ("gunnerus-28.9", "kvlcc2-l7", "esso-190k", "container-175", "cybership2", "naval-51", "stranger", "waves")
@@ -67,7 +67,7 @@ def world(seed: int, fresh: int = 200, pool: int = 50, ship: str = "") -> World:
     horizon, interval = int(draw.integers(8, 21)), float(draw.integers(2, 6))
     step = _nice(one.pace / LENGTHS)
     ranges = _ranges(one)
-    environment = dynamics(one.truth).environment
+    environment = vessel_dynamics(one.truth).environment
     changes: dict[str, Any] = {}
     if "V_w" in environment:
         changes["wind_speed"] = (0.0, float(draw.choice([0.0, 6.0, 12.0])))
@@ -87,9 +87,9 @@ def world(seed: int, fresh: int = 200, pool: int = 50, ship: str = "") -> World:
         manoeuvre=[{"kind": name, "share": float(draw.uniform(0.5, 2.0)), **ranges[name]} for name in names],
         **{"wind_speed": (0.0, 0.0), **changes},
     )
-    frame = simulate(truth, one.truth)
-    model = dynamics(one.model)
-    seen = {column_of(name) for name in model.state} | {*model.commands, *model.environment, "run", "t", "flags"}
+    frame = simulate_truth(truth, one.truth)
+    model = vessel_dynamics(one.model)
+    seen = {state_column(name) for name in model.state} | {*model.commands, *model.environment, "run", "t", "flags"}
     frame = frame.drop(columns=[name for name in frame if name not in seen])
     noise = float(draw.choice([0.0, 0.005, 0.0125])) * one.speed
     length = one.pace * one.speed
@@ -108,7 +108,7 @@ def _ship(name: str, seed: int) -> Ship:
     if name == "stranger":
         truth, speed, n = strange_vessel(seed)
         document = {key: value for key, value in truth.document.items() if key not in ("current", "name")}
-        return Ship(truth, check_vessel({**document, "name": "its model"}, "model.toml"), speed, 60 * n)
+        return Ship(truth, check_document({**document, "name": "its model"}, "model.toml"), speed, 60 * n)
     model = load_vessel("gunnerus-28.9" if name == "waves" else name)
     truth = load_vessel("gunnerus-28.9-6dof") if name == "waves" else model
     if model.name.startswith("R/V Gunnerus"):
@@ -119,7 +119,7 @@ def _ship(name: str, seed: int) -> Ship:
 
 def _ranges(ship: Ship) -> dict[str, dict[str, Any]]:
     """Ranges of every kind of manoeuvre, by the ship's size and speed."""
-    commands = dynamics(ship.truth).commands
+    commands = vessel_dynamics(ship.truth).commands
     shafts = [0.5 * ship.rpm, 1.1 * ship.rpm]
     orders: dict[str, Any] = {"n_rpm": shafts}
     if any(name.endswith(".alpha") for name in commands):

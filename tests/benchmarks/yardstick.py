@@ -24,7 +24,7 @@ from shipid.hybrid import gradient
 from shipid.hybrid.device import use_threads
 from shipid.hybrid.method import Case, Method, Task
 from shipid.hybrid.path_trained import PathTrained
-from shipid.metrics import position_error, summary
+from shipid.metrics import position_error, summarise_errors
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import Prepared, instants_of, obtain, physics_of, prepare
 from shipid.study.sessions import machine
@@ -78,7 +78,7 @@ def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, method: Method) -> dic
     assert fit.corrector is not None
     instants = instants_of(plan.study, vessel, prepared.data, prepared.test)
     paths = fit.corrector.predict(physics, instants, prepared.test_paths[cell.model])
-    error = summary(position_error(paths, prepared.test.future))
+    error = summarise_errors(position_error(paths, prepared.test.future))
     alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]
     row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}
     chosen = dict(fit.corrector.hyperparameters)

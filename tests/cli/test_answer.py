@@ -14,9 +14,9 @@ import typer
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.cli.answer import Answer, answering
-from shipid.cli.terminal import table
-from shipid.document import bundled
+from shipid.cli.answer import Answer, open_answer
+from shipid.cli.terminal import text_table
+from shipid.document import bundled_documents
 from shipid.study.store import DATASET, read_rows
 
 CLI = Path(__file__).parents[2] / "shipid" / "cli"
@@ -33,8 +33,8 @@ def answered(*arguments: object, code: int = 0) -> dict[str, Any]:
 
 
 def test_lists_and_one_vessel() -> None:
-    assert [row["name"] for row in answered("vessel", "list")["vessels"]] == list(bundled("models"))
-    assert [row["name"] for row in answered("study", "list")["studies"]] == list(bundled("studies"))
+    assert [row["name"] for row in answered("vessel", "list")["vessels"]] == list(bundled_documents("models"))
+    assert [row["name"] for row in answered("study", "list")["studies"]] == list(bundled_documents("studies"))
     ship = answered("vessel", "show", "gunnerus-28.9-6dof")
     assert ship["particulars"]["L_pp"] == 28.9
     assert {"path": "particulars.L_pp", "value": 28.9, "unit": "m"} not in ship["terms"]
@@ -78,7 +78,7 @@ def test_data(tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 def test_an_exit_status_comes_with_the_answer(capsys: pytest.CaptureFixture[str]) -> None:
     def ends() -> None:
-        with answering(True) as answer:
+        with open_answer(True) as answer:
             answer.say("two faults", faults=np.int64(2), worst=np.nan, file=Path("a"), many=np.arange(2))
             answer.say("a heading")
             raise typer.Exit(1)
@@ -86,7 +86,7 @@ def test_an_exit_status_comes_with_the_answer(capsys: pytest.CaptureFixture[str]
     with pytest.raises(typer.Exit):
         ends()
     assert json.loads(capsys.readouterr().out) == {"faults": 2, "worst": None, "file": "a", "many": [0, 1]}
-    with pytest.raises(ValueError, match="broken"), answering(True):
+    with pytest.raises(ValueError, match="broken"), open_answer(True):
         raise ValueError("broken")
     assert capsys.readouterr().out == "", "half an answer is none"
 
@@ -95,7 +95,7 @@ def test_people_see_tables_and_lines(capsys: pytest.CaptureFixture[str]) -> None
     answer = Answer(False)
     answer.say("a heading", number=1)
     answer.say()
-    answer.rows("rows", [{"a": 1}], table(["a"], [["1"]]))
+    answer.rows("rows", [{"a": 1}], text_table(["a"], [["1"]]))
     answer.rows("none", [], None)
     assert [line.strip() for line in capsys.readouterr().out.splitlines() if line.strip("─ ")] == [
         "a heading",

@@ -60,7 +60,7 @@ def test_an_error_of_the_system_that_names_no_file_says_what_helps(
         raise raised
 
     monkeypatch.setattr(sys, "argv", ["shipid", "study"])
-    monkeypatch.setattr(cli, "_named", command)
+    monkeypatch.setattr(cli, "_app_of_arguments", command)
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     assert re.fullmatch(line + "\n", capsys.readouterr().err)
@@ -81,11 +81,11 @@ def test_a_compiled_package_that_cannot_be_loaded_is_one_line(
         return command
 
     monkeypatch.setattr(sys, "argv", ["shipid", "study"])
-    monkeypatch.setattr(cli, "_named", refused(ImportError("failed to map", path="/lib/_C.so")))
+    monkeypatch.setattr(cli, "_app_of_arguments", refused(ImportError("failed to map", path="/lib/_C.so")))
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     assert capsys.readouterr().err.startswith("error: /lib/_C.so: cannot be loaded (failed to map): ")
-    monkeypatch.setattr(cli, "_named", refused(ImportError("cannot import name", path="/lib/mine.py")))
+    monkeypatch.setattr(cli, "_app_of_arguments", refused(ImportError("cannot import name", path="/lib/mine.py")))
     with pytest.raises(ImportError, match="cannot import name"):
         cli.main()
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from shipid.cli.completion import bundled_or_file, files
-from shipid.document import bundled
+from shipid.cli.completion import offer_documents, offer_files
+from shipid.document import bundled_documents
 
 
 def offered(folder: Path, *words: str) -> list[str]:
@@ -45,12 +45,12 @@ def test_names_before_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         Path(name).touch()
     (tmp_path / "models").mkdir()
     (tmp_path / "models" / "x.toml").touch()
-    assert bundled_or_file("models")("m") == ["mariner", "mine.toml", "models/"]
-    assert bundled_or_file("models")("") == [*bundled("models"), "mine.toml", "models/"]
-    assert bundled_or_file("models")("models/") == ["models/x.toml"]
-    assert bundled_or_file("models")("gone/x") == []
-    assert files(".txt")("n") == ["notes.txt"]
-    assert files()("") == ["models/"]
+    assert offer_documents("models")("m") == ["mariner", "mine.toml", "models/"]
+    assert offer_documents("models")("") == [*bundled_documents("models"), "mine.toml", "models/"]
+    assert offer_documents("models")("models/") == ["models/x.toml"]
+    assert offer_documents("models")("gone/x") == []
+    assert offer_files(".txt")("n") == ["notes.txt"]
+    assert offer_files()("") == ["models/"]
 
 
 @pytest.mark.slow

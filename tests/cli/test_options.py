@@ -27,23 +27,23 @@ from tests.study.tiny import TINY
 
 
 def test_changes_are_toml_or_text() -> None:
-    from shipid.cli.options import parsed
+    from shipid.cli.options import parse_changes
 
-    assert parsed(None) == {}
-    assert parsed(["grid.N_D=[10, 30]", "method.0.kind=alone", "a=1e-3"]) == {
+    assert parse_changes(None) == {}
+    assert parse_changes(["grid.N_D=[10, 30]", "method.0.kind=alone", "a=1e-3"]) == {
         "grid.N_D": [10, 30],
         "method.0.kind": "alone",
         "a": 1e-3,
     }
     for wrong in ("grid.N_D", "=3"):
         with pytest.raises(DocumentError, match="write --set path=value"):
-            parsed([wrong])
+            parse_changes([wrong])
 
 
 def test_a_path_may_hold_a_comparison() -> None:
-    from shipid.cli.options import assignments
+    from shipid.cli.options import parse_assignments
 
-    assert assignments(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
+    assert parse_assignments(["hull.*[order >= 3]=0.2"], "--prior", "paths=0.3") == {"hull.*[order >= 3]": 0.2}
 
 
 def test_the_command_line_can_be_typed_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,8 +12,8 @@ import pytest
 import typer.main
 
 from shipid.cli import app
-from shipid.cli.outputs import OUTPUTS, Guarded, check_output
-from shipid.document import bundled
+from shipid.cli.outputs import OUTPUTS, GuardedCommand, check_output
+from shipid.document import bundled_documents
 from shipid.errors import ShipidError
 from tests.cli.running import ended, output_of
 
@@ -22,7 +22,7 @@ from tests.cli.running import ended, output_of
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a vessel and a dataset."""
     folder = tmp_path_factory.mktemp("made")
-    shutil.copy(bundled("models")["mariner"], folder / "ship.toml")
+    shutil.copy(bundled_documents("models")["mariner"], folder / "ship.toml")
     words = ["zigzag", "10", "10", "--out", folder / "page.html", "--log", folder / "log.parquet"]
     output_of("manoeuvre", folder / "ship.toml", *words)
     return folder
@@ -145,18 +145,18 @@ def test_every_command_is_guarded() -> None:
 
     leaves = commands(typer.main.get_command(app))
     assert len(leaves) > 20
-    assert all(isinstance(one, Guarded) for one in leaves)
+    assert all(isinstance(one, GuardedCommand) for one in leaves)
     assert {name for one in leaves for param in one.params for name in [param.name] if name in OUTPUTS} == set(OUTPUTS)
 
 
 STAGES = (  # what a command calls one after the other, before its own work
-    "shipid.cli._check_utf_8",
-    "shipid.cli._named",
+    "shipid.cli._check_encoding",
+    "shipid.cli._app_of_arguments",
     "shipid.cli.log_to_stderr",
-    "shipid.cli.outputs.Guarded.parse_args",
+    "shipid.cli.outputs.GuardedCommand.parse_args",
     "shipid.cli.outputs.isfinite",
     "shipid.cli.outputs.check_output",
-    "shipid.cli.outputs.recognised",
+    "shipid.cli.outputs.raise_interrupts",
 )
 
 
@@ -182,5 +182,5 @@ def test_ctrl_c_is_one_line_in_every_command(monkeypatch: pytest.MonkeyPatch) ->
             raise SystemError("returned a result with an exception set") from None
 
     for press in (pressed, pressed_in_compiled_code):
-        monkeypatch.setattr("shipid.document.bundled", press)
+        monkeypatch.setattr("shipid.document.bundled_documents", press)
         assert ended("study", "list") == (130, "", "interrupted\n")

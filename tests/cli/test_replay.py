@@ -15,7 +15,7 @@ from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.report import replay
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import load_vessel
 
 SHIP = "kvlcc2-l7"
@@ -24,7 +24,7 @@ SHIP = "kvlcc2-l7"
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     kinds = [Zigzag(name=f"zz {angle}", n_rpm=627, angle_deg=angle, duration=40, execute_at=5) for angle in (10, 20)]
-    frame = perform(load_vessel(SHIP), kinds, step=0.1)
+    frame = perform_manoeuvres(load_vessel(SHIP), kinds, step=0.1)
     frame = frame[[name for name in frame if not str(name).startswith("actual.")]].astype({"run": "str"})
     file = tmp_path_factory.mktemp("replay") / "log.parquet"
     return write_dataset(Dataset(frame, {"clock": "run", "flags": []}), file)

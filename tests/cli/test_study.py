@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study.store import DATASET, read_rows
@@ -24,7 +24,7 @@ from tests.study.tiny import TINY, without_figures, without_workers
 
 def test_studies_and_variants(study: Path) -> None:
     text = output_of("study", "list")
-    assert all(f" {name} " in text for name in bundled("studies"))
+    assert all(f" {name} " in text for name in bundled_documents("studies"))
     text = output_of("study", "variants", study, "--save", "patches")
     accuracy = re.findall(r"^ *(right|wrong-1|wrong-2|none) +(\S+)", text, re.MULTILINE)
     assert [name for name, _ in accuracy] == ["right", "wrong-1", "wrong-2", "none"]
@@ -74,7 +74,7 @@ def test_variants_of_a_chosen_observer_have_no_accuracy_yet(study: Path) -> None
 
 
 def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engines, "compiler", lambda: None)
+    monkeypatch.setattr(engines, "find_compiler", lambda: None)
     with pytest.raises(ShipidError, match="--single: needs a C compiler"):
         output_of("study", "screen", study, "--single")
 
@@ -186,7 +186,7 @@ def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
         next(events)
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("shipid.cli.study.draw", full)
+    monkeypatch.setattr("shipid.cli.study.draw_events", full)
     code, _, error = ended("study", "run", TINY, "--out", tmp_path / "run", "--workers", "1")
     assert (code, error) == (1, "error: system: No space left on device\n")
     assert taken[0].gi_frame is None, "the generator is closed"

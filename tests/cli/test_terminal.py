@@ -11,9 +11,9 @@ import pytest
 
 def test_a_table_prints_text_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     """Rich would take brackets for markup."""
-    from shipid.cli.terminal import show, table
+    from shipid.cli.terminal import print_table, text_table
 
-    show(table(["speed [m/s]"], [["[bold]4"]]))
+    print_table(text_table(["speed [m/s]"], [["[bold]4"]]))
     out = capsys.readouterr().out
     assert "speed [m/s]" in out
     assert "[bold]4" in out
@@ -21,27 +21,32 @@ def test_a_table_prints_text_as_it_is(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_without_a_terminal_a_row_is_one_line_and_columns_stay_in_line(capsys: pytest.CaptureFixture[str]) -> None:
     """A search for a name finds the whole row; a sign of Chinese takes two places."""
-    from shipid.cli.terminal import show, table
+    from shipid.cli.terminal import print_table, text_table
 
-    show(table(["ship", "H [m]"], [["\u8239", 1.5], ["a", "x" * 300]]))
+    print_table(text_table(["ship", "H [m]"], [["\u8239", 1.5], ["a", "x" * 300]]))
     first, heading, rule, *rows, last = capsys.readouterr().out.splitlines()
     assert (first, heading, last) == ("", "  ship   H [m]", "")
     assert rows == ["  \u8239     1.5", f"  a      {'x' * 300}"]
     assert set(rule.strip()) == {"\u2500"}
-    show(table([], []))
+    print_table(text_table([], []))
 
 
 def test_digits() -> None:
-    from shipid.cli.terminal import digits
+    from shipid.cli.terminal import four_digits
 
-    assert [digits(value) for value in (1.23456, -0.00001, float("nan"), 1.6e9)] == ["1.235", "0", "-", "1600000000.0"]
+    assert [four_digits(value) for value in (1.23456, -0.00001, float("nan"), 1.6e9)] == [
+        "1.235",
+        "0",
+        "-",
+        "1600000000.0",
+    ]
 
 
 def test_a_table_of_measures_has_no_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    from shipid.cli.terminal import measure_table, show
+    from shipid.cli.terminal import measure_table, print_table
 
     row = {"measure": "lateral deviation", "value": -1e-7, "unit": "m", "lengths": -3e-9, "note": ""}
-    show(measure_table([row], []))
+    print_table(measure_table([row], []))
     out = capsys.readouterr().out
     assert "0.00" in out
     assert "-" not in out
@@ -78,7 +83,7 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
         yield Event("end", text="folder")
 
     watch = Still()
-    terminal.draw(slow(watch), watch)  # type: ignore[arg-type]
+    terminal.draw_events(slow(watch), watch)  # type: ignore[arg-type]
     lines = capsys.readouterr().out.splitlines()
     assert lines[:2] == [
         "2 of 2 cells to do",
@@ -92,12 +97,12 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
     )
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     watch = Still()
-    terminal.draw(slow(watch), watch)  # type: ignore[arg-type]
+    terminal.draw_events(slow(watch), watch)  # type: ignore[arg-type]
     assert "a[b]-N0004-s0: trial " in screen.getvalue()
 
 
 def test_events_are_one_line_each_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    from shipid.cli.terminal import draw
+    from shipid.cli.terminal import draw_events
     from shipid.study.run import Event
 
     good = {"cell": "a-N0004-s0", "status": "ok", "H": 1.0, "H_90": 2.0, "seconds": 0.5}
@@ -109,7 +114,7 @@ def test_events_are_one_line_each_where_there_is_no_terminal(capsys: pytest.Capt
         Event("cell", done=2, total=2, row=bad),
         Event("end", text="folder"),
     ]
-    draw(events, Still())  # type: ignore[arg-type]
+    draw_events(events, Still())  # type: ignore[arg-type]
     assert capsys.readouterr().out.splitlines() == [
         "rolling out the models",
         "2 of 2 cells to do",
@@ -119,14 +124,14 @@ def test_events_are_one_line_each_where_there_is_no_terminal(capsys: pytest.Capt
 
 
 def test_an_interruption_says_what_is_kept(capsys: pytest.CaptureFixture[str]) -> None:
-    from shipid.cli.terminal import counted
+    from shipid.cli.terminal import count_blocks
 
     def blocks() -> Iterator[list[int]]:
         yield [1]
         raise KeyboardInterrupt
 
     with pytest.raises(SystemExit) as end:
-        list(counted(blocks(), 3, "cells", "what is finished is kept"))
+        list(count_blocks(blocks(), 3, "cells", "what is finished is kept"))
     assert end.value.code == 130
     assert capsys.readouterr().err == "what is finished is kept\n"
 
@@ -136,7 +141,7 @@ def test_where_there_is_no_terminal_counted_says_how_far_it_is(
 ) -> None:
     """A rotation of an hour whose output goes to a file is not silent, also before its first cell."""
     from shipid.cli import terminal
-    from shipid.cli.terminal import counted
+    from shipid.cli.terminal import count_blocks
 
     monkeypatch.setattr(terminal, "SILENCE", 0.02)
 
@@ -145,7 +150,7 @@ def test_where_there_is_no_terminal_counted_says_how_far_it_is(
             time.sleep(0.1)
             yield block
 
-    assert list(counted(slowly(), 3, "cells")) == [[1, 2], [3]]
+    assert list(count_blocks(slowly(), 3, "cells")) == [[1, 2], [3]]
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "0 of 3 cells"
     assert any(line.startswith("2 of 3 cells") for line in lines)

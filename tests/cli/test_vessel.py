@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of
 
 
 def test_vessels() -> None:
     text = output_of("vessel", "list")
-    for name in bundled("models"):
+    for name in bundled_documents("models"):
         assert f" {name} " in text
     ship = load_vessel("gunnerus-28.9")
     text = output_of("vessel", "show", "gunnerus-28.9")

@@ -14,8 +14,8 @@ from shipid.errors import DataError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.manoeuvre import Excitation
-from shipid.simulation.perform import perform
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 SHIPS = {"kvlcc2-l7": 600.0, "gunnerus-28.9-6dof": 150.0, "container-175": 100.0, "cybership2": 900.0}
@@ -37,7 +37,7 @@ def log_of(ship: Vessel, n_rpm: float) -> Dataset:
         )
         for seed, name in enumerate("ab")
     ]
-    frame = perform(ship, runs, step=0.5, outputs=list(dynamics(ship).outputs))
+    frame = perform_manoeuvres(ship, runs, step=0.5, outputs=list(vessel_dynamics(ship).outputs))
     frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
     return Dataset(frame, {"clock": "run", "flags": []})
 
@@ -50,7 +50,7 @@ def test_a_vessel_predicts_what_was_simulated_on_it(name: str) -> None:
     found, names = predicted_outputs(ship, log), common_outputs(ship, log)
     assert list(found.columns) == ["run", "t", *names]
     assert names
-    assert names == list(dynamics(ship).outputs)
+    assert names == list(vessel_dynamics(ship).outputs)
     late = (log.frame["t"] > 15).to_numpy()
     for output in names:
         true = log.frame[output].to_numpy()[late]

@@ -6,12 +6,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.engine.collect import collect_terms
-from shipid.engine.graph import Graph
+from shipid.engine.graph import InstructionGraph
 from shipid.engine.printing import STAGES
 from shipid.engine.tables import find_tables, inside_tables
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.drawn import seeds
 from tests.drawn_ships import drawn_ship
@@ -22,7 +22,7 @@ PRODUCTS = {ca.OP_MUL, ca.OP_SQ, ca.OP_DIV}
 
 def late_products(function: ca.Function) -> int:
     """Number of multiplications and divisions that an input which is not early has a part in, tables left out."""
-    graph, tables = Graph(function), inside_tables(function)
+    graph, tables = InstructionGraph(function), inside_tables(function)
     late: list[bool] = []
     for k, (operation, operands) in enumerate(zip(graph.operation, graph.operands, strict=True)):
         given = operation == ca.OP_INPUT and function.name_in(function.instruction_input(k)[0]) not in EARLY
@@ -31,7 +31,7 @@ def late_products(function: ca.Function) -> int:
 
 
 def check(vessel: Vessel, seed: int) -> None:
-    rates = dynamics(vessel).rates
+    rates = vessel_dynamics(vessel).rates
     collected = collect_terms(rates, EARLY)
     assert collected.name_in() == rates.name_in()
     assert len(find_tables(collected)) == len(find_tables(rates))
@@ -50,7 +50,7 @@ def test_drawn_ships_keep_their_rates(seed: int, dof: int) -> None:
     check(drawn_ship(seed + 700, dof), seed)
 
 
-@pytest.mark.parametrize("name", sorted(bundled("models")))
+@pytest.mark.parametrize("name", sorted(bundled_documents("models")))
 def test_bundled_vessels_keep_their_rates(name: str) -> None:
     check(load_vessel(name), 1)
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from shipid.engine import engines
-from shipid.engine.engines import ENGINES, Engine, chosen
-from shipid.engine.integrate import Array, Batch, Job
-from shipid.engine.rollout import distances, rollout
+from shipid.engine.engines import ENGINES, Engine, choose_engine
+from shipid.engine.integrate import Array, RolloutBatch, RolloutJob
+from shipid.engine.rollout import rollout, rollout_distances
 from shipid.errors import ShipidError
-from shipid.metrics import position_error, tally
+from shipid.metrics import position_error, tally_errors
 from shipid.vessel.dynamics import Dynamics
 from shipid.vessel.load import load_vessel
 
@@ -21,7 +21,7 @@ Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
 SHIP = load_vessel("gunnerus-28.9")
 
 
-def drift(_: Dynamics, batch: Batch, job: Job) -> tuple[Array, Array]:
+def drift(_: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
     """A toy: whatever the forces, everything moves by its number of seconds."""
     times = np.arange(0, job.num_steps + 1, job.every) * job.step
     path = batch.state[list(job.rows)].T[None, None] + times[:, None, None, None]
@@ -46,21 +46,21 @@ def test_an_engine_is_one_line(toy: str, draw_inputs: Draw) -> None:
 
 def test_a_new_engine_measures_from_its_paths(toy: str, draw_inputs: Draw) -> None:
     given, goal = draw_inputs(SHIP, 3), np.zeros((4, 3, 2))
-    measured = distances(SHIP, **given, goal=goal, step=1.0, engine=toy)
+    measured = rollout_distances(SHIP, **given, goal=goal, step=1.0, engine=toy)
     path = rollout(SHIP, **given, step=1.0, num_steps=4, keep=("north", "east"), engine=toy)
     apart = position_error(path.states[1:, 0], goal)
     np.testing.assert_allclose(measured.total[0], apart.sum(axis=0))
-    np.testing.assert_array_equal(measured.tally[0], tally(apart))
+    np.testing.assert_array_equal(measured.tally[0], tally_errors(apart))
 
 
 def test_an_engine_that_measures_is_asked_to(monkeypatch: pytest.MonkeyPatch, draw_inputs: Draw) -> None:
-    def measure(_: Dynamics, batch: Batch, job: Job, goal: Array) -> tuple[Array, Array, Array]:
+    def measure(_: Dynamics, batch: RolloutBatch, job: RolloutJob, goal: Array) -> tuple[Array, Array, Array]:
         assert goal.shape == (4, 2, 3)
         shape = (len(batch.parameters), batch.state.shape[1])
         return np.full(shape, 42.0), np.zeros((shape[0], 1)), np.full(shape, job.step)
 
     monkeypatch.setitem(ENGINES, "ruler", Engine(drift, measure=measure))
-    measured = distances(SHIP, **draw_inputs(SHIP, 3), goal=np.zeros((4, 3, 2)), step=1.0, engine="ruler")
+    measured = rollout_distances(SHIP, **draw_inputs(SHIP, 3), goal=np.zeros((4, 3, 2)), step=1.0, engine="ruler")
     assert (measured.total == 42).all()
 
 
@@ -92,7 +92,7 @@ def test_auto_goes_by_size_and_by_what_there_is(
     expected: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(engines, "compiler", lambda: "cc" if has_compiler else None)
+    monkeypatch.setattr(engines, "find_compiler", lambda: "cc" if has_compiler else None)
     empty: Any = np.zeros((1, 0, num_samples))
-    batch = Batch(np.zeros((6, num_samples)), empty[0], empty, empty, empty, np.zeros((1, 3)))
-    assert chosen(batch, Job(1.0, num_steps, "euler", 1, (0, 1), device)) is ENGINES[expected]
+    batch = RolloutBatch(np.zeros((6, num_samples)), empty[0], empty, empty, empty, np.zeros((1, 3)))
+    assert choose_engine(batch, RolloutJob(1.0, num_steps, "euler", 1, (0, 1), device)) is ENGINES[expected]

@@ -33,7 +33,7 @@ def spread(values: np.ndarray, count: int) -> np.ndarray:
 )
 @pytest.mark.parametrize("compiled", [False, True])
 def test_a_block_of_a_gpu_holds_all_variants_and_not_too_much(samples: int, variants: int, compiled: bool) -> None:
-    width = engine._width(samples, variants, 1, compiled, "cuda")
+    width = engine._block_width(samples, variants, 1, compiled, "cuda")
     assert width * variants <= max(engine.DEVICE_BLOCK, engine.GRAIN * variants) + engine.GRAIN * variants
     assert width >= min(samples, engine.DEVICE_BLOCK // variants, engine.GRAIN)
 

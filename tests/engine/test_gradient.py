@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from shipid.engine.engines import ENGINES
-from shipid.engine.gradient import Gradient, rollout_gradient, squared_distance
+from shipid.engine.gradient import Gradient, rollout_gradient, squared_distance_loss
 from shipid.engine.integrate import Array, Method
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import WEIGHTS
 
@@ -23,12 +23,12 @@ SHIP = load_vessel("gunnerus-28.9").with_values({"hull.learned": WEIGHTS})
 STEPS, SAMPLES, KEEP = 4, 5, ("north", "east", "u", "r")
 RNG = np.random.default_rng(5)
 GOAL, PUSH = RNG.uniform(-5, 5, (STEPS, SAMPLES, len(KEEP))), RNG.uniform(-2e4, 2e4, (STEPS, SAMPLES, 6))
-LOSS = squared_distance(GOAL, np.array([1.0, 1.0, 3.0, 200.0]))
+LOSS = squared_distance_loss(GOAL, np.array([1.0, 1.0, 3.0, 200.0]))
 
 
 def calm(vessel: Vessel) -> Vessel:
     """The vessel without forces of waves, whose components are drawn."""
-    drawn = {f"{term.path}.off": True for term in dynamics(vessel).drawn}
+    drawn = {f"{term.path}.off": True for term in vessel_dynamics(vessel).drawn}
     return vessel.with_values(drawn) if drawn else vessel
 
 
@@ -77,7 +77,7 @@ def test_parameters_by_finite_differences(draw_inputs: Draw, method: Method, eng
     lag = {"n": {"kind": "first_order", "T": 1.0, "rate": 9.0}, "alpha": {"kind": "first_order", "T": 0.5, "rate": 9.0}}
     ship = SHIP.with_values({"thruster.port.actuator": lag})
     given, options = inputs(ship, draw_inputs, method)
-    options["memory"] = {name: np.full(SAMPLES, 0.9) for name in dynamics(ship).memory}
+    options["memory"] = {name: np.full(SAMPLES, 0.9) for name in vessel_dynamics(ship).memory}
     gradients = gradient(ship, given, options, engine, tuple(ship.parameters))
     values = np.array(list(ship.parameters.values()))
     widths = 1e-6 * np.maximum(np.abs(values), 1e-2)
@@ -130,7 +130,7 @@ def test_auto_takes_the_compiled_sweep_and_else_pytorch(draw_inputs: Draw, monke
     names = ("hull.learned.w_v.1",)
     by_name = {engine: gradient(SHIP, given, options, engine, names).parameters for engine in ("native", "torch")}
     np.testing.assert_array_equal(gradient(SHIP, given, options, "auto", names).parameters, by_name["native"])
-    monkeypatch.setattr("shipid.engine.engines.compiler", lambda: None)
+    monkeypatch.setattr("shipid.engine.engines.find_compiler", lambda: None)
     np.testing.assert_array_equal(gradient(SHIP, given, options, "auto", names).parameters, by_name["torch"])
 
 

@@ -6,14 +6,16 @@ import math
 
 import pytest
 
-from shipid.engine.integrate import integrate, num_threads
+from shipid.engine.integrate import count_threads, integrate_step
 
 
 def end(method: str, num_steps: int) -> float:
     """x(1) of x' = -x m, m' = 0 with m = 1 and x(0) = 1: exp(-1)."""
     x, m = 1.0, 1.0
     for _ in range(num_steps):
-        x, m = integrate(lambda x, m: -x * m, lambda m, _dt: m, lambda x, a, k: x + a * k, x, m, 1 / num_steps, method)  # type: ignore[arg-type]
+        x, m = integrate_step(
+            lambda x, m: -x * m, lambda m, _dt: m, lambda x, a, k: x + a * k, x, m, 1 / num_steps, method
+        )  # type: ignore[arg-type]
     return x
 
 
@@ -25,13 +27,15 @@ def test_the_error_falls_with_the_order_of_the_method(method: str, order: int) -
 
 def test_stages_of_rk4_use_the_memory_at_their_time() -> None:
     """x' = m with m = exp(t), advanced exactly: Simpson's rule for the integral of exp."""
-    x, m = integrate(lambda _x, m: m, lambda m, dt: m * math.exp(dt), lambda x, a, k: x + a * k, 0.0, 1.0, 1.0, "rk4")
+    x, m = integrate_step(
+        lambda _x, m: m, lambda m, dt: m * math.exp(dt), lambda x, a, k: x + a * k, 0.0, 1.0, 1.0, "rk4"
+    )
     assert m == pytest.approx(math.e)
     assert x == pytest.approx((1 + 4 * math.exp(0.5) + math.e) / 6)
 
 
 def test_cores_respect_the_thread_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    assert num_threads() == 1
+    assert count_threads() == 1
     monkeypatch.setenv("OMP_NUM_THREADS", "none")
-    assert num_threads() >= 1
+    assert count_threads() >= 1

@@ -16,26 +16,26 @@ import numpy as np
 import pytest
 
 from shipid.engine import libraries, native
-from shipid.engine.libraries import NoLibrary, build, load, run_compiler, stranger
-from shipid.engine.native import Target, compiler
+from shipid.engine.libraries import NoLibrary, build_library, foreign_owner_words, load_library, run_compiler
+from shipid.engine.native import CompilerTarget, find_compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.vessel.load import load_vessel
 from tests.drawn import seeds
 from tests.engine.conftest import QUICK
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 SHIP = load_vessel("gunnerus-28.9")
 SOURCE = "double run(void) { return 1.0; }"
 
 
 def forget() -> None:
     """As a new process: nothing is compiled, no folder is chosen, no compiler is known."""
-    native._library.cache_clear()
-    native._probed.cache_clear()
-    native.target.cache_clear()
+    native._compile_rollout.cache_clear()
+    native._probe_compiler.cache_clear()
+    native.compiler_target.cache_clear()
     native.compiler_version.cache_clear()
-    libraries.folder.cache_clear()
+    libraries.library_folder.cache_clear()
 
 
 @pytest.fixture(autouse=True)
@@ -68,12 +68,12 @@ def made(folder: Path) -> Path:
 
 @cache
 def compiled() -> bytes:
-    """The library of `SOURCE`, as `build` leaves it."""
-    command = compiler()
+    """The library of `SOURCE`, as `build_library` leaves it."""
+    command = find_compiler()
     assert command is not None
     with TemporaryDirectory() as folder:
         library = Path(folder) / "model.so"
-        assert build(native._command(command, Target(1)), SOURCE, library) is None
+        assert build_library(native._compiler_command(command, CompilerTarget(1)), SOURCE, library) is None
         return library.read_bytes()
 
 
@@ -83,7 +83,7 @@ def test_a_truncated_library_is_never_loaded(kept: float, tmp_path: Path) -> Non
     content = library.read_bytes()
     library.write_bytes(content[: int(kept * len(content)) if isinstance(kept, float) else kept])
     with pytest.raises(NoLibrary, match="is damaged"):
-        load(library)
+        load_library(library)
 
 
 @pytest.mark.parametrize("seed", seeds(4, 20))
@@ -93,29 +93,29 @@ def test_a_library_with_another_byte_is_never_loaded(seed: int, tmp_path: Path) 
     content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
     library.write_bytes(content)
     with pytest.raises(NoLibrary, match="is damaged"):
-        load(library)
+        load_library(library)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
 def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     library = made(tmp_path / "a")
-    assert stranger(library) is None
+    assert foreign_owner_words(library) is None
     for place, mode in ((library, 0o720), (library, 0o702), (library.parent, 0o720), (library.parent, 0o702)):
         before = stat.S_IMODE(place.stat().st_mode)
         place.chmod(mode)
-        assert "written by other" in str(stranger(library))
+        assert "written by other" in str(foreign_owner_words(library))
         place.chmod(before)
     tmp_path.chmod(0o707)  # others could put another folder in the place of this one
-    assert "written by other" in str(stranger(library))
+    assert "written by other" in str(foreign_owner_words(library))
     tmp_path.chmod(0o1707)
-    assert stranger(library) is None
+    assert foreign_owner_words(library) is None
     tmp_path.chmod(0o700)
     link = library.with_name("link.so")
     link.symlink_to(library)
-    assert "no file" in str(stranger(link))
+    assert "no file" in str(foreign_owner_words(link))
     monkeypatch.setattr(os, "geteuid", lambda: 12345)
     with pytest.raises(NoLibrary, match="belongs to another user"):
-        load(library)
+        load_library(library)
 
 
 @pytest.mark.slow
@@ -141,7 +141,7 @@ def test_a_rollout_mends_the_cache(
         states = numbers()
     if damage != "folder":
         np.testing.assert_array_equal(states, sound)
-        assert load(library) is not None
+        assert load_library(library) is not None
     np.testing.assert_allclose(states, sound, rtol=1e-9)
     assert len([record for record in caplog.records if "anew" in record.message or "not used" in record.message]) <= 2
 
@@ -195,8 +195,8 @@ def test_a_full_disk_is_one_line(
     """No library fits anywhere, after the probe has fitted."""
     sound = numbers()
     forget()
-    assert compiler() is not None
-    monkeypatch.setattr(native, "build", lambda *_: "ld: final link failed: No space left on device")
+    assert find_compiler() is not None
+    monkeypatch.setattr(native, "build_library", lambda *_: "ld: final link failed: No space left on device")
     (Path(os.environ["XDG_CACHE_HOME"]) / "shipid").rename(Path(os.environ["XDG_CACHE_HOME"]) / "gone")
     (Path(os.environ["XDG_CACHE_HOME"]) / "shipid").mkdir(mode=0o700)
     with caplog.at_level(logging.WARNING):
@@ -204,7 +204,7 @@ def test_a_full_disk_is_one_line(
         numbers()
     (line,) = [record.getMessage() for record in caplog.records]
     assert "No space left" in line
-    assert compiler() is None
+    assert find_compiler() is None
 
 
 @pytest.mark.parametrize("seed", seeds(1, 6))
@@ -222,8 +222,8 @@ def test_what_a_strange_compiler_says_is_one_line_that_names_it_and_controls_no_
     monkeypatch.setenv("PATH", str(tmp_path / "tools"))
     forget()
     with caplog.at_level(logging.WARNING):
-        assert native.engine() == "casadi"
-        native.refuse((tmp_path / "said").read_bytes().decode(errors="replace"))
+        assert native.engine_description() == "casadi"
+        native.refuse_compiling((tmp_path / "said").read_bytes().decode(errors="replace"))
     first, second = (record.getMessage() for record in caplog.records)
     assert first.startswith(f"the C compiler {tmp_path / 'tools' / 'gcc'} cannot be used (")
     assert ("without a library" in first) == bool(seed % 3)
@@ -279,4 +279,4 @@ def test_a_library_under_the_name_of_another_is_never_loaded(tmp_path: Path) -> 
     library = made(tmp_path / "a")
     other = library.rename(library.with_name("other.so"))
     with pytest.raises(NoLibrary, match="is damaged"):
-        load(other)
+        load_library(other)

@@ -12,25 +12,25 @@ import pytest
 import torch
 
 from shipid.engine import torch as batched
-from shipid.engine.lowering import lower
-from shipid.engine.native import compiler
+from shipid.engine.lowering import lower_function
+from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Method, Trajectories, rollout
 from shipid.engine.torch import kernels
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import Family, members
+from shipid.vessel.perturb import Family, draw_members
 from tests.conftest import structure
 from tests.engine.operations import operations
 
-ENGINES = ["casadi", "torch", *(["native"] if compiler() else [])]
+ENGINES = ["casadi", "torch", *(["native"] if find_compiler() else [])]
 Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
 
 
 def family(vessel: Vessel, count: int) -> np.ndarray:
     scales = ["thruster.*.k_T"] if any(path.endswith(".k_T") for path in vessel.parameters) else []
     rules = [{"parameters": ["hull.*", "inertia.m", *scales], "factor": (0.7, 1.3)}]
-    drawn = members(Family(name="f", members=count, perturb=rules), vessel)
+    drawn = draw_members(Family(name="f", members=count, perturb=rules), vessel)
     return np.array([variant.parameters for variant in drawn])
 
 
@@ -43,7 +43,7 @@ def empty_cache(libraries_kept: Path) -> Iterator[None]:
 
 def evaluate(function: ca.Function, inputs: dict[str, np.ndarray]) -> np.ndarray:
     """Lowered function on inputs (channels, batch), parameters the same for all."""
-    lowered = lower(function)
+    lowered = lower_function(function)
     names = [function.name_in(i) for i in range(function.n_in())]
     given = [torch.tensor(inputs[name]) for name in names]
     given[names.index("parameters")] = given[names.index("parameters")][:, :1]
@@ -59,7 +59,7 @@ def by_casadi(function: ca.Function, inputs: dict[str, np.ndarray]) -> np.ndarra
 
 
 def dynamics_inputs(vessel: Vessel, draw_inputs: Draw, width: int) -> dict[str, np.ndarray]:
-    given, model = draw_inputs(vessel, width), dynamics(vessel)
+    given, model = draw_inputs(vessel, width), vessel_dynamics(vessel)
     rng = np.random.default_rng(1)
 
     def stacked(names: Any, group: str) -> np.ndarray:
@@ -78,7 +78,7 @@ def dynamics_inputs(vessel: Vessel, draw_inputs: Draw, width: int) -> dict[str, 
 
 @pytest.mark.parametrize("name", ["rates", "advance"])
 def test_functions_of_every_vessel(vessel: Vessel, draw_inputs: Draw, name: str) -> None:
-    function = getattr(dynamics(vessel), name)
+    function = getattr(vessel_dynamics(vessel), name)
     inputs = dynamics_inputs(vessel, draw_inputs, 16)
     expected = by_casadi(function, inputs)
     computed = evaluate(function, inputs)
@@ -137,7 +137,7 @@ def test_every_printed_operation_has_casadis_value() -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # PyTorch's compiler uses what PyTorch deprecates
-@pytest.mark.skipif(compiler() is None, reason="no C++ compiler on this machine")
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler on this machine")
 def test_a_family_compiles_once(draw_inputs: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
     """Eight variants, batches of one block or of several, one compilation; the same numbers as CasADi's."""
     vessel = load_vessel("gunnerus-28.9").with_values({"wind.off": True})

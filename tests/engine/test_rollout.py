@@ -13,11 +13,11 @@ import pytest
 import torch
 
 from shipid.engine.integrate import Method
-from shipid.engine.native import compiler
-from shipid.engine.rollout import distances, rollout
+from shipid.engine.native import find_compiler
+from shipid.engine.rollout import rollout, rollout_distances
 from shipid.errors import DataError, ShipidError
-from shipid.interrupts import uninterrupted
-from shipid.vessel.dynamics import dynamics
+from shipid.interrupts import hold_interrupts
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import OF_LAWS, pace
 
@@ -56,7 +56,7 @@ def test_mirroring_the_manoeuvre_mirrors_the_path(bundled_vessel: Vessel) -> Non
     values = bundled_vessel.parameters
     alike = {path: values[path.removesuffix("_minus") + "_plus"] for path in values if path.endswith("_minus")}
     vessel = bundled_vessel.with_values(alike)
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     start = zeros(model.state, 2) | {"u": np.full(2, 4.0)}
     angle = np.array([0.5, -0.5])
     commands = {name: np.full(2, 2.5) if name.endswith(".n") else angle for name in model.commands}
@@ -79,7 +79,7 @@ def test_without_thrust_a_ship_slows_down(bundled_vessel: Vessel) -> None:
     if "abkowitz" in bundled_vessel.document["hull"]:
         pytest.skip("a polynomial about one speed says nothing of a ship that stops")
     u, v, r = (x.ravel() for x in np.meshgrid([0.5, 3.0, 6.0], [-1.0, 0.2, 1.0], [-0.13, 0.02, 0.13]))
-    model = dynamics(bundled_vessel)
+    model = vessel_dynamics(bundled_vessel)
     start = zeros(model.state, len(u)) | {"u": u, "v": v, "r": r}
     held = zeros(model.commands, len(u)), zeros(model.environment, len(u))
     path = rollout(bundled_vessel, start, *held, step=0.5, num_steps=1200, every=120, method="rk4")
@@ -96,7 +96,7 @@ def last_state(vessel: Vessel, draw_inputs: Draw, method: Method, step: float, s
     given["start"] |= {"u": np.full(3, 3.0 * slow), "v": np.full(3, 0.4 * slow), "r": np.full(3, -0.05)}
     commands = {name: np.full(3, 0.7 if name.endswith("alpha") else 2.0) for name in given["commands"]}
     environment = {name: np.zeros(3) for name in given["environment"]}
-    memory = {name: np.full(3, 0.6 if name.endswith("alpha") else 1.5) for name in dynamics(vessel).memory}
+    memory = {name: np.full(3, 0.6 if name.endswith("alpha") else 1.5) for name in vessel_dynamics(vessel).memory}
     path = rollout(
         vessel,
         given["start"],
@@ -137,7 +137,7 @@ def test_commands_act_from_step_to_step(draw_inputs: Draw, engine: Any) -> None:
     first, second = draw_inputs(vessel, 3, seed=1), draw_inputs(vessel, 3, seed=2)
     options: dict[str, Any] = {"step": 0.5, "engine": engine}
     one = rollout(vessel, **first, num_steps=6, **options)
-    joined = {name: one[name][-1, 0] for name in dynamics(vessel).state}
+    joined = {name: one[name][-1, 0] for name in vessel_dynamics(vessel).state}
     two = rollout(
         vessel,
         joined,
@@ -174,7 +174,7 @@ def test_extra_force_enters_as_force(engine: Any, shape: str) -> None:
     tau = {"sample": np.array([5e3, 0, 0]), "held": np.tile([5e3, 0, 0], (2, 1)), "steps": np.zeros((3, 2, 3))}[shape]
     if shape == "steps":
         tau[1, :, 0] = 5e3
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     start, commands = zeros(model.state, 2), zeros(model.commands, 2)
     path = rollout(vessel, start, commands, step=1e-3, num_steps=3, tau_extra=tau, engine=engine)
     gained = 5e3 / (410931.81 + 79320.5895) * 1e-3
@@ -190,7 +190,7 @@ def test_an_input_that_is_no_number_is_reported_though_a_limit_hides_it(
     draw_inputs: Draw, engine: Any, where: str
 ) -> None:
     """Its samples alone, in paths and in distances; the last sample shares no vector with the first."""
-    if engine in ("native", "single") and compiler() is None:
+    if engine in ("native", "single") and find_compiler() is None:
         pytest.skip("no C compiler on this machine")
     limits = {f"thruster.port.actuator.{name}": {**LAG, "low": -3.0, "high": 3.0} for name in ("n", "alpha")}
     vessel = load_vessel("gunnerus-28.9-6dof" if where == "drawn" else "gunnerus-28.9").with_values(limits)
@@ -215,13 +215,13 @@ def test_an_input_that_is_no_number_is_reported_though_a_limit_hides_it(
         values[1, list(vessel.parameters).index("thruster.port.actuator.n.high")] = np.nan
         further["parameters"], bad = values, np.array([[False], [True]]) & np.ones((2, count), dtype=bool)
     else:
-        waves = np.zeros((count, 2, sum(dynamics(vessel).drawn[0].widths.values())))
+        waves = np.zeros((count, 2, sum(vessel_dynamics(vessel).drawn[0].widths.values())))
         waves[:, 1, 3] += wrong
         further = {"components": {"waves.first_order": waves}}
     path = rollout(vessel, **given, **further, step=0.5, num_steps=4, engine=engine)
     np.testing.assert_array_equal(path.diverged, bad)
     if where not in ("tau", "drawn"):
-        measured = distances(vessel, **given, **further, goal=np.zeros((4, count, 2)), step=0.5, engine=engine)
+        measured = rollout_distances(vessel, **given, **further, goal=np.zeros((4, count, 2)), step=0.5, engine=engine)
         np.testing.assert_array_equal(measured.diverged, bad)
 
 
@@ -262,7 +262,7 @@ def test_an_interrupt_waits_for_casadi_and_is_not_lost() -> None:
 
     def work() -> None:
         nonlocal reached
-        with uninterrupted():
+        with hold_interrupts():
             os.kill(os.getpid(), signal.SIGINT)
             reached = True
 
@@ -274,7 +274,7 @@ def test_an_interrupt_waits_for_casadi_and_is_not_lost() -> None:
 
 def marked(vessel: Vessel) -> dict[str, dict[str, np.ndarray]]:
     """Start, commands and environment of two samples, each channel with its own number."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     names = {"start": model.state, "commands": model.commands, "environment": model.environment}
     return {
         group: {name: np.array([1.0, 2.0]) / 8 + number / 64 for number, name in enumerate(channels)}

@@ -11,8 +11,8 @@ import pytest
 
 from shipid.engine import native, samples
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import compiler
-from shipid.engine.samples import on_samples
+from shipid.engine.native import find_compiler
+from shipid.engine.samples import map_over_samples
 
 
 @pytest.fixture(autouse=True)
@@ -20,9 +20,9 @@ def own_cache(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator
     monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "_refused", [])
     monkeypatch.setattr(native, "_interpreted", set())
-    samples._library.cache_clear()
+    samples._compile_sample_function.cache_clear()
     yield
-    samples._library.cache_clear()
+    samples._compile_sample_function.cache_clear()
 
 
 def function() -> ca.Function:
@@ -40,12 +40,12 @@ def inputs(count: int, seed: int = 0) -> list[np.ndarray]:
     return [x, y, rng.uniform(1, 2, 2), np.zeros((1, count))]
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 @pytest.mark.parametrize("count", [1, 7, 8, 33])
 def test_c_and_the_virtual_machine_agree(count: int) -> None:
     made = function()
-    few, many = (on_samples(made, n, ["p"]) for n in (1, 1e12))
-    assert samples._library(made, ("p",)) is not None
+    few, many = (map_over_samples(made, n, ["p"]) for n in (1, 1e12))
+    assert samples._compile_sample_function(made, ("p",)) is not None
     for one, other in zip(few(*inputs(count)), many(*inputs(count)), strict=True):
         assert one.shape == other.shape
         np.testing.assert_allclose(other, one, rtol=1e-14, atol=1e-15)
@@ -58,14 +58,14 @@ def test_without_a_compiler_it_is_interpreted(
     def none(*_: object) -> None:
         raise NoLibrary("the C compiler failed")
 
-    monkeypatch.setattr(samples, "compiler", lambda: "gcc")
-    monkeypatch.setattr(samples, "compiled", none)
+    monkeypatch.setattr(samples, "find_compiler", lambda: "gcc")
+    monkeypatch.setattr(samples, "compile_source", none)
     made = function()
     with caplog.at_level("WARNING"):
-        run = on_samples(made, 1e12, ["p"])
-        on_samples(made, 1e12, ["p"])
+        run = map_over_samples(made, 1e12, ["p"])
+        map_over_samples(made, 1e12, ["p"])
     assert [record.getMessage() for record in caplog.records] == ["f is not compiled (the C compiler failed): slower"]
-    assert native.engine().endswith((", f by CasADi", "casadi"))  # other digits than those of C
-    for one, other in zip(run(*inputs(5)), on_samples(made, 1, ["p"])(*inputs(5)), strict=True):
+    assert native.engine_description().endswith((", f by CasADi", "casadi"))  # other digits than those of C
+    for one, other in zip(run(*inputs(5)), map_over_samples(made, 1, ["p"])(*inputs(5)), strict=True):
         np.testing.assert_array_equal(one, other)
     assert native._refused == []  # rollouts keep their engine

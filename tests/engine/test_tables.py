@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from shipid.engine import native
-from shipid.engine.integrate import Batch, Job
-from shipid.engine.native import compiler, run_native, run_single, target
-from shipid.engine.tables import LEAST, Lookup, even_tables, find_tables
-from shipid.engine.vectors import Target
-from shipid.physics.wind import interpolate
+from shipid.engine.integrate import RolloutBatch, RolloutJob
+from shipid.engine.native import compiler_target, find_compiler, run_native, run_single
+from shipid.engine.tables import LEAST, TableLookup, even_tables, find_tables
+from shipid.engine.vectors import CompilerTarget
+from shipid.physics.wind import interpolate_ramps
 from shipid.vessel import dynamics as module
-from shipid.vessel.dynamics import Dynamics, dynamics
+from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.engine.conftest import QUICK
 
@@ -26,7 +26,7 @@ SHIP = load_vessel("gunnerus-28.9")
 
 def tables_of(path: str) -> list[int]:
     """Numbers of knots of the tables in the rates of a vessel, the last knot left out."""
-    return sorted(len(table.knots) for table in find_tables(dynamics(load_vessel(path)).rates).values())
+    return sorted(len(table.knots) for table in find_tables(vessel_dynamics(load_vessel(path)).rates).values())
 
 
 def test_wind_tables_of_a_ship_are_found_whole_and_nothing_else() -> None:
@@ -39,20 +39,25 @@ def test_wind_tables_of_a_ship_are_found_whole_and_nothing_else() -> None:
 @pytest.mark.parametrize("size", [LEAST, LEAST + 1])
 def test_a_short_table_stays_a_sum(size: int) -> None:
     x, grid, values = ca.SX.sym("x"), ca.SX.sym("grid", size), ca.SX.sym("values", size)
-    found = find_tables(ca.Function("f", [x, grid, values], [interpolate(x, grid, values)]))
+    found = find_tables(ca.Function("f", [x, grid, values], [interpolate_ramps(x, grid, values)]))
     assert len(found) == (size > LEAST)
 
 
 def with_tables(size: int) -> Dynamics:
     """A motion whose rates are two tables of `size` knots of u, one of v on the same knots, and beyond the knots."""
-    model = dynamics(SHIP)
+    model = vessel_dynamics(SHIP)
     x, p = ca.SX.sym("state", 6), ca.SX.sym("parameters", len(SHIP.parameters))
     grid, first, second = p[:size], p[size : 2 * size], p[2 * size : 3 * size]
     beyond = first[0] + (first[1] - first[0]) / (grid[1] - grid[0]) * (x[3] - grid[0])
     for i in range(1, size - 1):
         bend = (first[i + 1] - first[i]) / (grid[i + 1] - grid[i]) - (first[i] - first[i - 1]) / (grid[i] - grid[i - 1])
         beyond += bend * ca.fmax(x[3] - grid[i], 0)
-    rates = [interpolate(x[3], grid, first), interpolate(x[3], grid, second), interpolate(x[4], grid, first), beyond]
+    rates = [
+        interpolate_ramps(x[3], grid, first),
+        interpolate_ramps(x[3], grid, second),
+        interpolate_ramps(x[4], grid, first),
+        beyond,
+    ]
     inputs = [x, ca.SX.sym("memory", 0), ca.SX.sym("commands", 4), ca.SX.sym("environment", 2), p]
     names = [*module.INPUTS, "tau_extra"]
     return replace(
@@ -61,15 +66,15 @@ def with_tables(size: int) -> Dynamics:
     )
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 @pytest.mark.parametrize("way", ["of this processor", "lane by lane"])
 @pytest.mark.parametrize("size", [LEAST + 1, 16, 17, 18, 19, 33, 34, 50])
 def test_a_lookup_has_the_values_of_the_ramps(
     size: int, way: str, libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Knots evenly apart, and others: at knots, between and beyond them, and where there is no number."""
-    if way == "lane by lane" and target().lookup is not None:
-        monkeypatch.setattr(Target, "lookup", property(lambda wanted: Lookup(wanted.lanes)))
+    if way == "lane by lane" and compiler_target().lookup is not None:
+        monkeypatch.setattr(CompilerTarget, "lookup", property(lambda wanted: TableLookup(wanted.lanes)))
     monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "OPTIONS", QUICK)
     rng, model = np.random.default_rng(size), with_tables(size)
@@ -84,9 +89,9 @@ def test_a_lookup_has_the_values_of_the_ramps(
     start = np.zeros((6, len(u)))
     start[3], start[4] = u, rng.permutation(u)
     zeros: Any = np.zeros
-    rates, job = model.rates.map(len(u)), Job(1.0, 1, "euler", 1, tuple(range(6)))
+    rates, job = model.rates.map(len(u)), RolloutJob(1.0, 1, "euler", 1, tuple(range(6)))
     for together in (parameters[:2], parameters[1:]):
-        batch = Batch(
+        batch = RolloutBatch(
             start, zeros((0, len(u))), zeros((1, 4, len(u))), zeros((1, 2, len(u))), zeros((1, 3, len(u))), together
         )
         got, short = (way(model, batch, job)[0][1] - start.T for way in (run_native, run_single))
@@ -99,11 +104,13 @@ def test_a_lookup_has_the_values_of_the_ramps(
         assert np.isnan(run_native(model, nothing, job)[0][1, :, :, :4]).all()
 
 
-@pytest.mark.skipif(compiler() is None or target().lookup is None, reason="sin and cos are not written out")
+@pytest.mark.skipif(
+    find_compiler() is None or compiler_target().lookup is None, reason="sin and cos are not written out"
+)
 def test_the_source_of_a_ship_with_tables_looks_them_up() -> None:
-    model = dynamics(SHIP)
-    tables = even_tables(native._rates(model), np.array([list(SHIP.parameters.values())]))
-    source = native._Source(model, 1.0, "euler", target(), tables).text()
+    model = vessel_dynamics(SHIP)
+    tables = even_tables(native._collected_rates(model), np.array([list(SHIP.parameters.values())]))
+    source = native._RolloutSource(model, 1.0, "euler", compiler_target(), tables).text()
     assert len(tables) == 3
     assert source.count("v_value(&") == 3
     assert source.count("v_place(a") == 1

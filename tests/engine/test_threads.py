@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 
 from shipid.engine import native, threads
-from shipid.engine.integrate import num_threads
-from shipid.engine.native import compiled, compiler
-from shipid.engine.threads import in_parallel, threaded
+from shipid.engine.integrate import count_threads
+from shipid.engine.native import compile_source, find_compiler
+from shipid.engine.threads import run_tasks, threaded_source
 from tests.engine.conftest import QUICK
 
-COUNT = threaded(["shift"], {"done": "int", "nothing": "int"}, "done[number + shift] += nothing ? 100 : 1;")
+COUNT = threaded_source(["shift"], {"done": "int", "nothing": "int"}, "done[number + shift] += nothing ? 100 : 1;")
 
 
 @pytest.fixture
 def count(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """A C function that counts how often it does each task."""
-    if compiler() is None:
+    if find_compiler() is None:
         pytest.skip("no C compiler on this machine")
     monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "OPTIONS", QUICK)
-    return compiled(COUNT)
+    return compile_source(COUNT)
 
 
 @pytest.mark.parametrize("num_cores", [1, 2, 5])
@@ -33,9 +33,9 @@ def count(libraries_kept: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_every_task_is_done_once(
     count: Any, monkeypatch: pytest.MonkeyPatch, num_cores: int, work: float, num_tasks: int
 ) -> None:
-    monkeypatch.setattr(threads, "num_threads", lambda: num_cores)
+    monkeypatch.setattr(threads, "count_threads", lambda: num_cores)
     done = np.zeros(40, dtype=np.intc)
-    in_parallel(count, [3], [done, None], num_tasks, work)
+    run_tasks(count, [3], [done, None], num_tasks, work)
     assert done.tolist() == [0, 0, 0, *[1] * num_tasks, *[0] * (37 - num_tasks)]
 
 
@@ -48,5 +48,5 @@ def test_after_an_interrupt_nothing_more_is_begun(count: Any) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        in_parallel(interrupted, [3], [done, None], 1000, threads.AT_ONCE)
-    assert 0 < done.sum() <= 2 * num_threads()
+        run_tasks(interrupted, [3], [done, None], 1000, threads.AT_ONCE)
+    assert 0 < done.sum() <= 2 * count_threads()

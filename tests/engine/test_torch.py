@@ -9,14 +9,14 @@ torch = pytest.importorskip("torch")
 
 from shipid.engine import torch as engine  # noqa: E402
 from shipid.engine.rollout import rollout  # noqa: E402
-from shipid.vessel.dynamics import dynamics  # noqa: E402
+from shipid.vessel.dynamics import vessel_dynamics  # noqa: E402
 from shipid.vessel.load import load_vessel  # noqa: E402
 
 
 @pytest.mark.parametrize("num_samples", [1, 255, 256, 8193, 20000])
 @pytest.mark.parametrize("compiled", [False, True])
 def test_blocks_cover_all_samples_with_little_padding(num_samples: int, compiled: bool) -> None:
-    width = engine._width(num_samples, 1, 1, compiled, "cpu")
+    width = engine._block_width(num_samples, 1, 1, compiled, "cpu")
     padded = -(-num_samples // width) * width
     assert width <= (engine.COMPILED_BLOCK if compiled else engine.EAGER_BLOCK)
     assert padded - num_samples < (engine.GRAIN if compiled else 1) * (padded // width)
@@ -25,7 +25,7 @@ def test_blocks_cover_all_samples_with_little_padding(num_samples: int, compiled
 
 def test_a_rollout_agrees_with_casadi() -> None:
     ship = load_vessel("gunnerus-28.9")
-    model = dynamics(ship)
+    model = vessel_dynamics(ship)
     start = {name: np.array([4.0, 3.0]) if name == "u" else np.zeros(2) for name in model.state}
     commands = {name: np.array([2.0, 1.5]) if name.endswith(".n") else np.array([0.1, -0.2]) for name in model.commands}
     calm = {name: np.zeros(2) for name in model.environment}

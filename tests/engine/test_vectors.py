@@ -11,58 +11,58 @@ import numpy as np
 import pytest
 
 from shipid.engine import native
-from shipid.engine.native import compiled, compiler, target
-from shipid.engine.threads import in_parallel, threaded
-from shipid.engine.vectors import SINGLE, Target, head
+from shipid.engine.native import compile_source, compiler_target, find_compiler
+from shipid.engine.threads import run_tasks, threaded_source
+from shipid.engine.vectors import SINGLE, CompilerTarget, vector_source
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler on this machine")
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {"sin": np.sin, "cos": np.cos, "tanh": np.tanh, "atan2": np.arctan2}
 WORST = 4.0  # units in the last place
 Array = np.ndarray[Any, Any]
 
 
-def _half() -> Target:
-    return Target(4, ("-march=native",), fused=True) if target().lanes > 4 else target()
+def _half() -> CompilerTarget:
+    return CompilerTarget(4, ("-march=native",), fused=True) if compiler_target().lanes > 4 else compiler_target()
 
 
-TARGETS: dict[str, Callable[[], Target]] = {  # looked at when a test runs, since that takes a compiler
-    "widest": target,
-    "glibc": lambda: replace(target(), fused=False),
-    "lane by lane": lambda: replace(target(), fused=False, prefix=""),
+TARGETS: dict[str, Callable[[], CompilerTarget]] = {  # looked at when a test runs, since that takes a compiler
+    "widest": compiler_target,
+    "glibc": lambda: replace(compiler_target(), fused=False),
+    "lane by lane": lambda: replace(compiler_target(), fused=False, prefix=""),
     "half as wide": _half,
-    "single": lambda: target(SINGLE),
-    "single, glibc": lambda: replace(target(SINGLE), fused=False),
+    "single": lambda: compiler_target(SINGLE),
+    "single, glibc": lambda: replace(compiler_target(SINGLE), fused=False),
 }
 
 
 @pytest.fixture(params=TARGETS)
-def wanted(request: pytest.FixtureRequest) -> Target:
+def wanted(request: pytest.FixtureRequest) -> CompilerTarget:
     """Vectors of this processor, with every way to their functions."""
     return TARGETS[request.param]()
 
 
 @pytest.fixture
-def call(wanted: Target, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Array]:
+def call(wanted: CompilerTarget, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Array]:
     """Call a function by its name on arrays of one length."""
-    monkeypatch.setattr(native, "target", lambda *_: wanted)
+    monkeypatch.setattr(native, "compiler_target", lambda *_: wanted)
 
     def called(name: str, *arguments: Array) -> Array:
         places = ", ".join(f"a[{k} * n + i]" for k in range(len(arguments)))
         task = f"for (long i = 0; i < n; ++i) out[i] = v_{name}({places});"
-        source = head(wanted) + threaded(["n"], {"a": "const U", "out": "U"}, task)
+        source = vector_source(wanted) + threaded_source(["n"], {"a": "const U", "out": "U"}, task)
         size = len(arguments[0])
         groups = -(-size // wanted.lanes)
         given = np.zeros((len(arguments), groups * wanted.lanes), wanted.precision.dtype)
         given[:, :size] = arguments
         out = np.empty(groups * wanted.lanes, wanted.precision.dtype)
-        in_parallel(compiled(source), [groups], [given, out], 1, 1.0)
+        run_tasks(compile_source(source), [groups], [given, out], 1, 1.0)
         return out[:size]
 
     return called
 
 
-def arguments(name: str, of: Target) -> tuple[Array, ...]:
+def arguments(name: str, of: CompilerTarget) -> tuple[Array, ...]:
     """Arguments of all sizes; for the sine and cosine also close to multiples of a quarter of a turn."""
     rng = np.random.default_rng(0)
     near = rng.uniform(-10, 10, 4000)
@@ -80,7 +80,7 @@ def arguments(name: str, of: Target) -> tuple[Array, ...]:
 
 @pytest.mark.skipif(np.finfo(np.longdouble).nmant < 63, reason="no number with more digits here")
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_close_to_the_true_value(name: str, wanted: Target, call: Callable[..., Array]) -> None:
+def test_close_to_the_true_value(name: str, wanted: CompilerTarget, call: Callable[..., Array]) -> None:
     given = arguments(name, wanted)
     true = FUNCTIONS[name](*(values.astype(np.longdouble) for values in given))
     error = np.abs(call(name, *given) - true) / np.spacing(np.abs(true.astype(wanted.precision.dtype)))
@@ -88,7 +88,7 @@ def test_close_to_the_true_value(name: str, wanted: Target, call: Callable[..., 
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_odd_and_even_to_the_bit(name: str, wanted: Target, call: Callable[..., Array]) -> None:
+def test_odd_and_even_to_the_bit(name: str, wanted: CompilerTarget, call: Callable[..., Array]) -> None:
     """A ship and its mirror image stay mirror images; glibc's cosine of -x may differ from that of x."""
     if not wanted.fused:
         pytest.skip("the functions of a library")
@@ -98,7 +98,7 @@ def test_odd_and_even_to_the_bit(name: str, wanted: Target, call: Callable[..., 
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_what_is_no_number_gives_none(name: str, wanted: Target, call: Callable[..., Array]) -> None:
+def test_what_is_no_number_gives_none(name: str, wanted: CompilerTarget, call: Callable[..., Array]) -> None:
     special = np.array([0.0, -0.0, np.nan, 1.0, -1.0])
     given = [np.array(values, wanted.precision.dtype) for values in zip(*product(special, repeat=2), strict=True)]
     given = given if name == "atan2" else given[:1]

@@ -23,7 +23,7 @@ from shipid.hybrid.ridge import smooth_basis
 from shipid.hybrid.units import Units
 from shipid.observer import COLUMNS, Observer
 from shipid.predictor import Predictor
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from tests.conftest import ENVELOPE, SPEEDS, pace, variety
 
@@ -54,7 +54,7 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     if kind == "learned-force" and ship is not None and "learned" in ship.document.get("hull", {}):
         ship = ships["gunnerus-28.9"]
     slow = 1.0 if ship is None else pace(ship)
-    model = None if ship is None else dynamics(ship)
+    model = None if ship is None else vessel_dynamics(ship)
     three = model is not None and model.num_dof == 3 and not model.hidden
     observer = Observer(fade=12.0) if three and rng.random() < 0.3 and kind not in STEPPED else None
     physics = Physics(
@@ -87,7 +87,7 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
 
 def remembering(physics, memory, instants, seed=2, **more):
     """A predictor whose network takes every input that the physics and a memory give at some instants."""
-    commands = dynamics(physics.vessel).commands
+    commands = vessel_dynamics(physics.vessel).commands
     inputs = Inputs(commands, memory)
     table = inputs.table(physics, instants)
     network = network_of(np.random.default_rng(seed), list(table), table, physics.horizon, 2, False)
@@ -123,7 +123,7 @@ def _instants(rng, physics, commands, count, steps, slow, known):
         factor = slow if name in SPEEDS else 1.0
         return factor * rng.uniform(low, high, shape)
 
-    model = None if physics.vessel is None else dynamics(physics.vessel)
+    model = None if physics.vessel is None else vessel_dynamics(physics.vessel)
     states = () if model is None else model.state
     names = tuple(dict.fromkeys(("psi", *MOTIONS, *states, *commands, "V_w", "beta_w", "V_c", "beta_c")))
     names = tuple(name for name in names if name not in ("north", "east"))

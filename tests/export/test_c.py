@@ -28,7 +28,7 @@ from shipid.hybrid.features import Memory
 from shipid.hybrid.physics import Physics
 from shipid.observer import AGE, LONGEST, MOST_PARTS, Observer, bank, observe
 from shipid.predictor import Predictor
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import pace, variety
 from tests.drawn_ships import drawn_ship
@@ -155,7 +155,7 @@ def test_a_prediction_is_fast_small_and_allocates_nothing(tmp_path):
 
 def log_of(vessel, seconds, rng, interval):
     """A run with orders that change, at uneven times; its heading goes on beyond pi."""
-    slow, commands = pace(vessel), dynamics(vessel).commands
+    slow, commands = pace(vessel), vessel_dynamics(vessel).commands
     t = np.cumsum(rng.uniform(0.8, 1.2, round(seconds / interval)) * interval) * slow
     frame = pd.DataFrame({"run": "a", "t": t, "flags": 0})
     psi = 3.0 + 0.03 / slow * (t - t[0])
@@ -178,7 +178,7 @@ def columns_of(frame):
 def reached_in(vessel, frame):
     """Positions of the actuators along a log that begins with its first row."""
     return memory_along(
-        vessel, {name: frame[name].to_numpy() for name in dynamics(vessel).commands}, frame["t"].to_numpy()
+        vessel, {name: frame[name].to_numpy() for name in vessel_dynamics(vessel).commands}, frame["t"].to_numpy()
     )
 
 

@@ -20,7 +20,7 @@ from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, Observer
 from shipid.predictor import Predictor
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.export.strange import drawn
 
@@ -44,7 +44,8 @@ def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
     """At the filtered position where positions are measured and make the true path, else where the ship is."""
     vessel, rng = load_vessel("mariner"), np.random.default_rng(1)
     columns = {
-        name: rng.uniform(0.1, 0.2, 3) for name in ("north", "east", "psi", "u", "v", "r", *dynamics(vessel).commands)
+        name: rng.uniform(0.1, 0.2, 3)
+        for name in ("north", "east", "psi", "u", "v", "r", *vessel_dynamics(vessel).commands)
     }
     columns |= {"u": np.full(3, 7.0)}
     estimates = {f"observer.{name}": columns.get(name, 0.0) + rng.normal(0, 1e-4, 3) for name in COLUMNS}

@@ -32,7 +32,7 @@ from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
-from shipid.vessel.load import check_vessel, load_vessel
+from shipid.vessel.load import check_document, load_vessel
 from tests.conftest import variety
 from tests.export.compiled import FLAGS, SANITIZERS, compile_, compiler
 from tests.export.strange import drawn, network_of
@@ -81,7 +81,7 @@ def test_the_description_names_every_variable(ship):
 def test_any_name_of_a_ship_is_one_of_xml():
     """Before, no tool could read an FMU of a ship whose name has a control character."""
     vessel = load_vessel("mariner")
-    odd = check_vessel({**vessel.document, "name": 'a\x07b\n<"ø🚢&'}, "odd.toml")
+    odd = check_document({**vessel.document, "name": 'a\x07b\n<"ø🚢&'}, "odd.toml")
     root = ET.fromstring(description(vessel_unit(odd, "ship", "rk4"), "{1}").encode())
     assert root.get("modelName") == 'a\ufffdb\n<"ø🚢&'
 
@@ -489,7 +489,7 @@ def test_a_compiler_that_fails_is_one_line_and_leaves_no_file(tmp_path, monkeypa
     tool, noted = tmp_path / "gcc", tmp_path / "noted"
     tool.write_text(f"#!/bin/sh\ntouch $TMPDIR/left.s; printf %s $TMPDIR > {noted}; printf 'no \\377' >&2; exit 1\n")
     tool.chmod(0o700)
-    monkeypatch.setattr("shipid.export.fmu.compiler", lambda: str(tool))
+    monkeypatch.setattr("shipid.export.fmu.find_compiler", lambda: str(tool))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     with pytest.raises(ShipidError, match="the C compiler failed"):
         write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), tmp_path / "ship.fmu")

@@ -13,8 +13,8 @@ from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.predictor import Predictor
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import check_vessel
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import check_document
 from tests.conftest import variety
 from tests.drawn_ships import drawn_ship, extreme_inputs
 from tests.export.compiled import Recorder
@@ -29,7 +29,7 @@ def gunnerus(gear):
     document = copy.deepcopy(variety()["gunnerus-28.9"].document)
     for side in ("port", "starboard"):
         document["thruster"][side]["actuator"] = {"alpha": gear}
-    return check_vessel(document, "gunnerus.toml")
+    return check_document(document, "gunnerus.toml")
 
 
 def limits_of(low, high):
@@ -100,7 +100,9 @@ def test_between_stops_a_jump_is_real(low_high, tmp_path):
     angles = [40, 160, 165, -165, -165, -160, 172]
     vessel, t = gunnerus(gear), np.arange(7.0)
     columns = {name: np.zeros(7) for name in ("psi", "v", "r")} | {"u": np.full(7, 4.0)}
-    columns |= {name: np.radians(angles) if "alpha" in name else np.full(7, 2.5) for name in dynamics(vessel).commands}
+    columns |= {
+        name: np.radians(angles) if "alpha" in name else np.full(7, 2.5) for name in vessel_dynamics(vessel).commands
+    }
     reached = memory_along(vessel, columns, t)
     physics = Physics(vessel, 20, 1.0)
     whole = Predictor(physics, "alone", Unchanged({})).predict(Instants(columns, hidden=reached)).swapaxes(0, 1)
@@ -160,7 +162,7 @@ def test_drawn_ships_take_angles_of_any_turn(seed, tmp_path):
     """
     vessel, rng = drawn_ship(seed % 100), np.random.default_rng(seed)
     count, horizon = 12, 5
-    names = dynamics(vessel)
+    names = vessel_dynamics(vessel)
     given = extreme_inputs(vessel, count, seed)
     columns = given["start"] | given["commands"] | given["environment"] | {"north": np.zeros(count)}
     columns["u"], columns["v"], columns["r"] = np.abs(columns["u"]), 0.1 * columns["v"], 0.1 * columns["r"]

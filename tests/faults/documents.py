@@ -17,7 +17,7 @@ from shipid.logs.mapping import read_mapping
 from shipid.study.plan import plan_text, read_plan, whole_unit
 from shipid.study.prepare import obtain, prepare
 from shipid.study.run import run_unit
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.faults.mutations import mutated
 from tests.faults.trials import Failure
@@ -50,7 +50,7 @@ def vessel(seed: int) -> None:
         file = Path(folder) / "x.toml"
         file.write_bytes(mutated("vessel", seed)[0])
         loaded = load_vessel(str(file))
-        model = dynamics(loaded)
+        model = vessel_dynamics(loaded)
         rest = [{name: np.ones(1) for name in names} for names in (model.state, model.commands, model.environment)]
         rollout(loaded, *rest, step=0.5, num_steps=2, engine="casadi")
 

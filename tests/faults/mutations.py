@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from shipid.document import bundled
+from shipid.document import bundled_documents
 
 NASTY = [
     *("1979-05-27", "07:32:00", "1979-05-27T07:32:00Z", "1979-05-27T07:32:00", "true", "false", "nan", "inf", "-inf"),
@@ -140,7 +140,9 @@ def documents(kind: str) -> dict[str, Path]:
     bad = Path(__file__).parents[1] / "bad"
     if kind == "study":  # the small one often: it can be run
         plain = {f"plain {number}": bad / "studies" / "plain.toml" for number in range(4)}
-        return bundled("studies") | plain | {"rich": Path(__file__).parent / "rich.toml"}
+        return bundled_documents("studies") | plain | {"rich": Path(__file__).parent / "rich.toml"}
     if kind == "vessel":
-        return bundled("models") | {"plain": bad / "vessels" / "plain.toml"}
-    return bundled("studies/mappings") | {f"plain {number}": bad / "logs" / "plain.toml" for number in range(4)}
+        return bundled_documents("models") | {"plain": bad / "vessels" / "plain.toml"}
+    return bundled_documents("studies/mappings") | {
+        f"plain {number}": bad / "logs" / "plain.toml" for number in range(4)
+    }

@@ -5,7 +5,7 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.hybrid.learned_force import LearnedForce, mass
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.hybrid.worlds import fitted, world
 
@@ -21,7 +21,7 @@ def test_home_a_missing_cross_flow():
 def test_the_mass_is_what_unit_forces_feel_in_one_step(name):
     """Against the equations of motion: a force of 1 kN and 1 kN m for one Euler step of 1 s, from rest."""
     vessel = load_vessel(name)
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     rows = [vessel.axes.index(axis) for axis in (0, 1, 5)]
     forces = np.zeros((1, 4, len(vessel.axes)))
     forces[0, range(3), rows] = 1e3

@@ -14,7 +14,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.hybrid.physics import Physics, assumed, check_columns
 from shipid.observer import MEASURED, Observer, observe
 from shipid.study.prepare import at_instants
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.identification.trials import trials
@@ -32,7 +32,7 @@ def windows() -> Windows:
 
 
 def test_paths_are_the_rollout_seen_from_the_instant(windows: Windows) -> None:
-    columns, model = windows.columns, dynamics(SHIP)
+    columns, model = windows.columns, vessel_dynamics(SHIP)
     start, orders, weather = (
         {name: columns[name] for name in names} for names in (model.state, model.commands, model.environment)
     )
@@ -110,7 +110,7 @@ def test_an_observer_needs_its_estimates_and_takes_no_screening(windows: Windows
 
 
 def test_what_is_not_measured_is_zero_and_reported() -> None:
-    columns = {name: np.full(3, 0.5) for name in ("u", "v", "psi", *dynamics(SHIP).commands)}
+    columns = {name: np.full(3, 0.5) for name in ("u", "v", "psi", *vessel_dynamics(SHIP).commands)}
     assert assumed(SHIP, columns) == ["north", "east", "r", "V_w", "beta_w"]
     zero = dict.fromkeys(assumed(SHIP, columns), np.zeros(3))
     np.testing.assert_array_equal(RIGHT.paths(Instants(columns)), RIGHT.paths(Instants(columns | zero)))

@@ -26,7 +26,7 @@ from shipid.measures.zigzag import zigzag
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman, Named
 from shipid.units import DEGREE
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 FITTED = ("05_01", "10_05", "15_01", "20_10_P", "25_05", "35_05")
@@ -74,7 +74,7 @@ def sailing(solution: Solution) -> Vessel:
 @lru_cache
 def late_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """The zigzag's, who reacts to the heading of `LATE` ago, and counts from the course that was ordered, 0."""
-    prompt = helm.zigzag(commands)
+    prompt = helm.zigzag_helmsman(commands)
     ordered = {"original": 0.0, "executed": 1.0}
 
     def past(signals: Named) -> Named:
@@ -96,7 +96,7 @@ def measured(log: Mapping[str, np.ndarray], run: str) -> Measures:
 
 def simulated(vessel: Vessel, log: Mapping[str, np.ndarray], run: str) -> Measures:
     """The same of the zigzag that the vessel sails from the state in which the test began, with the same helm."""
-    trial, model, count = measured(log, run), dynamics(vessel), len(log["t"]) - 1
+    trial, model, count = measured(log, run), vessel_dynamics(vessel), len(log["t"]) - 1
     record = record_of(log)
     side = float(np.sign(record.helm[int(np.argmax(np.abs(record.helm) > trial["helm"].value / 2))]))
     helm_over = np.where(log["t"][:-1] >= trial["execute"].value, side * trial["helm"].value, 0.0)
@@ -121,7 +121,7 @@ def _columns(path: Trajectories, state: Sequence[str]) -> dict[str, np.ndarray]:
 
 def windows(vessel: Vessel, data: Dataset, runs: Sequence[str], horizon: float) -> tuple[float, float]:
     """RMS error of the position [m] after a horizon [s] with the rudder as measured, and of constant u, v, r."""
-    model, count, error, naive = dynamics(vessel), round(horizon / STEP), [], []
+    model, count, error, naive = vessel_dynamics(vessel), round(horizon / STEP), [], []
     for run in runs:
         log = columns(data, run)
         begins = np.arange(0, len(log["t"]) - count, round(BETWEEN / STEP))
@@ -142,7 +142,7 @@ def windows(vessel: Vessel, data: Dataset, runs: Sequence[str], horizon: float) 
 
 def whole(vessel: Vessel, log: Mapping[str, np.ndarray]) -> tuple[float, float]:
     """RMS over a whole run, from its first state on with the rudder as measured: position [m], heading [rad]."""
-    model, count = dynamics(vessel), len(log["t"]) - 1
+    model, count = vessel_dynamics(vessel), len(log["t"]) - 1
     start = {name: log[name][:1] for name in model.state}
     commands = {name: log[name][:-1, None] for name in model.commands}
     path = rollout(vessel, start, commands, step=STEP, num_steps=count, method="rk4")
@@ -152,7 +152,7 @@ def whole(vessel: Vessel, log: Mapping[str, np.ndarray]) -> tuple[float, float]:
 
 def circle(vessel: Vessel, side: float, angle: float = 35 * DEGREE, speed: float = 1.179) -> Measures:
     """Turning circle, side +1 to starboard, from straight ahead."""
-    model, count = dynamics(vessel), round(CIRCLE / STEP)
+    model, count = vessel_dynamics(vessel), round(CIRCLE / STEP)
     start = {name: np.full(1, speed if name == "u" else 0.0) for name in model.state}
     over = np.where(np.arange(count) * STEP >= 1.0, side * angle, 0.0)[:, None]
     inputs = {"propeller.n": np.full(1, SHAFT), "rudder.delta": over}

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.engine.native import compiler, target
+from shipid.engine.native import compiler_target, find_compiler
 from shipid.identification.compiled import pack, run_compiled
 from shipid.identification.sensitivities import Layout, run_machine, variation
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 
 SHIP = load_vessel("gunnerus-28.9")
 
 
 def test_packing_groups_predictions_and_repeats_the_last() -> None:
-    lanes = target().lanes
+    lanes = compiler_target().lanes
     count = lanes + 1
     array = np.arange(count * 6, dtype=float).reshape(count, 3, 2)
     packed = pack(array)
@@ -26,10 +26,10 @@ def test_packing_groups_predictions_and_repeats_the_last() -> None:
     assert (back[count:] == array[-1]).all()
 
 
-@pytest.mark.skipif(compiler() is None, reason="needs a C compiler")
+@pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 def test_compiled_outputs_are_those_of_the_virtual_machine() -> None:
-    layout = Layout(dynamics(SHIP), (("inertia.m",),), ("u", "r"), (), (), 0, 0.5, "euler")
-    model, rng, count, steps = variation(layout), np.random.default_rng(0), target().lanes + 2, 3
+    layout = Layout(vessel_dynamics(SHIP), (("inertia.m",),), ("u", "r"), (), (), 0, 0.5, "euler")
+    model, rng, count, steps = variation(layout), np.random.default_rng(0), compiler_target().lanes + 2, 3
     x = np.zeros((count, model.size))
     x[:, :3] = rng.uniform([3.0, -0.1, -0.02], [5.0, 0.1, 0.02], (count, 3))
     x[:, 3:12] = np.eye(3).ravel()

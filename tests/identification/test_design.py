@@ -24,7 +24,7 @@ from shipid.identification.design import (
     recorded,
 )
 from shipid.simulation.manoeuvre import (
-    Approached,
+    ApproachedManoeuvre,
     CrashStop,
     Excitation,
     PullOut,
@@ -33,8 +33,8 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.simulation.perform import perform
-from shipid.simulation.standard import standard
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.standard import define_standard
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import variety
@@ -160,7 +160,7 @@ def test_limits_of_the_actuators_hold() -> None:
         (Excitation(signal="aprbs", n_rpm=100, amplitude_rpm=20, angle_deg=12, duration=60), 12, 120),
     ],
 )
-def test_no_kind_orders_more_than_the_limits(manoeuvre: Approached, helm: float, rpm: float) -> None:
+def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, helm: float, rpm: float) -> None:
     assert manoeuvre.greatest_orders == pytest.approx((helm, rpm))
     assert allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))
     assert not allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=0.99 * rpm))
@@ -175,7 +175,7 @@ def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
     """Their starts are along the ship's axes, the velocities of a log are horizontal: the next start is met."""
     ship = variety()[name]
     one = TurningCircle(n_rpm=180, approach="rest", duration=60)
-    log = perform(ship, [one], step=0.2, environment={})
+    log = perform_manoeuvres(ship, [one], step=0.2, environment={})
     cut = _cut(ship, log, 50, 5)
     how = {"step": 0.2, "num_steps": 50, "method": "rk4", "memory": cut.memory or None}
     path = rollout(ship, cut.start, cut.commands, cut.environment, **how)  # type: ignore[arg-type]
@@ -185,7 +185,7 @@ def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
 
 def test_position_and_heading_and_whole_runs_count() -> None:
     more = {**WEIGHTS, "psi": 0.01, "position": 1.0}
-    zigzag = Candidate("zigzag", standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
+    zigzag = Candidate("zigzag", define_standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
     one = informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
     all_ = informed(SHIP, [zigzag], GROUPS, weights=more, horizon=0.0)[0].information
     assert np.linalg.eigvalsh(all_ - one).min() > -1e-6 * np.trace(one)

@@ -14,7 +14,7 @@ from shipid.identification.fit import Point, _Value, evaluate, loss, origin, sea
 from shipid.identification.residuals import Problem, build
 from shipid.identification.settings import Identify
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import load_vessel
 from tests.identification.trials import changed, trials
 
@@ -127,7 +127,7 @@ def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyP
 def test_a_search_does_not_end_where_a_gauss_newton_step_still_goes_down() -> None:
     """Zigzags stepped ten times as finely, fitted from wild factors: kinks of |v| and |r| stop short steps."""
     runs = [Zigzag(name=side, n_rpm=145, side=side, angle_deg=20, duration=60) for side in ("starboard", "port")]
-    log = perform(SHIP, runs, step=0.1, interval=1.0)
+    log = perform_manoeuvres(SHIP, runs, step=0.1, interval=1.0)
     data = Dataset(log[[name for name in log if not name.startswith("actual.")]], {"clock": "run", "flags": []})
     settings = Identify(parameters=["hull.derivatives.*"], weights={"u": 0.05, "v": 0.05, "r": 0.002}, horizon=0)
     here = build(SHIP, data, data.runs, settings)

@@ -10,8 +10,8 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.identification.collinearity import combinations
 from shipid.identification.inverse import _Problem, _solved, inverse_dynamics
-from shipid.simulation.truth import Truth, simulate
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.truth import Truth, simulate_truth
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import variety
 
@@ -24,10 +24,10 @@ D_P = [("thruster.port.D_p", "thruster.starboard.D_p")]
 def log_of(vessel: Vessel = SHIP, interval: float = 0.2, **more: object) -> Dataset:
     orders = {"n_rpm": (50, 200), "alpha_deg": (-50, 50), "start_speed": (1, 4)}
     block = orders | {key: more.pop(key) for key in orders if key in more}
-    if "rudder.delta" in dynamics(vessel).commands:
+    if "rudder.delta" in vessel_dynamics(vessel).commands:
         block["delta_deg"] = block.pop("alpha_deg")
     given = {"vessel": vessel.key, "manoeuvres": 8, "duration": 60, "step": 0.05, "manoeuvre": [block], **more}
-    return Dataset(simulate(Truth(interval=interval, **given), vessel), {})  # type: ignore[arg-type]
+    return Dataset(simulate_truth(Truth(interval=interval, **given), vessel), {})  # type: ignore[arg-type]
 
 
 LOG = log_of()
@@ -94,10 +94,10 @@ def test_every_structure_is_recovered(name: str) -> None:
 def test_orders_that_jump_within_a_bump_do_no_harm() -> None:
     """The helm goes over in the middle of a run: forces jump, and the integral has the jump where it is."""
     from shipid.simulation.manoeuvre import TurningCircle
-    from shipid.simulation.perform import perform
+    from shipid.simulation.perform import perform_manoeuvres
 
     circle = TurningCircle(n_rpm=150, duration=80, execute_at=30)
-    log = Dataset(perform(SHIP, [circle], step=0.05, interval=0.2), {})
+    log = Dataset(perform_manoeuvres(SHIP, [circle], step=0.05, interval=0.2), {})
     base = wrong(MAIN)
     estimate = inverse_dynamics(base, log, log.runs, [["hull.derivatives.N_ur"]])
     exact = inverse_dynamics(SHIP, log, log.runs, [["hull.derivatives.N_ur"]])

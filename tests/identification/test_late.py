@@ -6,7 +6,7 @@ import numpy as np
 
 from shipid.data.dataset import Dataset
 from shipid.identification.late import CONSIDERABLE, between_rows, held_over_steps, late_commands
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import variety
 from tests.identification.trials import trials
@@ -45,14 +45,14 @@ def test_a_vessel_without_a_length_is_not_judged() -> None:
 def test_at_the_rows_and_in_the_middle_between_them() -> None:
     ship = variety()["actuators"]
     rng, t = np.random.default_rng(1), np.array([0.0, 1.0, 2.5, 3.0])
-    rows = {name: rng.normal(size=4) for name in dynamics(ship).commands}
+    rows = {name: rng.normal(size=4) for name in vessel_dynamics(ship).commands}
     at_rows, later = (
         between_rows(ship, {"t": t, **rows}, t),
         between_rows(ship, {"t": t, **rows}, np.array([[1.74, 1.76]])),
     )
     for name, values in rows.items():
         np.testing.assert_array_equal(at_rows[name], values)
-        if name in dynamics(ship).memory:
+        if name in vessel_dynamics(ship).memory:
             np.testing.assert_array_equal(later[name], [values[1:3]])
         else:
             mean = (values[1] + values[2]) / 2
@@ -63,8 +63,8 @@ def test_an_order_within_a_step_counts_from_the_step_that_begins_nearest() -> No
     """A command without an actuator has its mean over the step."""
     t = np.array([0.0, 1.4, 2.6])
     for ship, by_hand in ((variety()["actuators"], [1.0, 2.0, 2.0, 4.0]), (SHIP, [1.0, 1.6, 2.8, 4.0])):
-        commands = dynamics(ship).commands
-        assert set(dynamics(ship).memory) == (set() if ship is SHIP else set(commands))
+        commands = vessel_dynamics(ship).commands
+        assert set(vessel_dynamics(ship).memory) == (set() if ship is SHIP else set(commands))
         rows = {name: np.array([1.0, 2.0, 4.0]) for name in commands}
         held = held_over_steps(ship, {"t": t, **rows}, np.arange(4.0), 1.0)
         for name in commands:

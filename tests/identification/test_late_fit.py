@@ -17,7 +17,7 @@ from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import Vessel
 from shipid.vessel.template import Particulars, first_guess
 
@@ -46,7 +46,7 @@ def zigzags(seed: int, step: float) -> pd.DataFrame:
         )
         for angle, heading in ((10, 10), (20, 20), (15, 10), (10, 5))
     ]
-    return perform(ferry(), runs, step=step)
+    return perform_manoeuvres(ferry(), runs, step=step)
 
 
 def log_of(seed: int, step: float, interval: float) -> Dataset:

@@ -15,7 +15,7 @@ from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.simulation.manoeuvre import Excitation
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import Vessel, load_vessel
 
 TORQUE = {"1": 0.0367, "J": -0.0130, "JJ": -0.0235}
@@ -63,7 +63,7 @@ def trials(seed: int = 1, steady: bool = False) -> Dataset:
         )
         for n in (400.0, 700.0)
     ]
-    frame = perform(ship, kinds, step=1.0, outputs=list(ship_outputs()))
+    frame = perform_manoeuvres(ship, kinds, step=1.0, outputs=list(ship_outputs()))
     frame = frame.drop(columns=[name for name in frame if str(name).startswith("actual.")])
     for name, size in NOISE.items():
         frame[name] += rng.normal(0, size, len(frame))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from shipid.identification.plausible import KINDS, NEAR, outside, verdict, within
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.load import Vessel, check_document, load_vessel
 
 
 def test_every_bundled_vessel_is_a_ship(bundled_vessel: Vessel) -> None:
@@ -90,7 +90,7 @@ def test_what_has_no_range_or_no_length_to_judge_by_has_no_bounds() -> None:
     assert within(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr") == (-float("inf"), float("inf"))
     document = load_vessel("gunnerus-28.9").document
     sizes = {name: size for name, size in document["particulars"].items() if name != "L_pp"}
-    without = check_vessel({**document, "particulars": sizes}, "without L_pp")
+    without = check_document({**document, "particulars": sizes}, "without L_pp")
     assert within(without, "inertia.I_z") == (-float("inf"), float("inf"))
     assert verdict(without, "inertia.I_z", {"inertia.I_z": 1.0}) == ""
 

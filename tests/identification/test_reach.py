@@ -9,7 +9,7 @@ import pytest
 
 from shipid.identification.reach import Reach, beyond, of_log, reach_of
 from shipid.simulation.manoeuvre import TurningCircle
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 from tests.identification.trials import trials
@@ -54,8 +54,8 @@ def test_a_ship_at_rest_has_no_drift() -> None:
 
 
 def test_a_hard_turn_goes_beyond_gentle_trials_and_not_beyond_itself() -> None:
-    hard = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=35, duration=60)], step=0.1)
-    gentle = perform(SHIP, [TurningCircle(n_rpm=627, angle_deg=3, duration=20)], step=0.1)
+    hard = perform_manoeuvres(SHIP, [TurningCircle(n_rpm=627, angle_deg=35, duration=60)], step=0.1)
+    gentle = perform_manoeuvres(SHIP, [TurningCircle(n_rpm=627, angle_deg=3, duration=20)], step=0.1)
     sentence = beyond("turning 35", of_log(SHIP, hard), of_log(SHIP, gentle))
     assert sentence.startswith("turning 35 reaches ")
     for word in ("deg of drift", "r L / U of", "35 deg of helm", "a speed of", "; the data reach"):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.engine.native import compiler
+from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.identification import residuals
 from shipid.identification.residuals import Predictions, build, predict
 from shipid.identification.settings import NUISANCES, Identify
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED, variety
 from tests.identification.trials import trials
@@ -72,16 +72,16 @@ def test_residuals_are_those_of_the_rollout() -> None:
     fit = build(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
     prediction = predict(fit, np.array([1.3]), np.zeros((2, 0)))
     for number, (_, rows) in enumerate(dataset.frame.groupby("run")):
-        start = {name: rows[name].to_numpy()[:1] for name in dynamics(other).state}
+        start = {name: rows[name].to_numpy()[:1] for name in vessel_dynamics(other).state}
         commands = {name: rows[name].to_numpy()[:-1, None] for name in dataset.commands}
-        weather = {name: np.zeros(1) for name in dynamics(other).environment}
+        weather = {name: np.zeros(1) for name in vessel_dynamics(other).environment}
         path = rollout(other, start, commands, weather, step=1.0, num_steps=30, method="rk4", engine="casadi")
         for name, width in zip(("u", "v", "r"), fit.deviations, strict=True):
             mine = prediction.r[(prediction.run == number) & (prediction.signals == name)]
             assert np.allclose(mine * width, path[name][1:, 0, 0] - rows[name].to_numpy()[1:], atol=1e-12)
 
 
-@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "actuators"])
 def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     vessel = variety()[name]

@@ -10,7 +10,7 @@ from shipid.errors import DataError
 from shipid.identification.residuals import Predictions, build, predict
 from shipid.identification.segments import cut_segments, too_short
 from shipid.identification.settings import Identify
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.identification.trials import changed, trials
@@ -51,7 +51,7 @@ def test_commands_between_rows() -> None:
     """An order to a gear changes in the middle between two rows, a command without one goes on evenly."""
     ship = variety()["actuators"]
     rows = trials(ship, runs=1, steps=20)
-    lagging = next(name for name in rows.commands if name in dynamics(ship).memory)
+    lagging = next(name for name in rows.commands if name in vessel_dynamics(ship).memory)
     frame = rows.frame.assign(**{lagging: np.where(rows.frame["t"] < 10, 1.0, 2.0)})
     stepped = Dataset(frame, rows.metadata)
     (one,) = cut_segments(ship, stepped, stepped.runs, 0.25, 0.0, commands="between")

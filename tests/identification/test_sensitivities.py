@@ -9,7 +9,7 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.identification.sensitivities import Layout, is_thrust, run_machine, variation
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.drawn_ships import drawn_ship
 
@@ -18,7 +18,7 @@ PATH = "hull.derivatives.N_ur"
 
 
 def layout(signals: tuple[str, ...] = ("u", "v", "r"), nuisances: tuple[str, ...] = (), step: float = 0.5) -> Layout:
-    return Layout(dynamics(SHIP), ((PATH,),), signals, nuisances, (), 0, step, "rk4")
+    return Layout(vessel_dynamics(SHIP), ((PATH,),), signals, nuisances, (), 0, step, "rk4")
 
 
 def test_thrust_coefficients_are_recognised() -> None:
@@ -37,7 +37,7 @@ def test_thrust_of_every_kind_is_linear_in_its_coefficients(kind: str, sense: fl
 
     def thrust(scale: float) -> float:
         values = [value * (scale if is_thrust(path) else 1.0) for path, value in ship.parameters.items()]
-        model = dynamics(ship)
+        model = vessel_dynamics(ship)
         state = [{"u": 1.0, "v": 0.2, "r": 0.01}.get(one, 0.0) for one in (*model.state, *model.hidden)]
         orders = [sense if one.endswith((".n", ".pitch")) else 0.1 for one in model.commands]
         memory = [orders[list(model.commands).index(one)] for one in model.memory]

@@ -21,8 +21,8 @@ from shipid.identification.settings import POSITIVE, Identify, unknowns
 from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, identify
 from shipid.identification.statistics import LinearFit, statistics
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, orders, trials
 
@@ -115,7 +115,7 @@ def weaves(name: str, n_rpm: float, duration: float, *, measured: bool) -> Datas
         for side in ("starboard", "port")
         for angle in (10.3, 15.2, 20.7)
     ]
-    frame = perform(load_vessel(name), kinds, step=0.02, interval=0.1)
+    frame = perform_manoeuvres(load_vessel(name), kinds, step=0.02, interval=0.1)
     if measured:
         frame = frame.assign(**{key[7:]: frame[key] for key in frame if key.startswith("actual.")})
     frame = frame.drop(columns=[key for key in frame if key.startswith("actual.")])
@@ -206,16 +206,18 @@ def astern(vessel: Vessel, seed: int) -> Dataset:
     """Four runs of 68 s astern in a current of 0.5 m/s towards 1.3 rad, with 1 % of noise."""
     rng, step, rows, runs = np.random.default_rng(seed), 0.17, 400, 4
     limits = {"n": (-2.5, 1.25), "alpha": (-0.4, 0.4)}
-    drawn = {name: rng.uniform(*limits[name.rsplit(".", 1)[-1]], (10, runs)) for name in dynamics(vessel).commands}
+    drawn = {
+        name: rng.uniform(*limits[name.rsplit(".", 1)[-1]], (10, runs)) for name in vessel_dynamics(vessel).commands
+    }
     commands = {name: np.repeat(values, rows // 10, axis=0) for name, values in drawn.items()}
-    start = {name: np.zeros(runs) for name in dynamics(vessel).state} | {"u": np.full(runs, -1.0)}
+    start = {name: np.zeros(runs) for name in vessel_dynamics(vessel).state} | {"u": np.full(runs, -1.0)}
     start["psi"] = rng.uniform(-3, 3, runs)
-    weather = {name: np.zeros(runs) for name in dynamics(vessel).environment}
+    weather = {name: np.zeros(runs) for name in vessel_dynamics(vessel).environment}
     weather |= {"V_c": np.full(runs, 0.5), "beta_c": np.full(runs, 1.3)}
     path = rollout(vessel, start, commands, weather, step=step, num_steps=rows, method="rk4")
     frames = []
     for run in range(runs):
-        columns = {name: path[name][:-1, 0, run] for name in dynamics(vessel).state}
+        columns = {name: path[name][:-1, 0, run] for name in vessel_dynamics(vessel).state}
         for name, noise in (("u", 0.05), ("v", 0.05), ("r", 0.00173)):
             columns[name] = columns[name] + noise * rng.standard_normal(rows)
         columns |= {name: values[:, run] for name, values in commands.items()}
@@ -686,7 +688,9 @@ def test_a_start_that_leads_to_a_worse_optimum_than_the_base_is_left() -> None:
     """A heel that nobody measured is 0 where each short prediction begins, so these lead a ship that heels astray."""
     ship = load_vessel("container-175")
     names = ("X_u|u|", "Y_v", "K_p", "N_v", "N_r")
-    log = perform(ship, Zigzag(execute_at=10.0, n_rpm=110, angle_deg=20, duration=300), step=0.5, interval=1.0)
+    log = perform_manoeuvres(
+        ship, Zigzag(execute_at=10.0, n_rpm=110, angle_deg=20, duration=300), step=0.5, interval=1.0
+    )
     kept = [name for name in log if not str(name).startswith("actual.") and name not in ("phi", "p")]
     data = Dataset(log[kept].assign(flags=0), {"clock": "run", "flags": []})
     free = [f"hull.prime_derivatives.{name}" for name in names]

@@ -14,7 +14,7 @@ from shipid.identification.structures import (
     check_structures,
     exchange,
 )
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import trials
 
@@ -37,7 +37,7 @@ def log_of(ship: Vessel) -> Dataset:
 
 
 def rates(vessel: Vessel, nu: tuple[float, float, float], orders: dict[str, float]) -> np.ndarray:
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     commands = [orders[name.rsplit(".", 1)[-1]] for name in model.commands]
     memory = [orders[name.rsplit(".", 1)[-1]] for name in model.memory]
     weather, none = np.zeros(len(model.environment)), np.zeros(model.num_dof)
@@ -52,7 +52,7 @@ def test_the_new_hull_makes_nearly_the_forces_of_the_old_one(name: str, ship: Ve
     asked = SETTINGS if ship is KVLCC2 else Identify(parameters=["hull.*"])
     exchanged = exchange(ship, name, data, data.runs, asked)
     assert max(exchanged.misfit.values()) < 0.16
-    moving = data.frame[["u", "v", "r", *dynamics(ship).commands]].iloc[10::17]
+    moving = data.frame[["u", "v", "r", *vessel_dynamics(ship).commands]].iloc[10::17]
     short = [column.rsplit(".", 1)[-1] for column in moving.columns]
     pairs = []
     for row in moving.to_numpy():
@@ -148,7 +148,7 @@ def test_roll_and_heel_are_as_they_were(block: str, name: str) -> None:
     data = log_of(ship)
     vessel = exchange(ship, name, data, data.runs, Identify(parameters=["hull.*"])).vessel
     assert vessel.document["hull"][block][coefficient] == ship.document["hull"][block][coefficient]
-    model = dynamics(ship)
+    model = vessel_dynamics(ship)
     numbers = [data.frame[command].median() for command in model.commands]
     speed = float(data.frame["u"].median())
     rolls = []
@@ -156,9 +156,9 @@ def test_roll_and_heel_are_as_they_were(block: str, name: str) -> None:
         moments = []
         for heel, rate in ((0.0, 0.0), (0.15, 0.0), (0.0, 0.1)):
             state = [0, 0, 0, heel, speed, 0, rate, 0]
-            given = (dynamics(one).memory, np.zeros(len(model.environment)), list(one.parameters.values()))
+            given = (vessel_dynamics(one).memory, np.zeros(len(model.environment)), list(one.parameters.values()))
             memory = [numbers[model.commands.index(command)] for command in given[0]]
-            rates = dynamics(one).rates(state, memory, numbers, given[1], given[2], np.zeros(model.num_dof))
+            rates = vessel_dynamics(one).rates(state, memory, numbers, given[1], given[2], np.zeros(model.num_dof))
             moments.append(np.array(rates).ravel()[model.num_dof :])
         rolls.append(np.array(moments)[1:] - moments[0])
     np.testing.assert_allclose(rolls[1], rolls[0], rtol=1e-9, atol=1e-12)
@@ -178,7 +178,7 @@ def test_a_rudder_that_is_off_stays_off(name: str) -> None:
     without = KVLCC2.with_values({"thruster.rudder.off": True})
     data = log_of(KVLCC2)
     exchanged = exchange(without, name, data, data.runs, Identify(parameters=["hull.*"]))
-    assert dynamics(exchanged.vessel).commands == dynamics(without).commands
+    assert vessel_dynamics(exchanged.vessel).commands == vessel_dynamics(without).commands
     assert not [path for path in exchanged.settings.parameters if path.startswith("thruster.rudder")]
     assert exchanged.vessel.document["thruster"]["rudder"] == without.document["thruster"]["rudder"]
 

@@ -7,20 +7,20 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.identification.unstable import grows, growth_in
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import growth
+from shipid.vessel.stability import yaw_growth
 from tests.vessel.test_stability import U, ship
 
 
 def straight(vessel: Vessel, speed: float) -> Dataset:
-    columns = dict.fromkeys(("north", "east", "psi", "v", "r", *dynamics(vessel).commands), 0.0)
+    columns = dict.fromkeys(("north", "east", "psi", "v", "r", *vessel_dynamics(vessel).commands), 0.0)
     return Dataset(pd.DataFrame({"run": "A", "t": [0.0, 1.0], "u": speed, "flags": 0} | columns), {"clock": "run"})
 
 
 def test_it_is_of_the_median_speed_and_orders_of_the_runs() -> None:
     vessel = ship(1e5)
-    assert growth_in(straight(vessel, U), ["A"], vessel) == growth(vessel, U, {"screw.n": 0.0})
+    assert growth_in(straight(vessel, U), ["A"], vessel) == yaw_growth(vessel, U, {"screw.n": 0.0})
     assert np.isfinite(growth_in(straight(vessel, 0.0), ["A"], vessel))
 
 

@@ -9,8 +9,8 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
-from shipid.simulation.log import logged as log_columns
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.log import log_columns as log_columns
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from tests.conftest import pace
 
@@ -26,7 +26,7 @@ def orders(vessel: Vessel, runs: int, steps: int, seed: int) -> dict[str, np.nda
         name: np.repeat(rng.uniform(*limits, (count, runs)), HELD, axis=0)[: steps + 1]
         for name, limits in RANGES.items()
     }
-    return {name: drawn[name.rsplit(".", 1)[-1]] for name in dynamics(vessel).commands}
+    return {name: drawn[name.rsplit(".", 1)[-1]] for name in vessel_dynamics(vessel).commands}
 
 
 def trials(
@@ -46,7 +46,7 @@ def trials(
     true_commands : commands in force where they differ from those logged. weather : channel -> (runs,), not logged.
     parameters : (runs, P), of each run.
     """
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     rng = np.random.default_rng(seed + 1000)
     start = {name: np.zeros(runs) for name in model.state}
     start |= {"psi": rng.uniform(-3, 3, runs), "u": pace(vessel) * rng.uniform(2, 5, runs)}

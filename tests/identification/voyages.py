@@ -8,9 +8,9 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification.settings import Identify
-from shipid.simulation.gusts import Gusts, series
-from shipid.simulation.log import logged
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.gusts import Gusts, gust_series
+from shipid.simulation.log import log_columns
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import FirstGuess, Particulars, first_guess
 
@@ -39,7 +39,7 @@ def guess() -> FirstGuess:
 def voyages(runs: int, shortest: float = 100.0, longest: float = 300.0, seed: int = 7) -> Dataset:
     """Runs of a length [s] between the two, random orders held for 20 s, wind of 1 to 9 m/s with gusts, noise."""
     vessel, rng = load_vessel(SHIP), np.random.default_rng(seed)
-    model, steps = dynamics(vessel), round(longest / STEP)
+    model, steps = vessel_dynamics(vessel), round(longest / STEP)
     count = -(-steps // round(HELD / STEP))
 
     def held(low: float, high: float) -> np.ndarray:
@@ -48,13 +48,13 @@ def voyages(runs: int, shortest: float = 100.0, longest: float = 300.0, seed: in
     n, alpha = held(1.5, 3.3), held(-0.6, 0.6)
     orders = {name: n if name.endswith(".n") else alpha for name in model.commands}
     t, mean, beta = STEP * np.arange(steps + 1), rng.uniform(1, 9, runs), rng.uniform(-3, 3, runs)
-    V_w = np.maximum(mean + series(Gusts(kind="npd"), mean, t, [(seed, run) for run in range(runs)]), 0.0)
+    V_w = np.maximum(mean + gust_series(Gusts(kind="npd"), mean, t, [(seed, run) for run in range(runs)]), 0.0)
     start = {name: np.zeros(runs) for name in model.state}
     start |= {"u": rng.uniform(2, 4, runs), "psi": rng.uniform(-3, 3, runs)}
     weather = {"V_w": V_w[:-1], "beta_w": np.tile(beta, (steps, 1))}
     path = rollout(vessel, start, orders, weather, step=STEP, num_steps=steps, method="rk4")
     assert not path.diverged.any()
-    columns = logged(path, model.state) | {k: np.vstack([x, x[-1:]]) for k, x in orders.items()}
+    columns = log_columns(path, model.state) | {k: np.vstack([x, x[-1:]]) for k, x in orders.items()}
     columns |= {"V_w": V_w, "beta_w": np.tile(beta, (steps + 1, 1))}
     frames = []
     for run, length in enumerate(rng.uniform(shortest, longest, runs)):

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.errors import DocumentError
 from shipid.logs.mapping import (
     EPOCHS,
@@ -28,7 +28,7 @@ from shipid.logs.repairs import REPAIRS, Despike
 Write = Callable[..., Path]
 
 
-@pytest.mark.parametrize("name", bundled("studies/mappings"))
+@pytest.mark.parametrize("name", bundled_documents("studies/mappings"))
 def test_bundled_mappings_are_valid_and_have_a_source(name: str) -> None:
     mapping = read_mapping(name)
     assert mapping.source.url is not None or mapping.source.file is not None

@@ -11,11 +11,11 @@ from shipid.measures.criteria import criteria
 from shipid.measures.recognise import kinds_of
 from shipid.measures.record import AT_REST, Measures, Record
 from shipid.measures.rows import measure_rows
-from shipid.simulation.standard import standards
+from shipid.simulation.standard import standard_manoeuvres
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, START, every, rows
 
-MEASURES = {kind: trial.measures for kind, trial in standards().items()}
+MEASURES = {kind: trial.measures for kind, trial in standard_manoeuvres().items()}
 KINDS = list(MEASURES)
 DENSE = {kind: every(sail(), 0.05) for kind, sail in RECORDS.items()}
 SIGNED = ("lateral_deviation", "neutral_helm")  # to starboard

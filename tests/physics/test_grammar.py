@@ -8,8 +8,8 @@ from shipid.physics.grammar import (
     DERIVATIVES,
     THRUST,
     acceleration_unit,
-    derivative,
     derivative_unit,
+    hull_derivative,
     prime_scale,
     thrust_monomial,
 )
@@ -39,7 +39,7 @@ MOTIONS = {"u": ca.SX(U), "v": ca.SX(V), "w": ca.SX(0.1), "p": ca.SX(P), "q": ca
     ],
 )
 def test_a_name_is_its_formula(name: str, value: float, order: int, unit: str) -> None:
-    formula = derivative(name)
+    formula = hull_derivative(name)
     assert float(formula.value(MOTIONS)) == pytest.approx(value, rel=1e-15)
     assert (formula.order, formula.axis, derivative_unit(name)) == (order, name[0], unit)
 
@@ -62,19 +62,19 @@ def test_two_names_of_one_monomial_are_refused(first: str, second: str, turned: 
 )
 def test_what_is_no_derivative_is_refused(name: str) -> None:
     with pytest.raises(ValueError, match="not a coefficient"):
-        derivative(name)
+        hull_derivative(name)
 
 
 @pytest.mark.parametrize("name", ["X_udot", "N_vdot", "Y_dot"])
 def test_acceleration_derivatives_are_sent_to_added_mass(name: str) -> None:
     with pytest.raises(ValueError, match=r"belongs in \[added_mass\]"):
-        derivative(name)
+        hull_derivative(name)
 
 
 @pytest.mark.parametrize("name", ["Y_delta", "X_deltadelta", "N_vvdelta"])
 def test_rudder_derivatives_are_sent_to_the_rudder(name: str) -> None:
     with pytest.raises(ValueError, match=r"belongs in a block such as \[thruster.rudder\]"):
-        derivative(name)
+        hull_derivative(name)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.helm import course_keeping, yaw_rate, zigzag
+from shipid.physics.helm import course_helmsman, yaw_rate_helmsman, zigzag_helmsman
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
 
@@ -27,7 +27,7 @@ def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side:
     inputs["execute_heading"] = 0.2 * first
     seen = {"psi": ca.DM(1.0 + turned * first * 1.0000001)}
     memory = {"side": ca.DM(side), "original": ca.DM(1.0), "executed": ca.DM(1.0)}
-    helmsman = zigzag(COMMANDS)
+    helmsman = zigzag_helmsman(COMMANDS)
     ordered = numbers(helmsman.orders(seen, inputs, memory))
     assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
     assert helmsman.advance is not None
@@ -36,7 +36,7 @@ def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side:
 
 def test_yaw_rate_law() -> None:
     inputs = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "rate": 0.03, "gain": 10.0, "reset": 4.0}
-    helmsman = yaw_rate(COMMANDS)
+    helmsman = yaw_rate_helmsman(COMMANDS)
     assert helmsman.advance is not None
     ordered = numbers(helmsman.orders({"r": 0.01}, inputs, {"integral": 0.1}))
     assert ordered == pytest.approx({"port.n": 2.0, "port.alpha": -0.5 * 0.3, "rudder.delta": 0.6 * 0.3})
@@ -51,7 +51,7 @@ def test_course_keeping_is_the_pid_law_of_its_frequency() -> None:
     """A ship r' = effect s with the helm share s: the error has the roots of (p + omega)^2 p + omega^3 / 10."""
     omega, effect, step = 0.2, 0.05, 0.05
     inputs = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "course": 6.2, "omega": omega, "effect": effect}
-    helmsman = course_keeping(COMMANDS)
+    helmsman = course_helmsman(COMMANDS)
     assert helmsman.advance is not None
     seen, memory = {name: ca.SX.sym(name) for name in ("psi", "r")}, {"integral": ca.SX.sym("integral")}
     ordered = helmsman.orders(seen, inputs, memory)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shipid.physics import hull
-from shipid.physics.grammar import derivative
+from shipid.physics.grammar import hull_derivative
 from tests.drawn import seeds
 
 UPRIGHT = ca.SX(6, 1)
@@ -21,14 +21,14 @@ def test_derivatives_sum_on_their_axes() -> None:
     u, v, r = 2.0, 0.5, -0.1
     nu_r = ca.SX(ca.DM([u, v, 0, 0, 0, r]))
     wrench = numbers(
-        hull.derivatives(nu_r, UPRIGHT, **{"X_u|u|": -10.0, "Y_uv": 3.0, "Y_v|v|": -4.0, "N_r": 7.0, "K_v": 2.0})
+        hull.derivatives_wrench(nu_r, UPRIGHT, **{"X_u|u|": -10.0, "Y_uv": 3.0, "Y_v|v|": -4.0, "N_r": 7.0, "K_v": 2.0})
     )
     np.testing.assert_allclose(wrench, [-10 * u * u, 3 * u * v - 4 * v * abs(v), 0, 2 * v, 0, 7 * r])
 
 
 def cross_flow(strips: int, v: float, r: float, **other: float) -> np.ndarray:
     """Wrench of the bundled formula, all strips summed."""
-    columns = hull.strips(strips=strips)
+    columns = hull.hull_strips(strips=strips)
     nu_r = ca.SX(ca.DM([1.0, v, 0, 0, 0, r]))
     numbers_of = {"C_d": 1.2, "x_aft": -15.0, "x_fwd": 18.0, "T": 2.6, "rho": 1025.0, **other}
     rows = zip(columns["fraction"], columns["share"], strict=True)
@@ -68,7 +68,7 @@ def test_resistance_polynomial() -> None:
     """Set B at 5 m/s: (677.85 + 0.65505 x 625) x 25 N, against the motion on either course."""
     expected = (677.85 + 0.65505 * 625) * 25
     for u, sign in ((5.0, -1), (-5.0, 1)):
-        wrench = numbers(hull.resistance(ca.SX(ca.DM([u, 0.3, 0, 0, 0, 0])), R_0=677.85, R_4=0.65505))
+        wrench = numbers(hull.resistance_wrench(ca.SX(ca.DM([u, 0.3, 0, 0, 0, 0])), R_0=677.85, R_4=0.65505))
         np.testing.assert_allclose(wrench, [sign * expected, 0, 0, 0, 0, 0])
 
 
@@ -76,8 +76,8 @@ def test_astern_the_hull_has_more_resistance() -> None:
     """k_astern times that ahead, continuous at rest, always against the motion."""
     mmg = {"R_0": 0.02, "L_pp": 7.0, "T": 0.46, "rho": 1000.0}
     kinds = (
-        lambda nu, **k: hull.mmg(nu, UPRIGHT, **mmg, **k),
-        lambda nu, **k: hull.resistance(nu, R_0=70.0, R_2=3.0, **k),
+        lambda nu, **k: hull.mmg_wrench(nu, UPRIGHT, **mmg, **k),
+        lambda nu, **k: hull.resistance_wrench(nu, R_0=70.0, R_2=3.0, **k),
     )
     for kind in kinds:
         ahead, astern = (numbers(kind(ca.SX(ca.DM([u, 0.1, 0, 0, 0, 0])), k_astern=1.4))[0] for u in (0.8, -0.8))
@@ -108,7 +108,7 @@ def test_the_mmg_hull_is_its_formula() -> None:
     X = force * (-0.02 - 0.04 * v_**2 + 0.77 * v_**4)
     Y, N = force * (-0.315 * v_ + 0.083 * r_), force * L * (-0.049 * r_ - 0.294 * v_**2 * r_)
     values = {"X_vv": -0.04, "X_vvvv": 0.77, "Y_v": -0.315, "Y_r": 0.083, "N_r": -0.049, "N_vvr": -0.294}
-    forces = hull.mmg(ca.SX(ca.DM([u, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
+    forces = hull.mmg_wrench(ca.SX(ca.DM([u, v, 0, 0, 0, r])), UPRIGHT, R_0=0.02, L_pp=L, T=T, rho=1000.0, **values)
     np.testing.assert_allclose(numbers(forces), [X, Y, 0, 0, 0, N], rtol=1e-4, atol=1e-9)
 
 
@@ -120,8 +120,8 @@ ALIKE |= {"N_uv": -0.1, "X_u": -0.02, "K_v": 0.01, "Y_rr": 0.01, "Y_phi": -0.01}
 
 def mmg(name: str, value: float, u: float, v: float, r: float) -> np.ndarray:
     nu_r, eta = ca.SX(ca.DM([u, v, 0, 0, 0, r])), ca.SX(ca.DM([0, 0, 0, 0.1, 0, 0]))
-    still = hull.mmg(nu_r, eta, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0)
-    return numbers(hull.mmg(nu_r, eta, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0, **{name: value})) - numbers(still)
+    still = hull.mmg_wrench(nu_r, eta, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0)
+    return numbers(hull.mmg_wrench(nu_r, eta, R_0=0.02, L_pp=7.0, T=0.46, rho=1000.0, **{name: value})) - numbers(still)
 
 
 @pytest.mark.parametrize(("name", "value"), [*TURNED.items(), *ALIKE.items()])
@@ -133,7 +133,7 @@ def test_astern_the_mmg_hull_is_alike_fore_and_aft(name: str, value: float) -> N
         np.testing.assert_allclose(astern, mirror * ahead, rtol=1e-12, atol=1e-12)
     U, axis = np.hypot(1.2, 0.4), "XYZKMN".index(name[0])
     factors = {"u": 1.2 / U, "v": 0.4 / U, "r": 0.1 * 7 / U, "phi": 0.1}
-    formula = derivative(name)
+    formula = hull_derivative(name)
     expected = value * np.prod([factors[symbol] for symbol, _ in formula.factors])  # ahead, as it is written
     lever = 7.0 if axis > 2 else 1.0
     assert mmg(name, value, 1.2, 0.4, 0.1)[axis] == pytest.approx(500 * 7 * 0.46 * U**2 * lever * expected, rel=1e-4)

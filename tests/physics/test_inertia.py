@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.inertia import coriolis, matrix, rigid_body
+from shipid.physics.inertia import coriolis_force, mass_matrix, rigid_body_entries
 from tests.drawn import seeds
 
 
@@ -23,8 +23,8 @@ def test_rigid_body_has_the_kinetic_energy_of_its_points() -> None:
     x, y, z = points.T
     m = masses.sum()
     M = numbers(
-        matrix(
-            rigid_body(
+        mass_matrix(
+            rigid_body_entries(
                 m=m,
                 x_G=masses @ x / m,
                 z_G=masses @ z / m,
@@ -46,7 +46,7 @@ def test_rigid_body_has_the_kinetic_energy_of_its_points() -> None:
 def test_coriolis_does_no_work(seed: int) -> None:
     rng = np.random.default_rng(seed)
     M, nu = rng.normal(size=(6, 6)), rng.normal(size=6)  # not even symmetric
-    force = numbers(coriolis(ca.SX(ca.DM(M)), ca.SX(ca.DM(nu)))).ravel()
+    force = numbers(coriolis_force(ca.SX(ca.DM(M)), ca.SX(ca.DM(nu)))).ravel()
     assert np.abs(force).max() > 0.1
     assert nu @ force == pytest.approx(0, abs=1e-13)
 
@@ -58,7 +58,7 @@ def test_planar_closed_form(seed: int) -> None:
     M = np.zeros((6, 6))
     M[0, 0], M[1, 1], M[1, 5], M[5, 1], M[5, 5] = rng.uniform(1, 5, 5)
     u, v, r = rng.uniform(-2, 2, 3)
-    forces = numbers(coriolis(ca.SX(ca.DM(M)), ca.SX(ca.DM([u, v, 0, 0, 0, r])))).ravel()[[0, 1, 5]]
+    forces = numbers(coriolis_force(ca.SX(ca.DM(M)), ca.SX(ca.DM([u, v, 0, 0, 0, r])))).ravel()[[0, 1, 5]]
     sway = M[1, 1] * v + (M[1, 5] + M[5, 1]) / 2 * r
     np.testing.assert_allclose(forces, [-sway * r, M[0, 0] * u * r, sway * u - M[0, 0] * u * v], atol=1e-13)
 
@@ -66,9 +66,9 @@ def test_planar_closed_form(seed: int) -> None:
 def test_free_rigid_body_keeps_its_momentum() -> None:
     """Kirchhoff without fluid: with M nu_dot = -C nu, momentum in fixed axes does not change."""
     rng = np.random.default_rng(1)
-    M = numbers(matrix(rigid_body(m=3.0, I_x=2.0, I_y=5.0, I_z=6.0, x_G=0.4, z_G=-0.2)))
+    M = numbers(mass_matrix(rigid_body_entries(m=3.0, I_x=2.0, I_y=5.0, I_z=6.0, x_G=0.4, z_G=-0.2)))
     nu = rng.normal(size=6)
-    nu_dot = np.linalg.solve(M, -numbers(coriolis(ca.SX(ca.DM(M)), ca.SX(ca.DM(nu)))).ravel())
+    nu_dot = np.linalg.solve(M, -numbers(coriolis_force(ca.SX(ca.DM(M)), ca.SX(ca.DM(nu)))).ravel())
     linear, angular = np.split(M @ nu, 2)
     linear_dot, angular_dot = np.split(M @ nu_dot, 2)
     np.testing.assert_allclose(linear_dot + np.cross(nu[3:], linear), 0, atol=1e-13)

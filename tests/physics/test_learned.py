@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 
 from shipid.engine.rollout import rollout
-from shipid.physics.learned import learned
-from shipid.vessel.dynamics import dynamics
+from shipid.physics.learned import learned_wrench
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import WEIGHTS
 
@@ -16,7 +16,7 @@ OUTPUTS = ("c_X", "c_Y", "c_N")
 
 
 def force(nu: np.ndarray, **changes: object) -> np.ndarray:
-    return np.array(ca.evalf(learned(ca.SX(nu), **{**WEIGHTS, **changes}))).ravel()  # type: ignore[arg-type]
+    return np.array(ca.evalf(learned_wrench(ca.SX(nu), **{**WEIGHTS, **changes}))).ravel()  # type: ignore[arg-type]
 
 
 def test_the_formula_by_hand() -> None:
@@ -41,7 +41,7 @@ def test_a_silent_network_leaves_the_path_as_it_is() -> None:
     learns = SHIP.with_values({"hull.learned": WEIGHTS | {name: [0.0] * 3 for name in OUTPUTS}})
     start = {"north": np.zeros(1), "east": np.zeros(1), "psi": np.zeros(1), "u": np.full(1, 4.0)}
     start |= {"v": np.full(1, 0.3), "r": np.full(1, 0.02)}
-    commands = {name: np.full(1, 1.5) for name in dynamics(SHIP).commands}
+    commands = {name: np.full(1, 1.5) for name in vessel_dynamics(SHIP).commands}
     weather = {"V_w": np.full(1, 4.0), "beta_w": np.full(1, 1.0)}
     paths = [rollout(ship, start, commands, weather, step=1.0, num_steps=10).states for ship in (SHIP, learns)]
     np.testing.assert_allclose(*paths, rtol=1e-13)
@@ -57,4 +57,4 @@ def test_two_hundred_weights_are_parameters_by_path_of_one_structure() -> None:
     assert len(paths) == 7 * 29
     assert changed.parameters["hull.learned.w_v.28"] == 0.25
     assert changed.parameters["hull.learned.c_N.3"] == -1.5
-    assert dynamics(changed) is dynamics(vessel)
+    assert vessel_dynamics(changed) is vessel_dynamics(vessel)

@@ -16,12 +16,12 @@ from shipid.physics.propeller import (
     four_quadrant,
     four_quadrant_shaft_thrust,
     four_quadrant_wash,
-    propeller,
     propeller_thrust,
-    quadratic,
+    propeller_wash,
+    propeller_wrench,
+    quadratic_propeller_wrench,
     quadratic_shaft_thrust,
     quadratic_wash,
-    wash,
 )
 
 # KVLCC2 at 7 m: Yasukawa and Yoshimura (2015), tables 1 and 3
@@ -32,11 +32,11 @@ RHO = 1000.0
 
 def thrust(u: float, n: float, **other: Any) -> np.ndarray:
     nu_r = ca.SX(np.array([u, 0, 0, 0, 0, 0]))
-    return np.array(ca.evalf(propeller(nu_r, ca.SX(n), t_P=0.220, rho=RHO, **{**SCREW, **other}))).ravel()
+    return np.array(ca.evalf(propeller_wrench(nu_r, ca.SX(n), t_P=0.220, rho=RHO, **{**SCREW, **other}))).ravel()
 
 
 def washed(nu_r: list[float], n: float, **other: Any) -> np.ndarray:
-    return np.array(ca.evalf(wash(ca.SX(np.array(nu_r)), ca.SX(n), **{**SCREW, **other}))).ravel()
+    return np.array(ca.evalf(propeller_wash(ca.SX(np.array(nu_r)), ca.SX(n), **{**SCREW, **other}))).ravel()
 
 
 def test_thrust_by_hand() -> None:
@@ -153,7 +153,7 @@ QUADRATIC: dict[str, Any] = {"x": -0.5, "T_nn": 3.6e-3, "T_nu": 1.5e-4}
 
 def quadratic_wrench(u: float, n: float, **other: Any) -> np.ndarray:
     nu_r = ca.SX(np.array([u, 0.1, 0, 0, 0, 0]))
-    return np.array(ca.evalf(quadratic(nu_r, ca.SX(n), **{**QUADRATIC, **other}))).ravel()
+    return np.array(ca.evalf(quadratic_propeller_wrench(nu_r, ca.SX(n), **{**QUADRATIC, **other}))).ravel()
 
 
 def quadratic_flow(u: float, n: float, **other: Any) -> np.ndarray:
@@ -219,8 +219,8 @@ POLYNOMIAL = {"K_T": SCREW["K_T"], "K_T_astern": ASTERN, "J_min": -0.4, "J_max":
 @pytest.mark.parametrize(
     ("force", "shaft", "numbers", "pitch"),
     [
-        (propeller, propeller_thrust, {**FLOW, **POLYNOMIAL, "D_p": 0.216, "rho": RHO}, []),
-        (quadratic, quadratic_shaft_thrust, {"x": -3.36, "y": 0.4, **DRIVEN, "w_P0": 0.3}, []),
+        (propeller_wrench, propeller_thrust, {**FLOW, **POLYNOMIAL, "D_p": 0.216, "rho": RHO}, []),
+        (quadratic_propeller_wrench, quadratic_shaft_thrust, {"x": -3.36, "y": 0.4, **DRIVEN, "w_P0": 0.3}, []),
         (four_quadrant, four_quadrant_shaft_thrust, {**FLOW, **CURVE, "D_p": 0.216, "rho": RHO}, []),
         (controllable_pitch, controllable_thrust, {**FLOW, **VARIABLE, "k_astern": 0.7, "rho": RHO}, [-0.6]),
     ],

@@ -10,8 +10,8 @@ import pytest
 from casadi import SX
 
 from shipid.errors import ShipidError
-from shipid.physics.hull import derivatives
-from shipid.physics.returned import returned
+from shipid.physics.hull import derivatives_wrench
+from shipid.physics.returned import check_returned
 
 v = SX.sym("v")
 C = SX.sym("C")
@@ -22,7 +22,7 @@ def term() -> None: ...
 
 @pytest.mark.parametrize("value", [ca.vertcat(v, v), np.ones(2), [1.0, 2.0], ca.DM([1, 2]), np.array([v, C])])
 def test_symbols_and_numbers_pass(value: Any) -> None:
-    symbols = returned("mine", term, value, [v, {"C": C}], 2)
+    symbols = check_returned("mine", term, value, [v, {"C": C}], 2)
     assert isinstance(symbols, SX)
     assert symbols.shape == (2, 1)
 
@@ -41,12 +41,12 @@ def test_symbols_and_numbers_pass(value: Any) -> None:
 )
 def test_anything_else_is_named(value: Any, found: str) -> None:
     with pytest.raises(ShipidError, match=rf"^mine must return 2 numbers, not {found} in {__file__}, line \d+$"):
-        returned("mine", term, value, [v], 2)
+        check_returned("mine", term, value, [v], 2)
     with pytest.raises(ShipidError, match=rf"^mine must return two, not {found}$"):
-        returned("mine", derivatives, value, [v], 2, "two")
+        check_returned("mine", derivatives_wrench, value, [v], 2, "two")
 
 
 def test_numbers_that_are_none_are_refused_and_infinite_ones_pass() -> None:
     with pytest.raises(ShipidError, match=r"^mine returns what is not a number \(NaN\)"):
-        returned("mine", term, v * np.nan, [v], 1)
-    assert returned("mine", term, ca.fmin(v, np.inf), [v], 1).shape == (1, 1)
+        check_returned("mine", term, v * np.nan, [v], 1)
+    assert check_returned("mine", term, ca.fmin(v, np.inf), [v], 1).shape == (1, 1)

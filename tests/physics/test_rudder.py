@@ -10,10 +10,10 @@ import pytest
 
 from shipid.physics.rudder import (
     coefficients_normal_force,
-    rudder,
     rudder_coefficients,
     rudder_derivatives,
     rudder_polynomial,
+    rudder_wrench,
 )
 
 # KVLCC2 at 7 m: Yasukawa and Yoshimura (2015), tables 1 and 3
@@ -27,7 +27,7 @@ L, D_P = 7.0, 0.216
 
 def wrench(nu_r: list[float], delta: float, wash: list[float], **other: Any) -> np.ndarray:
     inputs = ca.SX(np.array(nu_r)), ca.SX(delta), ca.SX(np.array(wash))
-    return np.array(ca.evalf(rudder(*inputs, **{**RUDDER, **other}))).ravel()
+    return np.array(ca.evalf(rudder_wrench(*inputs, **{**RUDDER, **other}))).ravel()
 
 
 @pytest.mark.parametrize("v", [-0.2, 0.15])

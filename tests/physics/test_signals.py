@@ -11,16 +11,16 @@ from shipid.logs.mapping import UNITS
 from shipid.physics.signals import (
     SIGNALS,
     is_shaft,
+    is_steering,
     mirror_sign,
-    named,
-    neutral,
-    row_of,
+    neutral_value,
+    rows_of_role,
     signal_of,
-    steers,
-    units,
+    signal_row,
+    signal_units,
 )
 
-COMMANDS = tuple(f"port.{name}" for name in named("command"))
+COMMANDS = tuple(f"port.{name}" for name in rows_of_role("command"))
 
 
 @pytest.mark.parametrize("name", SIGNALS)
@@ -40,22 +40,22 @@ def test_a_row_is_whole(name: str) -> None:
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_can_be_drawn_checked_and_guessed(name: str) -> None:
-    row = row_of(name)
+    row = signal_row(name)
     assert row is not None
     assert row.usual[0] < row.usual[1] <= row.reach[1]
     assert row.plausible is not None
     assert row.names
     assert max(np.abs(row.usual)) < row.plausible
-    assert not (is_shaft(name) and steers(name))
+    assert not (is_shaft(name) and is_steering(name))
 
 
 def test_commands_are_recognised_by_their_last_name() -> None:
     commands = ("port.n", "port.alpha", "port.delta", "port.pitch")
     assert [is_shaft(name) for name in commands] == [True, False, False, False]
-    assert [steers(name) for name in commands] == [False, True, True, False]
+    assert [is_steering(name) for name in commands] == [False, True, True, False]
     assert [mirror_sign(name) for name in commands] == [1, -1, -1, 1]
-    assert [neutral(name) for name in commands] == [0.0, 0.0, 0.0, 0.8]
-    assert units(commands) == dict(zip(commands, ("rev/s", "rad", "rad", "-"), strict=True))
+    assert [neutral_value(name) for name in commands] == [0.0, 0.0, 0.0, 0.8]
+    assert signal_units(commands) == dict(zip(commands, ("rev/s", "rad", "rad", "-"), strict=True))
     assert (signal_of("port.n"), signal_of("u")) == ("n", "u")
 
 
@@ -79,5 +79,10 @@ def test_a_name_in_a_log_is_one_signal_at_most(called: str, signal: str | None) 
 
 
 def test_what_nobody_knows_has_no_row() -> None:
-    assert row_of("port.rocket") is None
-    assert (neutral("port.rocket"), mirror_sign("x"), steers("x.y"), is_shaft("x.y")) == (0.0, 1.0, False, False)
+    assert signal_row("port.rocket") is None
+    assert (neutral_value("port.rocket"), mirror_sign("x"), is_steering("x.y"), is_shaft("x.y")) == (
+        0.0,
+        1.0,
+        False,
+        False,
+    )

@@ -7,7 +7,7 @@ import casadi as ca
 import pytest
 
 from shipid.physics import TERMS
-from shipid.physics.symbols import types_of
+from shipid.physics.symbols import argument_types
 
 
 @pytest.mark.parametrize(
@@ -15,7 +15,7 @@ from shipid.physics.symbols import types_of
 )
 def test_types_of_every_function_of_shipid_are_read_without_casadi(function: Callable[..., Any]) -> None:
     """Only the type of symbols is another: units, marks and defaults are the same."""
-    read = types_of(function)
+    read = argument_types(function)
     whole = get_type_hints(function, localns={"SX": ca.SX}, include_extras=True)
     assert read.keys() == whole.keys()
     assert [get_args(one)[1:] for one in read.values()] == [get_args(one)[1:] for one in whole.values()]
@@ -27,4 +27,4 @@ def test_a_type_that_is_none_is_named() -> None:
         return C * nu_r
 
     with pytest.raises(NameError, match="'Newton' is not defined"):
-        types_of(drag)
+        argument_types(drag)

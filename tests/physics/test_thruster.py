@@ -27,7 +27,7 @@ def azimuth(**changes: float) -> ca.Function:
     """(nu_r, n, alpha) -> wrench of the 28.9 m ship's port unit."""
     values = port() | changes
     nu_r, n, alpha = ca.SX.sym("nu_r", 6), ca.SX.sym("n"), ca.SX.sym("alpha")
-    return ca.Function("azimuth", [nu_r, n, alpha], [thruster.azimuth(nu_r, n, alpha, **values)])
+    return ca.Function("azimuth", [nu_r, n, alpha], [thruster.azimuth_wrench(nu_r, n, alpha, **values)])
 
 
 def test_azimuth_against_the_published_samples(shared_data: Path) -> None:
@@ -76,9 +76,9 @@ def test_tunnel_at_200_rpm_is_the_published_polynomial() -> None:
     block = load_vessel("gunnerus-28.9").document["thruster"]["bow"]
     values = {k: v for k, v in block.items() if k not in ("kind", "source", "off")}
     expected = 3.15982607e-4 * 200**3 + 1.60941887e-3 * 200**2 + 5.17642375 * 200
-    wrench = numbers(thruster.tunnel(ca.SX(200 / 60), **values))
+    wrench = numbers(thruster.tunnel_wrench(ca.SX(200 / 60), **values))
     np.testing.assert_allclose(wrench, [0, expected, 0, -1.01 * expected, 0, 13.08 * expected], rtol=1e-8)
-    np.testing.assert_allclose(numbers(thruster.tunnel(ca.SX(-200 / 60), **values)), -wrench)
+    np.testing.assert_allclose(numbers(thruster.tunnel_wrench(ca.SX(-200 / 60), **values)), -wrench)
 
 
 def advance(command: float, state: float, dt: float, T: float, rate: float = thruster.UNLIMITED) -> float:

@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.frames import current
-from shipid.physics.waves import drift, first_order, passage_rates
+from shipid.physics.frames import current_velocity
+from shipid.physics.waves import drift_wrench, first_order, passage_rates
 from tests.drawn import seeds
 
 COUNT = 7  # harmonics 0 ... 6
@@ -45,7 +45,7 @@ def test_the_water_goes_where_the_current_sets(seed: int) -> None:
     """Whatever the heading and the motion of the ship."""
     rng = np.random.default_rng(seed)
     eta, nu = (ca.SX(rng.uniform(-0.5, 3.0, 6) * [1, 1, 1, 0.1, 0.1, 1]) for _ in range(2))
-    nu_c, _ = current(eta, nu, ca.SX(0.8), ca.SX(2.2))
+    nu_c, _ = current_velocity(eta, nu, ca.SX(0.8), ca.SX(2.2))
     rates = np.array(ca.evalf(passage_rates(eta, nu, nu - nu_c))).ravel()
     np.testing.assert_allclose(rates, [1, 0.8 * np.cos(2.2), 0.8 * np.sin(2.2)])
 
@@ -75,7 +75,7 @@ def test_a_moving_ship_meets_the_waves_at_the_frequency_of_encounter(beta_deg: i
 
 def test_drift_is_a_series_in_the_relative_heading() -> None:
     eta, chi = ca.SX.sym("eta", 6), ca.SX.sym("chi")
-    wrench = drift(eta, ca.cos(chi), ca.sin(chi), ca.DM(DRIFT.ravel()))
+    wrench = drift_wrench(eta, ca.cos(chi), ca.sin(chi), ca.DM(DRIFT.ravel()))
     compiled = ca.Function("drift", [eta, chi], [ca.densify(wrench)])
     m = np.arange(COUNT)
     for psi in (-2.0, 0.0, 1.3):

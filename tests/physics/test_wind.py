@@ -24,11 +24,15 @@ AT_REST = ca.SX(6, 1)
 
 def test_beam_wind_on_the_28_9_m_ship() -> None:
     """15 m/s on the beam: Y = 20.2 kN, N = 29.8 kN m, digits printed with the parameters."""
-    from_port = wind.table(AT_REST, ca.SX(0), ca.SX(15.0), ca.SX(np.pi / 2), **parameters("gunnerus-28.9", 1.23))
+    from_port = wind.wind_table_wrench(
+        AT_REST, ca.SX(0), ca.SX(15.0), ca.SX(np.pi / 2), **parameters("gunnerus-28.9", 1.23)
+    )
     wrench = numbers(from_port)
     assert wrench[1] == pytest.approx(20.2e3, abs=50)
     assert wrench[5] == pytest.approx(29.8e3, abs=50)
-    from_starboard = wind.table(AT_REST, ca.SX(0), ca.SX(15.0), ca.SX(-np.pi / 2), **parameters("gunnerus-28.9", 1.23))
+    from_starboard = wind.wind_table_wrench(
+        AT_REST, ca.SX(0), ca.SX(15.0), ca.SX(-np.pi / 2), **parameters("gunnerus-28.9", 1.23)
+    )
     np.testing.assert_allclose(numbers(from_starboard)[[1, 5]], -wrench[[1, 5]])
 
 
@@ -44,7 +48,7 @@ def test_relative_wind_follows_the_method() -> None:
 def test_interpolation_is_piecewise_linear_and_flat_beyond() -> None:
     grid, values = [0.0, 1.0, 3.0, 4.0], [2.0, -1.0, 5.0, 5.5]
     x = np.linspace(-1, 5, 61)
-    computed = [float(wind.interpolate(ca.SX(at), ca.SX(ca.DM(grid)), ca.SX(ca.DM(values)))) for at in x]
+    computed = [float(wind.interpolate_ramps(ca.SX(at), ca.SX(ca.DM(grid)), ca.SX(ca.DM(values)))) for at in x]
     np.testing.assert_allclose(computed, np.interp(x, grid, values), atol=1e-14)
 
 
@@ -62,5 +66,7 @@ def test_blendermann_by_hand(gamma_deg: float) -> None:
     N = q * A_L * L * (s_L / L - 0.18 * (gamma - np.pi / 2)) * C_Y
     K = q * A_L * (A_L / L) * kappa * s_H / (A_L / L) * C_Y
     towards = ca.SX(np.pi - gamma)  # from gamma off the port bow
-    forces = numbers(wind.blendermann(AT_REST, ca.SX(0), ca.SX(V_w), towards, **parameters("gunnerus-33.9", rho_a)))
+    forces = numbers(
+        wind.blendermann_wrench(AT_REST, ca.SX(0), ca.SX(V_w), towards, **parameters("gunnerus-33.9", rho_a))
+    )
     np.testing.assert_allclose(forces, [X, q * A_L * C_Y, 0, K, 0, N], rtol=1e-9, atol=1e-6)

@@ -15,12 +15,12 @@ from shipid.measures.spiral import levels
 from shipid.report import manoeuvre
 from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
 from shipid.report.paths import outline_at
-from shipid.simulation.standard import standards
+from shipid.simulation.standard import standard_manoeuvres
 from tests.measures.made_records import RECORDS, every
 from tests.report.test_page import Page
 from tests.report.views import views
 
-TRIALS = standards()
+TRIALS = standard_manoeuvres()
 
 
 def content(kind: str, name: str = "a ship") -> ManoeuvreContent:

@@ -10,12 +10,12 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.simulation.approach import (
     Controls,
     NotStraight,
-    acceleration,
     balanced_shaft,
     helm_effect,
-    steady,
+    steady_approach,
+    straight_acceleration,
 )
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import PATCHED
@@ -76,12 +76,12 @@ def test_two_screws_steer_by_their_difference() -> None:
 def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
     """Speeds of the 2015 derivatives, computed separately in NumPy: 75, 145, 200 rpm."""
     n = np.array([75, 145, 200]) / 60
-    approach = steady(Controls(SHIP), n, step=0.1, method="rk4", engine="casadi")
+    approach = steady_approach(Controls(SHIP), n, step=0.1, method="rk4", engine="casadi")
     state = approach.state
     np.testing.assert_allclose(state["u"], [2.27, 4.39, 6.06], atol=0.02)
     assert approach.memory == {}
     for shaft, u in zip(n, state["u"], strict=True):
-        assert np.abs(acceleration(SHIP, u, {"port.n": shaft, "starboard.n": shaft})).max() < 5e-4
+        assert np.abs(straight_acceleration(SHIP, u, {"port.n": shaft, "starboard.n": shaft})).max() < 5e-4
     for name in ("north", "east", "psi", "v", "r"):
         np.testing.assert_allclose(state[name], 0, atol=1e-9)
 
@@ -89,30 +89,32 @@ def test_a_steady_approach_is_an_equilibrium_at_each_shaft_speed() -> None:
 def test_an_approach_that_never_settles_or_diverges_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     gains = Controls(SHIP.with_values({"hull.derivatives.X_u|u|": 1e5}))
     with pytest.raises(ShipidError, match=r"at 145 rpm diverges: take a smaller step"):
-        steady(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+        steady_approach(gains, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
     ponderous = Controls(
         SHIP.with_values({"added_mass.X_udot": -1e9, "hull.derivatives.X_u|u|": -2.1, "unusual": ["added_mass.X_udot"]})
     )
     with pytest.raises(ShipidError, match=r"after 3600 s straight ahead at 145 rpm, u still changes: let a helmsman"):
-        steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+        steady_approach(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
     monkeypatch.setattr("shipid.simulation.approach.SWINGING", {"u", "w"})  # as where heave alone swings on
     with pytest.raises(
         NotStraight, match=r"still changes: its hull damps u too little \(Z_w, K_p and M_q do so\), or let"
     ):
-        steady(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
+        steady_approach(ponderous, np.array([145 / 60]), step=0.5, method="euler", engine="casadi")
 
 
 def test_a_large_and_slow_ship_reaches_her_speed_whatever_time_that_takes() -> None:
     given = Particulars(length=300.0, beam=58.0, draught=20.8, block=0.82, speed=8.0)
     tanker = Controls(first_guess(given, "tanker", "tanker.toml").vessel)
     for shaft in (0.4,):
-        steadily = steady(tanker, np.array([shaft]), step=1.0, method="euler", engine="casadi")
-        balanced = fsolve(lambda u, n=shaft: acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft)
+        steadily = steady_approach(tanker, np.array([shaft]), step=1.0, method="euler", engine="casadi")
+        balanced = fsolve(
+            lambda u, n=shaft: straight_acceleration(tanker.vessel, float(u[0]), tanker.ahead(n))[0], 8 * shaft
+        )
         assert steadily.state["u"][0] == pytest.approx(balanced[0], rel=0.015)
     creeping = balanced_shaft(tanker, 0.2) or 0.0  # she was said to be steady at 0.15 m/s, and at 0.1 m/s at rest
-    slowly = steady(tanker, np.array([creeping]), step=30.0, method="rk4", engine="casadi")
+    slowly = steady_approach(tanker, np.array([creeping]), step=30.0, method="rk4", engine="casadi")
     assert slowly.state["u"][0] == pytest.approx(0.2, rel=0.015)
-    stopped = steady(tanker, np.array([0.0, 1e-4]), step=1.0, method="euler", engine="casadi")
+    stopped = steady_approach(tanker, np.array([0.0, 1e-4]), step=1.0, method="euler", engine="casadi")
     np.testing.assert_allclose(stopped.state["u"], 0.0, atol=0.05)  # at rest at once, not after hours of approach
 
 
@@ -130,11 +132,11 @@ LAGS = {"thruster.port.actuator.alpha": {"kind": "first_order", "T": 0.5, "rate"
 def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str, object], n: list[float]) -> None:
     """No velocity changes with the helm that he holds, and the yaw rate is nil."""
     vessel = load_vessel(key).with_values(changes)
-    controls, model = Controls(vessel), dynamics(vessel)
+    controls, model = Controls(vessel), vessel_dynamics(vessel)
     how = {"step": 0.1, "method": "rk4", "engine": "casadi"}
     with pytest.raises(NotStraight, match="helmsman"):
-        steady(controls, np.array(n), **how)  # type: ignore[arg-type]
-    approach = steady(controls, np.array(n), held=True, **how)  # type: ignore[arg-type]
+        steady_approach(controls, np.array(n), **how)  # type: ignore[arg-type]
+    approach = steady_approach(controls, np.array(n), held=True, **how)  # type: ignore[arg-type]
     assert set(approach.helm) == set(controls.helm)
     assert set(approach.memory) == set(model.memory)
     for place, shaft in enumerate(n):
@@ -151,5 +153,5 @@ def test_a_helmsman_holds_what_does_not_go_straight(key: str, changes: dict[str,
         assert np.abs(rates[3:]).max() < 1e-4 * approach.state["u"][place]
         assert abs(approach.state["r"][place]) < 1e-4
         assert 0.001 < max(map(abs, helm.values())) < 0.3
-    alone = steady(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
+    alone = steady_approach(controls, np.array(n[:1]), held=True, **how)  # type: ignore[arg-type]
     assert alone.state["u"][0] == approach.state["u"][0]  # whatever the company

@@ -10,9 +10,9 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
-from shipid.simulation.draw import Draw
-from shipid.simulation.manoeuvre import KINDS, Spiral, Steps, Timed, Zigzag
-from shipid.simulation.truth import Truth, check_truth, draw_manoeuvres, simulate
+from shipid.simulation.draw import ManoeuvreDraw
+from shipid.simulation.manoeuvre import KINDS, Spiral, StepManoeuvre, TimedManoeuvre, Zigzag
+from shipid.simulation.truth import Truth, check_truth, draw_manoeuvres, simulate_truth
 from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 from tests.conftest import LAG
@@ -46,8 +46,8 @@ def test_every_kind_has_an_example() -> None:
 def test_every_kind_is_a_truth(kind: str) -> None:
     """A dataset, each run as long as run-up and duration say, no two runs alike; more runs change none that exist."""
     block = {"kind": kind, **BLOCKS[kind]}
-    few = simulate(truth(block, manoeuvres=2, run_up=5.0), LAGGED)
-    many = simulate(truth(block, manoeuvres=4, run_up=5.0), LAGGED)
+    few = simulate_truth(truth(block, manoeuvres=2, run_up=5.0), LAGGED)
+    many = simulate_truth(truth(block, manoeuvres=4, run_up=5.0), LAGGED)
     pd.testing.assert_frame_equal(many.iloc[: len(few)], few, rtol=1e-9, atol=1e-9)
     runs = [run for _, run in many.groupby("run")]
     assert len(Dataset(many, {"clock": "run", "flags": []}).frame) == 4 * 26
@@ -85,7 +85,7 @@ def test_a_first_order_after_the_end_of_the_run_is_refused(kind: str) -> None:
 def test_a_kind_is_one_edit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A class and its name: no other place knows the kinds."""
 
-    class Weave(Timed):
+    class Weave(TimedManoeuvre):
         """The helm swings like a sine."""
 
         angle_deg: float = 10.0
@@ -97,7 +97,7 @@ def test_a_kind_is_one_edit(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DocumentError, match="'weave' is no kind of manoeuvre"):
         truth({"kind": "weave"})
     monkeypatch.setitem(KINDS, "weave", Weave)
-    log = simulate(truth({"kind": "weave", "n_rpm": 120.0, "angle_deg": [5.0, 15.0]}), SHIP)
+    log = simulate_truth(truth({"kind": "weave", "n_rpm": 120.0, "angle_deg": [5.0, 15.0]}), SHIP)
     greatest = log.groupby("run")["port.alpha"].max() / DEGREE
     assert greatest.between(4.5, 15).all()
     assert greatest.nunique() == 3
@@ -128,19 +128,19 @@ def test_pairs_are_drawn_where_a_number_is_wanted() -> None:
     def at(place: float) -> Any:
         return lambda _: place
 
-    zigzag = Draw(kind="zigzag", n_rpm=[80, 150], angle_deg=20, side=["starboard", "port"])
+    zigzag = ManoeuvreDraw(kind="zigzag", n_rpm=[80, 150], angle_deg=20, side=["starboard", "port"])
     low, high = (zigzag.manoeuvre(60.0, at(place)) for place in (0.0, 0.999))
     assert low == Zigzag(n_rpm=80, angle_deg=20, side="starboard", duration=60, course_deg=0)
     assert isinstance(high, Zigzag)
     assert (high.n_rpm, high.angle_deg, high.side) == (pytest.approx(149.93), 20, "port")
     assert high.course_deg == pytest.approx(359.64)
-    fixed = Draw(kind="zigzag", n_rpm=100, course_deg=[30, 40]).manoeuvre(60.0, at(0.5))
+    fixed = ManoeuvreDraw(kind="zigzag", n_rpm=100, course_deg=[30, 40]).manoeuvre(60.0, at(0.5))
     assert fixed.course_deg == 35
-    spiral = Draw(kind="spiral", n_rpm=100, hold=10, angles_deg=[15, -15]).manoeuvre(60.0, at(0.5))
+    spiral = ManoeuvreDraw(kind="spiral", n_rpm=100, hold=10, angles_deg=[15, -15]).manoeuvre(60.0, at(0.5))
     assert isinstance(spiral, Spiral)
     assert spiral.angles_deg == (15, -15)
-    steps = Draw(kind="steps", n_rpm=100, alpha_deg=[-10, 20]).manoeuvre(60.0, at(0.5))
-    assert isinstance(steps, Steps)
+    steps = ManoeuvreDraw(kind="steps", n_rpm=100, alpha_deg=[-10, 20]).manoeuvre(60.0, at(0.5))
+    assert isinstance(steps, StepManoeuvre)
     assert steps.orders == {"n_rpm": (100, 100), "alpha_deg": (-10, 20)}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.simulation.excitation import aprbs, deal, limit_rate, multisine
+from shipid.simulation.excitation import aprbs_series, deal_harmonics, limit_rate, multisine_series
 
 PERIOD = 100.0
 TIME = np.arange(2000) * 0.05  # one period
@@ -16,7 +16,7 @@ BANDS = {
     "successive": tuple(range(1, 13)),
     "sparse": (2, 3, 7, 11, 13, 21, 34),
     "narrow": (17, 18, 19, 20, 21),
-    "dealt": deal(range(2, 30), 3)[1],
+    "dealt": deal_harmonics(range(2, 30), 3)[1],
     "many": tuple(range(3, 43)),
 }
 REACHED = {"successive": 1.45, "sparse": 1.96, "narrow": 1.75, "dealt": 1.45, "many": 1.45}  # crest factors
@@ -24,7 +24,7 @@ every_band = pytest.mark.parametrize("harmonics", BANDS.values(), ids=BANDS.keys
 
 
 def sines(harmonics: tuple[int, ...], time: np.ndarray = TIME, **changes: Any) -> np.ndarray:
-    return multisine(time, **{"period": PERIOD, "harmonics": harmonics, "amplitude": 0.4, **changes})
+    return multisine_series(time, **{"period": PERIOD, "harmonics": harmonics, "amplitude": 0.4, **changes})
 
 
 def crest_factor(series: np.ndarray) -> float:
@@ -55,7 +55,7 @@ def test_peaks_are_below_schroeders(name: str) -> None:
 
 
 def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
-    parts = deal(range(2, 30), 3)
+    parts = deal_harmonics(range(2, 30), 3)
     assert sorted(harmonic for part in parts for harmonic in part) == list(range(2, 30))
     assert all(min(part) < 5 and max(part) > 26 for part in parts)
     commands = np.stack([sines(part) for part in parts], axis=1)
@@ -65,14 +65,18 @@ def test_dealt_commands_are_orthogonal_and_share_the_band() -> None:
 
 
 def steps(**changes: Any) -> np.ndarray:
-    return aprbs(np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes})
+    return aprbs_series(
+        np.arange(20001) * 0.1, **{"hold": (4.0, 15.0), "levels": (-0.5, 0.3), "key": (7, 1), **changes}
+    )
 
 
 def test_a_longer_series_begins_with_the_shorter() -> None:
     time = np.arange(5001) * 0.1
-    short = aprbs(time[:1001], hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))
-    np.testing.assert_array_equal(aprbs(time, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
-    np.testing.assert_array_equal(aprbs(time + 40.0, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
+    short = aprbs_series(time[:1001], hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))
+    np.testing.assert_array_equal(aprbs_series(time, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short)
+    np.testing.assert_array_equal(
+        aprbs_series(time + 40.0, hold=(4.0, 15.0), levels=(-0.5, 0.3), key=(7, 1))[:1001], short
+    )
     assert not np.isin(short, steps(key=(7, 2))).any()
 
 
@@ -97,7 +101,7 @@ def test_rate_limit_is_respected_and_caught_up_with() -> None:
         (lambda: sines((1000,)), "too fast for steps of 0.05 s"),
         (lambda: sines((1,), period=0.0), "period must be positive"),
         (lambda: sines((1,), amplitude=-1.0), "amplitude at least 0"),
-        (lambda: deal((1, 2), 3), "cannot be shared by 3"),
+        (lambda: deal_harmonics((1, 2), 3), "cannot be shared by 3"),
         (lambda: steps(hold=(0.0, 1.0)), "hold times must be positive"),
         (lambda: steps(hold=(2.0, 1.0)), r"not \[2, 1\] s"),
         (lambda: steps(levels=(2.0, 1.0)), r"not \[2, 1\]"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.simulation.gusts import Gusts, series, spectrum, variance
+from shipid.simulation.gusts import Gusts, gust_series, gust_spectrum, gust_variance
 
 KINDS = {
     "npd": Gusts(kind="npd"),
@@ -30,7 +30,7 @@ def test_npd_integrates_to_its_closed_form() -> None:
     beta = gamma(1 / n) * gamma(5 / (3 * n) - 1 / n) / gamma(5 / (3 * n))
     expected = 320 / 172 * (U / 10) ** 2.75 * (z / 10) ** (0.45 - 2 / 3) * beta / n
     everything = Gusts(kind="npd", height=z, frequencies=(1e-9, 1e9), harmonics=500)
-    np.testing.assert_allclose(variance(everything, U), expected, rtol=1e-5)
+    np.testing.assert_allclose(gust_variance(everything, U), expected, rtol=1e-5)
 
 
 def test_kaimal_integrates_to_its_closed_form() -> None:
@@ -39,17 +39,17 @@ def test_kaimal_integrates_to_its_closed_form() -> None:
     for height, length in ((10.0, 56.7), (90.0, 340.2)):
         gusts = Gusts(kind="kaimal", turbulence_intensity=0.1, height=height, frequencies=(a, b))
         part = (1 + 6 * a * length / U) ** (-2 / 3) - (1 + 6 * b * length / U) ** (-2 / 3)
-        np.testing.assert_allclose(variance(gusts, U), (0.1 * U) ** 2 * part, rtol=1e-9)
+        np.testing.assert_allclose(gust_variance(gusts, U), (0.1 * U) ** 2 * part, rtol=1e-9)
 
 
 @every_kind
 def test_variance_of_a_long_series_is_the_integral(gusts: Gusts) -> None:
     U = np.array([2.0, 8.0, 15.0])
     f = np.geomspace(*gusts.frequencies, 20001)
-    density = spectrum(gusts, U[:, None], f)
+    density = gust_spectrum(gusts, U[:, None], f)
     integral = ((density[:, 1:] + density[:, :-1]) / 2 * np.diff(f)).sum(axis=1)
     time = np.arange(0.0, 40000.0, 0.9)
-    gust = series(gusts, U, time, keys(3))
+    gust = gust_series(gusts, U, time, keys(3))
     np.testing.assert_allclose(gust.var(axis=0), integral, rtol=0.05)
     assert np.all(np.abs(gust.mean(axis=0)) < 0.03 * U)
 
@@ -57,11 +57,11 @@ def test_variance_of_a_long_series_is_the_integral(gusts: Gusts) -> None:
 @every_kind
 def test_a_series_depends_on_its_key_alone(gusts: Gusts) -> None:
     time, U = np.arange(200) * 0.5, np.array([1.0, 5.0, 9.0, 5.0])
-    four = series(gusts, U, time, keys(4))
-    np.testing.assert_array_equal(series(gusts, U, time, keys(4)), four)
-    np.testing.assert_array_equal(series(gusts, U[1:2], time, keys(4)[1:2]), four[:, 1:2])
+    four = gust_series(gusts, U, time, keys(4))
+    np.testing.assert_array_equal(gust_series(gusts, U, time, keys(4)), four)
+    np.testing.assert_array_equal(gust_series(gusts, U[1:2], time, keys(4)[1:2]), four[:, 1:2])
     assert np.abs(four[:, 1] - four[:, 3]).max() > 0.1  # the same wind, another manoeuvre
-    assert np.abs(series(gusts, U, time, keys(4, seed=2)) - four).max() > 0.1
+    assert np.abs(gust_series(gusts, U, time, keys(4, seed=2)) - four).max() > 0.1
 
 
 @pytest.mark.parametrize(

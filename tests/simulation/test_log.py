@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.simulation.log import aboard, column_of, horizontal, run_names
+from shipid.simulation.log import body_velocities, horizontal_velocities, number_runs, state_column
 
 
 def test_horizontal_velocities_are_those_of_the_rotation() -> None:
@@ -12,7 +12,7 @@ def test_horizontal_velocities_are_those_of_the_rotation() -> None:
     rng = np.random.default_rng(3)
     body = {name: rng.normal(size=50) for name in ("u", "v", "w", "q", "r")}
     body |= {"phi": rng.uniform(-0.5, 0.5, 50), "theta": rng.uniform(-0.3, 0.3, 50)}
-    velocities = horizontal(body)
+    velocities = horizontal_velocities(body)
     for k in range(50):
         c, s = np.cos(body["phi"][k]), np.sin(body["phi"][k])
         roll = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
@@ -22,19 +22,19 @@ def test_horizontal_velocities_are_those_of_the_rotation() -> None:
         np.testing.assert_allclose([velocities["u"][k], velocities["v"][k]], level[:2], atol=1e-12)
         rate = (body["q"][k] * np.sin(body["phi"][k]) + body["r"][k] * np.cos(body["phi"][k])) / c
         np.testing.assert_allclose(velocities["r"][k], rate, atol=1e-12)
-    back = aboard({**body, **velocities})
+    back = body_velocities({**body, **velocities})
     for name in ("u", "v", "r"):
         np.testing.assert_allclose(back[name], body[name], atol=1e-12)
 
 
 def test_a_level_ship_logs_the_velocities_of_its_body() -> None:
     level = {name: np.array([value]) for name, value in (("u", 2.0), ("v", -0.3), ("r", 0.05))}
-    for turned in (horizontal(level), aboard(level)):
+    for turned in (horizontal_velocities(level), body_velocities(level)):
         assert {name: values[0] for name, values in turned.items()} == {"u": 2.0, "v": -0.3, "r": 0.05}
 
 
 def test_names_sort_as_they_count() -> None:
-    assert run_names(2) == ["M001", "M002"]
-    many = run_names(1200)
+    assert number_runs(2) == ["M001", "M002"]
+    many = number_runs(1200)
     assert many == sorted(many)
-    assert (many[0], column_of("down"), column_of("psi")) == ("M0001", "z", "psi")
+    assert (many[0], state_column("down"), state_column("psi")) == ("M0001", "z", "psi")

@@ -14,19 +14,19 @@ from shipid.measures.recognise import kinds_of, record_of
 from shipid.measures.zigzag import zigzag
 from shipid.simulation.manoeuvre import (
     KINDS,
+    ConstantOrders,
     CrashStop,
     Excitation,
     Manoeuvre,
     ReverseSpiral,
     Spiral,
-    Steps,
-    Turning,
+    StepManoeuvre,
     TurningCircle,
     Zigzag,
 )
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
+from shipid.vessel.load import Vessel, check_document, load_vessel
 from tests.conftest import LAG
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -39,7 +39,7 @@ def runs(frame: pd.DataFrame) -> list[pd.DataFrame]:
 
 
 def one(vessel: Vessel, manoeuvre: Manoeuvre, **how: Any) -> pd.DataFrame:
-    return perform(vessel, [manoeuvre], **{"step": 0.1, **how})
+    return perform_manoeuvres(vessel, [manoeuvre], **{"step": 0.1, **how})
 
 
 def held(log: pd.DataFrame, hold: float, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -57,7 +57,7 @@ def zigzags() -> pd.DataFrame:
         for angle, heading in PAIRS
         for side in ("starboard", "port")
     ]
-    return perform(SHIP, chosen, step=0.1)
+    return perform_manoeuvres(SHIP, chosen, step=0.1)
 
 
 def test_zigzag_reverses_at_the_execute_heading_within_one_step() -> None:
@@ -108,7 +108,7 @@ def test_together_is_one_at_a_time() -> None:
         CrashStop(name="stop", n_rpm=120, astern_rpm=100, duration=20, execute_at=5),
     ]
     wind = {"V_w": np.arange(5.0), "beta_w": np.full(5, 0.4)}
-    together = perform(LAGGED, mixed, step=0.1, environment=wind)
+    together = perform_manoeuvres(LAGGED, mixed, step=0.1, environment=wind)
     assert list(together["run"].unique()) == [manoeuvre.name for manoeuvre in mixed]
     for number, manoeuvre in enumerate(mixed):
         alone = one(LAGGED, manoeuvre, environment={name: float(values[number]) for name, values in wind.items()})
@@ -120,7 +120,7 @@ def test_together_is_one_at_a_time() -> None:
 def test_turning_circle_is_the_known_steady_turn(n_rpm: float, u: float, v: float, r: float) -> None:
     """Steady turns at 35 deg of the 2015 derivatives, integrated separately in NumPy [m/s, m/s, deg/s]."""
     to_either = [TurningCircle(n_rpm=n_rpm, duration=200, side=side) for side in ("starboard", "port")]
-    for log, sense in zip(runs(perform(SHIP, to_either, step=0.1)), (1, -1), strict=True):
+    for log, sense in zip(runs(perform_manoeuvres(SHIP, to_either, step=0.1)), (1, -1), strict=True):
         end = log.iloc[-1]
         assert end["u"] == pytest.approx(u, abs=0.01)
         assert end["v"] == pytest.approx(-sense * v, abs=0.01)
@@ -129,7 +129,7 @@ def test_turning_circle_is_the_known_steady_turn(n_rpm: float, u: float, v: floa
 
 def test_steps_hold_levels_in_their_ranges() -> None:
     """Levels differ, each holds for 2 to 5 s, shaft and angle change at different times; another seed, other orders."""
-    steps = Steps(orders={"n_rpm": (60, 90), "alpha_deg": (-20, 10)}, hold=(2.0, 5.0), seed=3, duration=60)
+    steps = StepManoeuvre(orders={"n_rpm": (60, 90), "alpha_deg": (-20, 10)}, hold=(2.0, 5.0), seed=3, duration=60)
     log = one(SHIP, steps)
     for signal, unit, low, high in (("n", 1 / 60, 60, 90), ("alpha", DEGREE, -20, 10)):
         series = log[f"port.{signal}"].to_numpy() / unit
@@ -157,7 +157,7 @@ def test_steps_hold_levels_in_their_ranges() -> None:
 )
 def test_orders_are_those_of_the_vessel(orders: dict[str, float], path: str, message: str) -> None:
     with pytest.raises(DocumentError, match=message) as caught:
-        one(SHIP, Turning(orders=orders, duration=20))
+        one(SHIP, ConstantOrders(orders=orders, duration=20))
     assert caught.value.path == path
 
 
@@ -179,7 +179,7 @@ def test_reverse_spiral_finds_the_loop_of_an_unstable_ship() -> None:
     unstable = SHIP.with_values({f"hull.derivatives.{name}": value for name, value in changes.items()})
     direct = Spiral(n_rpm=145, hold=100, angles_deg=(10, 0, -10, 0, 10))
     reverse = ReverseSpiral(n_rpm=145, hold=100, rates_deg=(3, 1, 0.5, -0.5, -1, -3))
-    logs = runs(perform(unstable, [direct, reverse], step=0.2))
+    logs = runs(perform_manoeuvres(unstable, [direct, reverse], step=0.2))
     _, jumped = held(logs[0], 100, 0.2)
     assert jumped[1] > 5
     assert jumped[3] < -5
@@ -207,7 +207,7 @@ def test_a_controllable_pitch_is_reversed_in_a_crash_stop() -> None:
     screw = {name: fixed.document["thruster"]["propeller"][name] for name in ("x", "D_p", "t_P", "w_P0")}
     gear = {"pitch": {"kind": "rate_limit", "rate": 0.05, "low": -0.5, "high": 0.9}}
     screw |= {"kind": "controllable_pitch", "k_P": 0.4063, "k_J": 0.4, "actuator": gear}
-    ship = check_vessel({**fixed.document, "thruster": {**fixed.document["thruster"], "propeller": screw}}, "CP")
+    ship = check_document({**fixed.document, "thruster": {**fixed.document["thruster"], "propeller": screw}}, "CP")
     log = one(ship, CrashStop(n_rpm=600, astern_rpm=500, execute_at=3, duration=150))
     before = log["t"].to_numpy() < 2.95
     np.testing.assert_allclose(log["propeller.n"], np.where(before, 10.0, 500 / 60))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.simulation.measured import approached, manoeuvre_content, measure_standard
+from shipid.simulation.measured import approach_words, manoeuvre_content, measure_standard
 from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import Particulars, first_guess
@@ -28,13 +28,13 @@ def test_a_ship_that_does_not_go_straight_gets_a_helmsman():
     lame = load_vessel("gunnerus-28.9").with_values({"thruster.starboard.off": True})
     done = measure_standard(lame, "turning", (20,), duration=120.0)
     assert done.standard.manoeuvre.approach == "helmsman"
-    assert approached(done).endswith("held on course by a helmsman")
+    assert approach_words(done).endswith("held on course by a helmsman")
     assert np.isfinite({row["measure"]: row["value"] for row in done.measures}["advance"])
     with pytest.raises(ShipidError, match="turns with the helm amidships"):
         measure_standard(lame, "turning", (20,), approach="steady")
     rest = measure_standard(lame, "turning", (20,), approach="rest", duration=60.0)
     assert rest.record.u[0] == 0
-    assert approached(rest).startswith("from rest")
+    assert approach_words(rest).startswith("from rest")
 
 
 @pytest.mark.parametrize("length", [1.0, 1.5, 6.0, 30.0])

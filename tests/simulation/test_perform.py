@@ -16,7 +16,7 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.units import DEGREE
 from shipid.vessel.load import Vessel, load_vessel
@@ -28,19 +28,19 @@ CIRCLE = TurningCircle(n_rpm=120, duration=20)
 
 
 def test_log_is_a_dataset_without_what_the_actuators_reached() -> None:
-    frame = perform(LAGGED, [CIRCLE, Zigzag(n_rpm=120, duration=30)], step=0.1, interval=0.5)
+    frame = perform_manoeuvres(LAGGED, [CIRCLE, Zigzag(n_rpm=120, duration=30)], step=0.1, interval=0.5)
     reached = [name for name in frame if str(name).startswith("actual.")]
     assert reached == ["actual.port.n", "actual.port.alpha", "actual.starboard.n", "actual.starboard.alpha"]
     data = Dataset(frame.drop(columns=reached), {"clock": "run", "flags": []})
     assert data.commands == ["port.n", "port.alpha", "starboard.n", "starboard.alpha"]
     assert list(frame["run"].unique()) == ["M001", "M002"]
     assert "V_w" in frame
-    assert not any(str(name).startswith("actual.") for name in perform(SHIP, [CIRCLE], step=0.1))
+    assert not any(str(name).startswith("actual.") for name in perform_manoeuvres(SHIP, [CIRCLE], step=0.1))
 
 
 def test_interval_only_thins_the_log() -> None:
     zigzag = [Zigzag(n_rpm=145, duration=40)]
-    fine, coarse = perform(SHIP, zigzag, step=0.1), perform(SHIP, zigzag, step=0.1, interval=0.5)
+    fine, coarse = perform_manoeuvres(SHIP, zigzag, step=0.1), perform_manoeuvres(SHIP, zigzag, step=0.1, interval=0.5)
     thinned = fine.iloc[::5].reset_index(drop=True)
     pd.testing.assert_frame_equal(thinned, coarse, rtol=1e-10)
 
@@ -50,7 +50,7 @@ def test_a_helmsman_holds_the_approach_of_a_ship_that_does_not_go_straight() -> 
     lame = SHIP.with_values({"thruster.starboard.off": True})
     circle = TurningCircle(name="circle", approach="helmsman", n_rpm=145, execute_at=10, duration=20, angle_deg=20)
     zigzag = Zigzag(name="zigzag", approach="helmsman", n_rpm=145, execute_at=10, duration=20, course_deg=90)
-    frame = perform(lame, [circle, zigzag], step=0.1)
+    frame = perform_manoeuvres(lame, [circle, zigzag], step=0.1)
     for run, angle in (("circle", 20), ("zigzag", 20)):
         log = frame[frame["run"] == run].reset_index(drop=True)
         assert np.abs(log["r"].iloc[:100]).max() < 1e-4
@@ -64,12 +64,12 @@ def test_weather_may_change_from_step_to_step() -> None:
     """A series that does not change is a constant; one that does is logged as it is, and felt by clock and helmsman."""
     two = [CIRCLE, Zigzag(name="zigzag", n_rpm=120, duration=30)]
     speeds = np.array([4.0, 6.0])
-    held = perform(SHIP, two, step=0.1, interval=0.5, environment={"V_w": speeds, "beta_w": 0.4})
+    held = perform_manoeuvres(SHIP, two, step=0.1, interval=0.5, environment={"V_w": speeds, "beta_w": 0.4})
     level = np.broadcast_to(speeds, (301, 2))
-    same = perform(SHIP, two, step=0.1, interval=0.5, environment={"V_w": level, "beta_w": 0.4})
+    same = perform_manoeuvres(SHIP, two, step=0.1, interval=0.5, environment={"V_w": level, "beta_w": 0.4})
     pd.testing.assert_frame_equal(same, held, rtol=1e-12)
     rising = np.linspace(0, 10, 301)[:, None] + [0.0, 1.0]
-    blown = perform(SHIP, two, step=0.1, interval=0.5, environment={"V_w": rising, "beta_w": 0.4})
+    blown = perform_manoeuvres(SHIP, two, step=0.1, interval=0.5, environment={"V_w": rising, "beta_w": 0.4})
     for place, (_, run) in enumerate(blown.groupby("run", sort=False)):
         np.testing.assert_allclose(run["V_w"], rising[::5, place][: len(run)])
     assert np.abs(blown["v"] - held["v"]).max() > 0.01
@@ -85,7 +85,7 @@ def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
         Zigzag(**short, angle_deg=20, execute_heading_deg=1, duration=15),
         ReverseSpiral(**short, rates_deg=(1, -2), hold=6),
     ]
-    each, batch = (perform(vessel, chosen, step=0.25, engine=engine) for engine in ("casadi", "torch"))
+    each, batch = (perform_manoeuvres(vessel, chosen, step=0.25, engine=engine) for engine in ("casadi", "torch"))
     assert (each.groupby("run")["port.alpha"].nunique() > 1).all()
     pd.testing.assert_frame_equal(each, batch, rtol=1e-9, atol=1e-9)
 
@@ -102,7 +102,7 @@ def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
 )
 def test_what_cannot_be_performed_is_reported(manoeuvres: list[Manoeuvre], how: dict[str, Any], message: str) -> None:
     with pytest.raises(ShipidError, match=message):
-        perform(SHIP, manoeuvres, **{"step": 0.1, **how})
+        perform_manoeuvres(SHIP, manoeuvres, **{"step": 0.1, **how})
 
 
 def test_a_run_that_diverges_is_named() -> None:
@@ -112,7 +112,7 @@ def test_a_run_that_diverges_is_named() -> None:
         CIRCLE.model_copy(update={"name": "wild"}),
     ]
     with pytest.raises(ShipidError, match="diverges in wild: take a smaller step"):
-        perform(wild, chosen, step=0.1)
+        perform_manoeuvres(wild, chosen, step=0.1)
 
 
 def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
@@ -120,8 +120,8 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
     ship = load_vessel("gunnerus-28.9-6dof")
     sea = draw_components(Sea(H_s=1.0, T_p=5.0, components=20), np.array([0.5, 2.0]), ["a", "b"])
     zigzags = [Zigzag(n_rpm=120, duration=60), Zigzag(n_rpm=140, duration=60)]
-    calm = perform(ship, zigzags, step=0.05, interval=0.5)
-    rough = perform(ship, zigzags, step=0.05, interval=0.5, components=wave_loads(ship, sea))
+    calm = perform_manoeuvres(ship, zigzags, step=0.05, interval=0.5)
+    rough = perform_manoeuvres(ship, zigzags, step=0.05, interval=0.5, components=wave_loads(ship, sea))
     assert calm["z"].std() < 0.02 < 0.1 < rough["z"].std()
     for _, run in rough.groupby("run"):
         turned = run["psi"][np.flatnonzero(np.diff(np.sign(run["port.alpha"]))) + run.index[0]]
@@ -145,11 +145,13 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
 )
 def test_what_does_not_fit_the_manoeuvres_is_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ShipidError, match=message):
-        perform(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], **{"step": 0.1, **given})
+        perform_manoeuvres(SHIP, [CIRCLE, CIRCLE.model_copy(update={"name": "other"})], **{"step": 0.1, **given})
 
 
 def test_execute_waits_and_orders_are_those_in_force() -> None:
-    frame = perform(SHIP, [TurningCircle(n_rpm=120, duration=20, execute_at=5, angle_deg=10, side="port")], step=0.1)
+    frame = perform_manoeuvres(
+        SHIP, [TurningCircle(n_rpm=120, duration=20, execute_at=5, angle_deg=10, side="port")], step=0.1
+    )
     before = frame["t"] < 4.95
     assert (frame.loc[before, "port.alpha"] == 0).all()
     np.testing.assert_allclose(frame.loc[~before, "port.alpha"], 10 * DEGREE)

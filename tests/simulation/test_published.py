@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
-from shipid.simulation.perform import perform
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 
 Array = np.ndarray
@@ -17,7 +17,7 @@ SIDES = ("starboard", "port")
 
 def accelerations(vessel: Vessel, nu: tuple[float, float, float], delta: float, n: float) -> Array:
     """d(u, v, r)/dt with rudder and shaft where they are."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     state = [0.0, 0.0, 0.0, *nu]
     orders = [delta if name.endswith("delta") else n for name in model.commands]
     values = list(vessel.parameters.values())
@@ -35,7 +35,7 @@ def trials(
         for angle in angles
         for side in SIDES
     ]
-    return dict(list(perform(vessel, [*turns, *zigzags], step=step).groupby("run")))
+    return dict(list(perform_manoeuvres(vessel, [*turns, *zigzags], step=step).groupby("run")))
 
 
 def turn(log: pd.DataFrame, length: float) -> tuple[float, float]:

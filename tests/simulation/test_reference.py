@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.engine.rollout import Trajectories, rollout
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 
 SPEEDS = {  # rpm -> steady speed ahead [m/s], calm water
@@ -44,9 +44,9 @@ def calm_run(name: str, rpm: np.ndarray, deg: np.ndarray, u: np.ndarray, seconds
     """Both azimuths alike, no wind, RK4 at 0.5 s, straight ahead at u to begin with."""
     vessel = load_vessel(name).with_values({"wind.off": True})
     zero = np.zeros(len(rpm))
-    start = dict.fromkeys(dynamics(vessel).state, zero) | {"u": u}
+    start = dict.fromkeys(vessel_dynamics(vessel).state, zero) | {"u": u}
     commands = {
-        command: rpm / 60 if command.endswith(".n") else np.radians(deg) for command in dynamics(vessel).commands
+        command: rpm / 60 if command.endswith(".n") else np.radians(deg) for command in vessel_dynamics(vessel).commands
     }
     return rollout(vessel, start, commands, step=0.5, num_steps=round(seconds / 0.5), method="rk4")
 
@@ -122,7 +122,7 @@ def test_turn_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
 
 def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> None:
     """Both units' forces on the recorded motion: surge within 3 %, sway within 6 % once under way."""
-    from shipid.physics.thruster import azimuth  # one term alone
+    from shipid.physics.thruster import azimuth_wrench  # one term alone
 
     recorded = [turn[f"bodyforce{i}_{axis}"] for axis in ("surge", "sway") for i in (0, 1)]
     computed = []
@@ -130,7 +130,9 @@ def test_thruster_forces_of_the_co_simulation(turn: dict[str, np.ndarray]) -> No
         block = load_vessel("gunnerus-28.9").document["thruster"][name]
         values = {k: v for k, v in block.items() if k not in ("kind", "source")} | {"rho": 1025.0}
         motions = zip(turn["surge_vel"], turn["sway_vel"], np.radians(turn["yaw_vel"]), strict=True)
-        wrenches = [azimuth(np.array([u, v, 0, 0, 0, r]), 100 / 60, np.radians(20), **values) for u, v, r in motions]
+        wrenches = [
+            azimuth_wrench(np.array([u, v, 0, 0, 0, r]), 100 / 60, np.radians(20), **values) for u, v, r in motions
+        ]
         computed.append(np.array([[float(w[0]), float(w[1])] for w in wrenches]))
     for axis, kept, rtol in ((0, recorded[:2], 0.03), (1, recorded[2:], 0.06)):
         forces, late = np.stack([f[:, axis] for f in computed]), slice(40, None)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from shipid.simulation.approach import Controls
-from shipid.simulation.request import Request, in_rows
+from shipid.simulation.request import Request, round_to_rows
 from shipid.vessel.load import load_vessel
 
 KEYS = {"n_rpm": 120.0, "execute_at": 10.0, "course_deg": 0.0, "approach": "steady"}
@@ -22,7 +22,7 @@ def test_times_are_in_ship_lengths_unless_they_are_given() -> None:
 
 
 def test_rows_are_whole() -> None:
-    assert [in_rows(time, ASKED.interval) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
+    assert [round_to_rows(time, ASKED.interval) for time in (1.0, 1.1, 1.5)] == [1.0, 1.5, 1.5]
 
 
 def test_a_turn_settles_in_time_constants_of_the_ship_within_limits() -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from shipid.errors import DocumentError
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
-from shipid.simulation.scripted import simulated
-from shipid.simulation.truth import Truth, simulate
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.scripted import simulate_script
+from shipid.simulation.truth import Truth, simulate_truth
 from shipid.vessel.load import load_vessel
 
 SHIP = load_vessel("mariner")
@@ -43,8 +43,8 @@ def test_given_manoeuvres_are_performed_as_in_python(tmp_path: Path) -> None:
         Zigzag(name="zz", n_rpm=80, angle_deg=10, execute_heading_deg=5, duration=60),
         Zigzag(n_rpm=80, angle_deg=20, execute_heading_deg=10, duration=40),
     ]
-    frame = simulated(SHIP, written(tmp_path, GIVEN))
-    wanted = perform(SHIP, runs, step=0.5, interval=1.0)
+    frame = simulate_script(SHIP, written(tmp_path, GIVEN))
+    wanted = perform_manoeuvres(SHIP, runs, step=0.5, interval=1.0)
     pd.testing.assert_frame_equal(frame, wanted[list(frame)])
     assert list(frame["run"].unique()) == ["zz", "M002"]
     assert not [name for name in frame if str(name).startswith("actual.")]
@@ -52,7 +52,7 @@ def test_given_manoeuvres_are_performed_as_in_python(tmp_path: Path) -> None:
 
 def test_a_vessel_that_cannot_perform_a_manoeuvre_is_not_a_key_of_the_document(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="no angle command turns") as caught:
-        simulated(load_vessel("otter"), written(tmp_path, GIVEN))
+        simulate_script(load_vessel("otter"), written(tmp_path, GIVEN))
     assert caught.value.path == "manoeuvre.0"
 
 
@@ -72,10 +72,10 @@ start_speed = [4.0, 6.0]
 
 def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
     """The vessel that it names, and what it sets of it, are left out."""
-    frame = simulated(SHIP, written(tmp_path, DRAWN))
+    frame = simulate_script(SHIP, written(tmp_path, DRAWN))
     block = {"n_rpm": [60.0, 80.0], "delta_deg": [-20.0, 20.0], "start_speed": [4.0, 6.0]}
     truth = Truth(vessel="mariner", manoeuvres=2, duration=20.0, step=0.5, manoeuvre=[block])  # type: ignore[list-item]
-    pd.testing.assert_frame_equal(frame, simulate(truth, SHIP))
+    pd.testing.assert_frame_equal(frame, simulate_truth(truth, SHIP))
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, message: str, tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=message) as caught:
-        simulated(SHIP, written(tmp_path, text))
+        simulate_script(SHIP, written(tmp_path, text))
     assert caught.value.path == path
     assert str(caught.value).startswith(str(tmp_path / "runs.toml"))
     assert "\n" not in str(caught.value)

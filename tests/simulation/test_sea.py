@@ -12,14 +12,14 @@ from shipid.errors import DocumentError
 from shipid.simulation.sea import (
     Sea,
     draw_components,
-    fourier,
-    interpolate,
-    jonswap,
+    heading_series,
+    interpolate_lagrange,
+    jonswap_spectrum,
     spread_angles,
     wave_loads,
 )
 from shipid.units import GRAVITY
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.drawn import seeds
 from tests.simulation.linear import MIRROR, all_round, heading_weights, lagrange, linear
@@ -37,7 +37,7 @@ def draw(sea: Sea = SEA, direction: float = 0.7, count: int = 3) -> dict[str, np
 def test_spectrum_has_its_height_and_its_peak(H_s: float, T_p: float, gamma: float) -> None:
     sea, peak = Sea(H_s=H_s, T_p=T_p, gamma=gamma), 2 * np.pi / T_p
     omega = np.linspace(0.3 * peak, 15 * peak, 60001)
-    S = jonswap(omega, sea)
+    S = jonswap_spectrum(omega, sea)
     assert np.trapezoid(S, omega) == pytest.approx(H_s**2 / 16, rel=2e-3)
     assert omega[S.argmax()] == pytest.approx(peak, rel=1e-3)
 
@@ -88,7 +88,7 @@ def test_fourier_series_pass_through_the_table() -> None:
     columns = {name: np.array(values) for name, values in SHIP.document["waves"]["first_order"]["table"].items()}
     for axis, side in (("Z", 1), ("K", -1)):
         values = columns[f"{axis}_real"] + 1j * columns[f"{axis}_imag"]
-        series = fourier(columns, values, side, 12)
+        series = heading_series(columns, values, side, 12)
         beta, m = np.radians(columns["beta_deg"]), np.arange(13)
         rows = np.searchsorted(np.unique(columns["omega"]), columns["omega"])
         for sign in (1, -1):
@@ -96,20 +96,24 @@ def test_fourier_series_pass_through_the_table() -> None:
             summed, expected = (series[rows] * basis).sum(axis=1), values if side > 0 else sign * values
             # a sine series is zero at 0 and 180 deg, where the table holds rounding of the mesh
             np.testing.assert_allclose(summed, expected, rtol=0, atol=1e-3 * np.abs(values).max())
-        np.testing.assert_array_equal(fourier(columns, values, side, 6), series[:, :7])
+        np.testing.assert_array_equal(heading_series(columns, values, side, 6), series[:, :7])
 
 
 def test_interpolation_is_exact_for_cubics_and_ends_with_the_table() -> None:
     grid = np.array([0.3, 0.4, 0.6, 0.7, 1.0, 1.4])
     cubic = np.polynomial.Polynomial([1.0, -2.0, 0.5, 3.0])
     inside = np.linspace(0.3, 1.4, 23)
-    np.testing.assert_allclose(interpolate(inside, grid, cubic(grid)[:, None])[:, 0], cubic(inside), rtol=1e-10)
-    np.testing.assert_allclose(interpolate(np.array([0.1, 1.5]), grid, cubic(grid)[:, None])[:, 0], [cubic(0.3), 0])
+    np.testing.assert_allclose(
+        interpolate_lagrange(inside, grid, cubic(grid)[:, None])[:, 0], cubic(inside), rtol=1e-10
+    )
+    np.testing.assert_allclose(
+        interpolate_lagrange(np.array([0.1, 1.5]), grid, cubic(grid)[:, None])[:, 0], [cubic(0.3), 0]
+    )
 
 
 def simulated_loads(vessel: Vessel, drawn: dict[str, np.ndarray], t: float, pose: np.ndarray) -> dict[str, np.ndarray]:
     """Wrench (6) of each wave term of sample 0, by the functions that every engine runs."""
-    model, loads = dynamics(vessel), wave_loads(vessel, drawn)
+    model, loads = vessel_dynamics(vessel), wave_loads(vessel, drawn)
     state = dict.fromkeys((*model.state, *model.hidden), 0.0)
     state |= dict(zip(("north", "east", "psi"), pose, strict=True)) | {"waves.first_order.t": t}
     rest = [0.0] * len(model.memory), [0.0] * len(model.commands), [0.0] * len(model.environment)

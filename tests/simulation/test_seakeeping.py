@@ -11,13 +11,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.engine.native import compiler
+from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Trajectories, rollout
-from shipid.physics.frames import skew
+from shipid.physics.frames import skew_matrix
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.simulation.truth import Truth, simulate
+from shipid.simulation.truth import Truth, simulate_truth
 from shipid.units import GRAVITY
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, linear
 
@@ -28,7 +28,7 @@ OFF = {f"thruster.{side}.off": True for side in ("port", "starboard")}
 HELD: dict[str, object] = {"added_mass.X_udot": -1e12, "added_mass.Y_vdot": -1e12, "added_mass.N_rdot": -1e14}
 HELD["unusual"] = ["added_mass.*"]
 LOW = Sea(H_s=0.1, T_p=5.0)  # linear: heading and path of a ship that no course keeper holds stay as they were
-ENGINE = "auto" if compiler() is None else "native"
+ENGINE = "auto" if find_compiler() is None else "native"
 
 #: BEM data base, uncoupled about the centre of gravity: natural periods [s] of heave, pitch, roll
 PERIODS = {HULLS[0]: {HEAVE: 4.12, PITCH: 4.03, ROLL: 5.57}, HULLS[1]: {HEAVE: 4.29, PITCH: 4.19, ROLL: 5.46}}
@@ -61,7 +61,7 @@ def run(
     **more: Any,
 ) -> Trajectories:
     """RK4 from `start`, zero where it says nothing; constant orders, no wind."""
-    model, count = dynamics(vessel), len(next(iter(start.values())))
+    model, count = vessel_dynamics(vessel), len(next(iter(start.values())))
     zero, given = np.zeros(count), orders or {}
     return rollout(
         vessel,
@@ -102,7 +102,7 @@ class Linearised:
 
 def linearised(vessel: Vessel, steady: Mapping[str, float] | None = None, n: float = 0.0) -> Linearised:
     """At a state, heading north, with a shaft speed [rev/s] that is reached."""
-    model, steady = dynamics(vessel), steady or {}
+    model, steady = vessel_dynamics(vessel), steady or {}
     names = (*model.state, *model.hidden)
     x, tau = ca.SX.sym("x", len(names)), ca.SX.sym("tau", 6)
     levels = [[n if key.endswith(".n") else 0.0 for key in keys] for keys in (model.memory, model.commands)]
@@ -139,7 +139,7 @@ def first_order(vessel: Vessel, drawn: Mapping[str, np.ndarray]) -> dict[str, np
 def about_centre_of_gravity(name: str, matrix: np.ndarray) -> np.ndarray:
     """A matrix about the origin moved to the centre of gravity: nu_CG = H nu_O, H = [[I, -S(r)], [0, I]]."""
     H = np.eye(6)
-    H[:3, 3:] = -np.array(ca.evalf(ca.densify(skew(ca.SX([0, 0, Z_G[name]])))))
+    H[:3, 3:] = -np.array(ca.evalf(ca.densify(skew_matrix(ca.SX([0, 0, Z_G[name]])))))
     back = np.linalg.inv(H)
     return np.asarray(back.T @ matrix @ back)
 
@@ -298,7 +298,7 @@ def test_calm_water_is_the_manoeuvring_model(name: str) -> None:
     lags = {f"thruster.{side}.actuator": ship_.document["thruster"][side]["actuator"] for side in ("port", "starboard")}
     flat = load_vessel(name.removesuffix("-6dof")).with_values(lags)
     for orders in ({}, {"manoeuvres": 2, "n_rpm": (140.0, 140.0), "alpha_deg": (30.0, 30.0)}):
-        six, three = simulate(calm(name, **orders), ship_), simulate(calm(name, **orders), flat)
+        six, three = simulate_truth(calm(name, **orders), ship_), simulate_truth(calm(name, **orders), flat)
         for column, limit in (("u", 0.02), ("v", 0.02), ("r", np.radians(0.05))):
             error = (six[column] - three[column]) ** 2
             assert np.sqrt(error.groupby(six["run"]).mean()).max() < limit, column

@@ -12,8 +12,8 @@ from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
-from shipid.simulation.standard import shaft_speed, standard
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.standard import define_standard, shaft_speed
 from shipid.vessel.load import load_vessel
 from tests.measures.test_laws import SIGNED, TOLERANCE
 
@@ -21,15 +21,15 @@ SHIP = load_vessel("gunnerus-28.9")
 
 
 def measured(name: str, *angles: float, **how: object) -> Measures:
-    chosen = standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
-    log = perform(SHIP, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
+    chosen = define_standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
+    log = perform_manoeuvres(SHIP, [chosen.manoeuvre], step=chosen.step, interval=chosen.interval)
     return chosen.manoeuvre.measures(record_of({str(key): log[key].to_numpy() for key in log if key != "run"}))
 
 
 @pytest.mark.parametrize("speed", [1.5, 3.0, 5.0])
 def test_shaft_speed_gives_the_speed(speed: float) -> None:
     n_rpm = 60 * shaft_speed(Controls(SHIP), speed)
-    path = perform(SHIP, [Zigzag(n_rpm=n_rpm, duration=1.0)], step=0.1)
+    path = perform_manoeuvres(SHIP, [Zigzag(n_rpm=n_rpm, duration=1.0)], step=0.1)
     assert path["u"].iloc[0] == pytest.approx(speed, abs=0.02)  # an approach ends where it changes by 1 mm/s in 30 s
 
 
@@ -42,14 +42,14 @@ def test_a_pull_out_begins_at_the_rate_of_the_steady_turn(speed: float) -> None:
 
 def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
     with pytest.raises(ShipidError, match=r"--speed: no shaft speed drives .* at 100 m/s: give a lower speed"):
-        standard(SHIP.with_values({"hull.derivatives.X_uu": -1e9}), "turning", speed=100.0)
+        define_standard(SHIP.with_values({"hull.derivatives.X_uu": -1e9}), "turning", speed=100.0)
 
 
 def test_a_ship_that_nothing_drives_is_told_so() -> None:
     """A lower speed is no help to a barge."""
     barge = SHIP.with_values({"thruster.port.off": True, "thruster.starboard.off": True})
     with pytest.raises(DocumentError, match=r"thruster: no command drives .* ahead: a manoeuvre needs a shaft speed"):
-        standard(barge, "stop")
+        define_standard(barge, "stop")
 
 
 def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
@@ -58,8 +58,8 @@ def test_thrust_about_a_service_speed_says_nothing_of_a_stop() -> None:
     with pytest.raises(
         ShipidError, match=r"thruster\.propeller: Mariner .* cannot stop: .* near her service speed alone"
     ):
-        standard(mariner, "stop")
-    assert standard(mariner, "turning").speed == pytest.approx(7.7175)
+        define_standard(mariner, "stop")
+    assert define_standard(mariner, "turning").speed == pytest.approx(7.7175)
 
 
 @pytest.mark.parametrize(
@@ -104,4 +104,4 @@ def test_what_cannot_be_done_is_refused(
     name: str, angles: tuple[float, ...], how: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ShipidError, match=f"^{re.escape(message)}"):
-        standard(SHIP, name, angles, **how)  # type: ignore[arg-type]
+        define_standard(SHIP, name, angles, **how)  # type: ignore[arg-type]

@@ -12,8 +12,8 @@ from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
 from shipid.simulation.sea import Sea, draw_components, wave_loads
-from shipid.simulation.truth import Truth, check_truth, simulate
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.truth import Truth, check_truth, simulate_truth
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED
 
@@ -42,7 +42,7 @@ def planar_rates(run: pd.DataFrame) -> dict[str, np.ndarray]:
 
 
 def test_more_manoeuvres_change_none_that_exist() -> None:
-    few, many = simulate(truth(), SHIP), simulate(truth(manoeuvres=12), SHIP)
+    few, many = simulate_truth(truth(), SHIP), simulate_truth(truth(manoeuvres=12), SHIP)
     assert many["run"].nunique() == 12
     pd.testing.assert_frame_equal(many.iloc[: len(few)], few)
 
@@ -50,7 +50,7 @@ def test_more_manoeuvres_change_none_that_exist() -> None:
 def test_draws_fill_their_ranges() -> None:
     """400 draws: inside, uniform (mean within 5 standard errors), and close to both ends."""
     count = 400
-    rows = first_rows(simulate(truth(manoeuvres=count, duration=1.0, step=1.0, start_speed=(0.5, 2.5)), SHIP))
+    rows = first_rows(simulate_truth(truth(manoeuvres=count, duration=1.0, step=1.0, start_speed=(0.5, 2.5)), SHIP))
     ranges = {
         "port.n": (50 / 60, 200 / 60),
         "port.alpha": (-50 * np.pi / 180, 50 * np.pi / 180),
@@ -71,7 +71,7 @@ def test_draws_fill_their_ranges() -> None:
 
 def test_log_obeys_kinematics() -> None:
     """Positions are the integral of the logged velocities: trapezoid on a fine log."""
-    frame = simulate(truth(interval=0.1, duration=8.0, start_speed=(1.0, 3.0)), SHIP)
+    frame = simulate_truth(truth(interval=0.1, duration=8.0, start_speed=(1.0, 3.0)), SHIP)
     for _, run in frame.groupby("run"):
         t = run["t"].to_numpy()
         for name, rate in planar_rates(run).items():
@@ -83,7 +83,7 @@ def test_log_obeys_kinematics() -> None:
 def test_every_structure_logs_a_dataset(name: str) -> None:
     """What is not measured on board (current) is not logged; heave has the name that datasets give it."""
     base, values = PATCHED[name]
-    frame = simulate(truth(manoeuvres=2, duration=2.0), load_vessel(base).with_values(values))
+    frame = simulate_truth(truth(manoeuvres=2, duration=2.0), load_vessel(base).with_values(values))
     columns = Dataset(frame, {"clock": "run", "flags": []}).frame.columns
     assert "V_c" not in columns
     assert ("z" in columns) == (name == "six")
@@ -92,7 +92,7 @@ def test_every_structure_logs_a_dataset(name: str) -> None:
 def test_diverging_truth_is_reported() -> None:
     wild = SHIP.with_values({"hull.derivatives.X_u|u|": 1e7})
     with pytest.raises(DocumentError, match=r"diverges in M00\d: take a smaller step") as caught:
-        simulate(truth(start_speed=(2.0, 3.0)), wild)
+        simulate_truth(truth(start_speed=(2.0, 3.0)), wild)
     assert caught.value.path == "truth"
 
 
@@ -119,12 +119,12 @@ SEA = {"H_s": 1.0, "T_p": 5.0, "components": 20}
 
 def test_waves_move_the_ship_and_differ_by_run() -> None:
     """A sea heaves and rolls her; calm water does not; another manoeuvre has another sea."""
-    calm, rough = simulate(truth(duration=20.0), SIX), simulate(truth(duration=20.0, waves=SEA), SIX)
+    calm, rough = simulate_truth(truth(duration=20.0), SIX), simulate_truth(truth(duration=20.0, waves=SEA), SIX)
     late = calm["t"] > 5.0
     assert calm.loc[late, "z"].abs().max() < 0.1 < rough.loc[late, "z"].std()
     heave = rough.pivot(index="t", columns="run", values="z").to_numpy()
     assert np.abs(np.corrcoef(heave.T) - np.eye(6)).max() < 0.9
-    flat = simulate(truth(duration=20.0, waves={**SEA, "H_s": 0.0}), SIX)
+    flat = simulate_truth(truth(duration=20.0, waves={**SEA, "H_s": 0.0}), SIX)
     pd.testing.assert_frame_equal(flat, calm, rtol=1e-9, atol=1e-9)
 
 
@@ -137,7 +137,7 @@ def test_waves_move_the_ship_and_differ_by_run() -> None:
 )
 def test_what_a_vessel_cannot_feel_is_refused(changes: dict[str, Any], path: str, message: str) -> None:
     with pytest.raises(DocumentError) as caught:
-        simulate(truth(**changes), SHIP)
+        simulate_truth(truth(**changes), SHIP)
     assert (caught.value.path, message in str(caught.value)) == (path, True)
 
 
@@ -158,10 +158,10 @@ def test_a_current_carries_ship_and_sea_along() -> None:
     ship = SIX.with_values({"current.kind": "uniform", "wind.off": True})
     zero, psi, V_c, beta_c = np.zeros(2), np.array([0.4, 0.4]), np.array([0.0, 1.5]), np.array([0.0, 2.2])
     loads = wave_loads(ship, draw_components(Sea(**SEA), np.array([1.0, 1.0]), ["same", "same"]))
-    start = dict.fromkeys(dynamics(ship).state, zero) | {"psi": psi, "down": zero + 0.2, "theta": zero + 0.05}
+    start = dict.fromkeys(vessel_dynamics(ship).state, zero) | {"psi": psi, "down": zero + 0.2, "theta": zero + 0.05}
     start |= {"u": 3.0 + V_c * np.cos(beta_c - psi) * np.cos(0.05), "v": V_c * np.sin(beta_c - psi)}
     start |= {"w": V_c * np.cos(beta_c - psi) * np.sin(0.05)}
-    orders = {name: zero + (2.0 if name.endswith("n") else 0.3) for name in dynamics(ship).commands}
+    orders = {name: zero + (2.0 if name.endswith("n") else 0.3) for name in vessel_dynamics(ship).commands}
     path = rollout(
         ship,
         start,
@@ -181,15 +181,15 @@ def test_a_current_carries_ship_and_sea_along() -> None:
 
 def test_a_sensor_of_an_output_logs_it() -> None:
     """With a noisy sensor the log has the thrust of one unit, true but for the noise; without one it has none."""
-    assert not [name for name in simulate(truth(duration=10.0), SHIP) if str(name).endswith(".thrust")]
+    assert not [name for name in simulate_truth(truth(duration=10.0), SHIP) if str(name).endswith(".thrust")]
     exact, noisy = (
-        simulate(truth(duration=10.0, sensors={"port.thrust": {"noise": noise}}), SHIP)["port.thrust"]
+        simulate_truth(truth(duration=10.0, sensors={"port.thrust": {"noise": noise}}), SHIP)["port.thrust"]
         for noise in (0.0, 50.0)
     )
     assert exact.abs().max() > 1000
     assert 20 < np.std(noisy - exact) < 80
     with pytest.raises(DocumentError, match=r"truth.sensors.port.torque: no logged column"):
-        simulate(truth(duration=10.0, sensors={"port.torque": {}}), SHIP)
+        simulate_truth(truth(duration=10.0, sensors={"port.torque": {}}), SHIP)
 
 
 @pytest.mark.parametrize(
@@ -202,4 +202,4 @@ def test_a_sensor_of_an_output_logs_it() -> None:
 def test_a_wrong_value_of_the_block_has_its_path(wrong: dict[str, float], message: str) -> None:
     """Before, it had the path in the vessel, or none."""
     with pytest.raises(DocumentError, match=message):
-        simulate(truth(set=wrong), SHIP)
+        simulate_truth(truth(set=wrong), SHIP)

@@ -20,7 +20,7 @@ from shipid.predictor import Predictor, fit
 from shipid.study import aboard
 from shipid.study.aboard import Played, play, summed_up, write
 from shipid.study.apply import table_of_stretch
-from shipid.units import percent
+from shipid.units import percent_text
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
 from tests.logs.conftest import as_dataset, turning
@@ -149,7 +149,7 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
         held.append(reach <= 1)
     (line,) = (line for line in summary(played) if line.startswith("band of 90 %"))
     assert [one.text for one in summed_up(played) if one.kind == "band"] == [line]
-    assert f"held {percent(np.mean(held))} of the {len(held)} whole paths" in line
+    assert f"held {percent_text(np.mean(held))} of the {len(held)} whole paths" in line
     write(played, tmp_path / "seen.csv")
     assert {"band_along", "band_across", "band_course", "band_factor"} <= set(
         pd.read_csv(tmp_path / "seen.csv").columns
@@ -213,7 +213,7 @@ def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
     assert first.instants["factor"].iloc[:4].eq(1).all()  # no path has ended yet
     for played in (first, second):
         held = (played.instants["reach"] <= played.instants["factor"])[played.instants["reach"].notna()].mean()
-        assert any(f"adapting at 0.3: it held {percent(held)}" in line for line in summary(played))
+        assert any(f"adapting at 0.3: it held {percent_text(held)}" in line for line in summary(played))
         assert any("times the calibrated one" in line for line in summary(played))
 
 

@@ -16,10 +16,10 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.physics import Physics
-from shipid.metrics import position_error, summary
+from shipid.metrics import position_error, summarise_errors
 from shipid.predictor import Predictor
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.study import store
 from shipid.study.apply import predict_log
 from shipid.study.plan import Plan
@@ -60,7 +60,7 @@ def test_orders_that_change_within_a_step_count_for_the_rest_of_it() -> None:
     """Gunnerus, rows of 0.1 s, steps of 1 s: held from the start of their step, such orders tripled the error."""
     ship = load_vessel("gunnerus-28.9")
     kinds = [Zigzag(n_rpm=145, angle_deg=angle, duration=100, execute_at=20.43) for angle in (10, 20)]
-    frame = perform(ship, kinds, step=0.05, interval=0.1).astype({"run": "str"})
+    frame = perform_manoeuvres(ship, kinds, step=0.05, interval=0.1).astype({"run": "str"})
     frame = frame[[name for name in frame if not str(name).startswith("actual.")]]
     windows = cut_windows(Dataset(frame, {"clock": "run", "flags": []}), horizon=30, step=1.0, interval=3.7)
     physics, held = Physics(ship, 30, 1.0, "rk4"), {}
@@ -96,7 +96,7 @@ def test_a_stored_predictor_takes_the_plan(tmp_path: Path, recorded: Callable[..
         predictor = Predictor.load(store.cell_file(tmp_path / "run", str(row.cell)))
         assert predictor.commands == "known"
         paths = predictor.predict(test.instants(known=True))
-        assert summary(position_error(paths, test.future))["mean"] == pytest.approx(row.H, rel=1e-9)
+        assert summarise_errors(position_error(paths, test.future))["mean"] == pytest.approx(row.H, rel=1e-9)
         with pytest.raises(DataError, match="made for known commands"):
             predictor.predict(test.instants())
     pure = Predictor.load(store.cell_file(tmp_path / "run", str(rows[rows["foundation"] == "none"]["cell"].iloc[0])))

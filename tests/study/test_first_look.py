@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.simulation.manoeuvre import Steps, TurningCircle, Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.manoeuvre import StepManoeuvre, TurningCircle, Zigzag
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.study.first_look import Look, first_look
 from shipid.vessel.load import Vessel, load_vessel
 
@@ -15,8 +15,8 @@ SHIP, RPM = "kvlcc2-l7", 627.0
 D_P = "thruster.propeller.D_p"
 
 
-def logged(vessel: Vessel, kinds: list[Zigzag | TurningCircle | Steps], interval: float) -> Dataset:
-    frame = perform(vessel, kinds, step=0.1, interval=interval)
+def logged(vessel: Vessel, kinds: list[Zigzag | TurningCircle | StepManoeuvre], interval: float) -> Dataset:
+    frame = perform_manoeuvres(vessel, kinds, step=0.1, interval=interval)
     kept = [name for name in frame if not str(name).startswith("actual.")]
     return Dataset(frame[kept].astype({"run": "str"}), {"clock": "run", "flags": []})
 
@@ -82,7 +82,9 @@ def test_a_wrong_sign_is_wrong_where_constant_motion_is_worse() -> None:
 def test_swapped_sides_of_a_craft_that_steers_by_them_are_reported() -> None:
     craft = load_vessel("otter")
     orders = {"port.n_rpm": (300.0, 900.0), "starboard.n_rpm": (300.0, 900.0)}
-    right = logged(craft, [Steps(name=f"s{seed}", duration=90.0, orders=orders, seed=seed) for seed in (1, 2)], 0.5)
+    right = logged(
+        craft, [StepManoeuvre(name=f"s{seed}", duration=90.0, orders=orders, seed=seed) for seed in (1, 2)], 0.5
+    )
     swapped = Dataset(right.frame.rename(columns={"port.n": "starboard.n", "starboard.n": "port.n"}), right.metadata)
     views = [first_look(craft, one, one.runs, ahead=5.0, step=0.5) for one in (right, swapped)]
     assert [view.turning < 0 for view in views] == [False, True]

@@ -35,7 +35,7 @@ from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
 from shipid.study.survey import separation, survey
 from shipid.vessel.load import load_vessel
-from shipid.vessel.perturb import Family, members, resolve
+from shipid.vessel.perturb import Family, draw_members, resolve_families
 from shipid.vessel.template import Particulars, first_guess
 from tests.study.tiny import logged
 
@@ -252,8 +252,8 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
 def test_every_coefficient_of_the_hull_is_degraded_families(name: str) -> None:
     """Also the drag of a cross-flow and the resistance: with linear damping alone a model is nearly the ship."""
     vessel = load_vessel(name)
-    family = resolve([Family(**one) for one in _degraded_families(name, vessel)])[1]
-    changed = members(family, vessel)[0].values
+    family = resolve_families([Family(**one) for one in _degraded_families(name, vessel)])[1]
+    changed = draw_members(family, vessel)[0].values
     geometry = ("x_aft", "x_fwd", "T", "rho")
     assert set(changed) == {p for p in vessel.parameters if p.startswith("hull.") and not p.endswith(geometry)}
 

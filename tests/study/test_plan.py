@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from shipid.document import bundled, bundled_folder
+from shipid.document import bundled_documents, bundled_documents_folder
 from shipid.errors import DocumentError
 from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
@@ -70,7 +70,7 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
 def test_every_bundled_study_is_tested() -> None:
     worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "calm", "zigzags"}
     of_methods = {"methods", "methods-full-scale", "paper-recipe", "paper-small"}
-    assert set(bundled("studies")) == {"quick", "full-scale", *worlds, *of_methods}
+    assert set(bundled_documents("studies")) == {"quick", "full-scale", *worlds, *of_methods}
 
 
 @pytest.mark.parametrize("name", ["quick", "full-scale", "zigzags", "constant-orders", "changing-orders"])
@@ -340,7 +340,7 @@ def test_digest_follows_the_document(tmp_path: Path) -> None:
 def test_digest_follows_every_vessel(tmp_path: Path, role: str) -> None:
     """Not only models, the vessel behind the truth too changes what comes out."""
     document = tmp_path / "own.toml"
-    original = (bundled_folder("models") / "gunnerus-28.9.toml").read_text()
+    original = (bundled_documents_folder("models") / "gunnerus-28.9.toml").read_text()
     document.write_text(original)
     change = {"truth.vessel": "./own.toml"} if role == "truth" else {"family.0.base": "./own.toml"}
     before = tiny_plan(tmp_path, change).digest
@@ -429,7 +429,7 @@ def test_the_judged_method_is_the_first_that_learns_beside_physics(tmp_path: Pat
 
 def test_a_digest_says_what_is_in_every_file_that_a_study_reads(tmp_path: Path) -> None:
     """Each part's digest those of its files, the whole one those of all: results are never taken for another log's."""
-    vessel = Path(bundled("models")["gunnerus-28.9"]).read_text()
+    vessel = Path(bundled_documents("models")["gunnerus-28.9"]).read_text()
     files = {f"{name}.parquet": name for name in ("first", "second")} | {f"{name}.toml": vessel for name in ("p", "q")}
     document = {
         "question": "What of it?",

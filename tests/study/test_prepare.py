@@ -17,7 +17,7 @@ import tomlkit
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.engine.rollout import rollout
-from shipid.errors import DataError, Diverges, DocumentError
+from shipid.errors import DataError, DivergenceError, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor, limits_of
@@ -38,7 +38,7 @@ from shipid.study.prepare import (
 )
 from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import draw, resolve
+from shipid.vessel.perturb import draw_variant, resolve_families
 from tests.study.test_commands import weaving
 from tests.study.tiny import logged, tiny_plan
 
@@ -187,12 +187,12 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatc
     family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
     plan = tiny_plan(tmp_path, {"family": [family]})
     prepared = prepare(plan, obtain(plan))
-    rule = resolve(plan.study.family)[0]
+    rule = resolve_families(plan.study.family)[0]
     redrawn = 0
     for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
         assert model.variant is not None
         counter = model.variant.counter
-        assert model.variant == draw(rule, model.member, SHIP, counter)
+        assert model.variant == draw_variant(rule, model.member, SHIP, counter)
         assert sum(model.name in note for note in prepared.notes) == counter
         redrawn += counter > 0
         if counter == 0:
@@ -211,7 +211,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.Mo
         family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
         family["perturb"][0]["factor"] = factor  # type: ignore[index]
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
-        with pytest.raises(Diverges, match=message) as caught:
+        with pytest.raises(DivergenceError, match=message) as caught:
             prepare(plan, obtain(plan))
         assert caught.value.path == "family.lost"
 

@@ -11,7 +11,7 @@ import pytest
 from shipid import capacity
 from shipid import document as documents
 from shipid.data.windows import cut_windows
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.errors import DocumentError
 from shipid.study.plan import read_plan
 from shipid.study.ranges import window_numbers
@@ -34,7 +34,7 @@ NONSENSE: dict[str, Any] = {
 def test_nonsense_is_refused_with_the_range_and_the_word(path: str, tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"expected .* if it is meant, write unusual") as caught:
         tiny_plan(tmp_path, {path: NONSENSE[path]})
-    assert str(caught.value.path).startswith(documents.by_name(tiny_plan(tmp_path).document, path))
+    assert str(caught.value.path).startswith(documents.path_with_names(tiny_plan(tmp_path).document, path))
 
 
 def test_what_is_meant_is_taken(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_what_is_meant_is_taken(tmp_path: Path) -> None:
     assert plan.study.unusual == ["truth.wind_speed.*"]
 
 
-@pytest.mark.parametrize("name", list(bundled("studies")))
+@pytest.mark.parametrize("name", list(bundled_documents("studies")))
 def test_bundled_studies_are_usual(name: str) -> None:
     assert not read_plan(name).study.unusual
 
@@ -70,7 +70,7 @@ def test_memory_that_cannot_be_had_is_refused_with_its_cause(
     path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     changes, most = LONG[path]
-    monkeypatch.setattr(capacity, "memory", lambda: most)
+    monkeypatch.setattr(capacity, "usable_memory", lambda: most)
     with pytest.raises(DocumentError, match="GiB of memory, and there are") as caught:
         tiny_plan(tmp_path, changes)
     assert caught.value.path == path

@@ -26,7 +26,7 @@ from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.trials import row_of
-from shipid.metrics import position_error, summary
+from shipid.metrics import position_error, summarise_errors
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
 from shipid.study import cells, run, seals, sessions, store
@@ -113,13 +113,13 @@ def test_an_engine_that_is_given_up_is_noted_before_anything_of_another_is_store
 ) -> None:
     """A compiler that passed its probe and failed on a model: the numbers of two engines were mixed without a word."""
     monkeypatch.setattr(native, "_refused", [])
-    if native.compiler() is None:
+    if native.find_compiler() is None:
         pytest.skip("no compiler")
     plan, folder, stored = tiny_plan(tmp_path), tmp_path / "run", dict[str, str]()
     work, write_seal = getattr(run, step), seals.write_seal
 
     def refused(*given: Any, **named: Any) -> Any:
-        native.refuse("the C compiler failed (Killed)")
+        native.refuse_compiling("the C compiler failed (Killed)")
         return work(*given, **named)
 
     def noted(place: Path, name: str, files: Any) -> None:
@@ -147,9 +147,9 @@ def test_an_engine_that_a_worker_of_a_cluster_gives_up_is_noted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(native, "_refused", [])
-    if native.compiler() is None:
+    if native.find_compiler() is None:
         pytest.skip("no compiler")
-    monkeypatch.setattr(run, "run_unit", lambda *_: native.refuse("the C compiler failed (Killed)"))
+    monkeypatch.setattr(run, "run_unit", lambda *_: native.refuse_compiling("the C compiler failed (Killed)"))
     plan = tiny_plan(tmp_path)
     noted, _ = run._on_cluster((plan, None, "cpu", {}), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
     assert [session["engine"].partition(",")[0] for session in noted] == ["native", "casadi"]
@@ -301,11 +301,11 @@ def test_H_is_what_the_stored_predictor_does_on_the_test_windows(tmp_path: Path,
     for row in rows.itertuples():
         predictor = Predictor.load(store.cell_file(tiny_run, str(row.cell)))
         paths = predictor.predict(prepared.test.instants())
-        error = summary(position_error(paths, prepared.test.future))
+        error = summarise_errors(position_error(paths, prepared.test.future))
         assert error["mean"] == pytest.approx(row.H, rel=1e-9)
         assert error["p90"] == pytest.approx(row.H_90, rel=1e-9)
         assert error["rms"] == pytest.approx(row.rms, rel=1e-9)
-        alone = summary(position_error(predictor.alone(prepared.test.instants()), prepared.test.future))
+        alone = summarise_errors(position_error(predictor.alone(prepared.test.instants()), prepared.test.future))
         assert np.isnan(row.A) if row.foundation == "none" else alone["mean"] == pytest.approx(row.A, rel=1e-9)
         assert set(predictor.provenance["runs"]) == set(prepared.runs(_batch(tmp_path, row.N_D)))
         assert not set(predictor.provenance["runs"]) & set(prepared.test.spans)
@@ -334,7 +334,7 @@ def test_a_folder_can_be_copied_and_read_elsewhere(tmp_path: Path, tiny_run: Pat
     here, there = read_results(tmp_path / "copy"), read_results(tiny_run)
     assert here.paths.keys() == there.paths.keys()
     for cell, path in here.paths.items():
-        error = summary(position_error(path, here.test.future))
+        error = summarise_errors(position_error(path, here.test.future))
         assert error["mean"] == pytest.approx(there.cells.set_index("cell").loc[cell, "H"], rel=1e-9)
 
 

@@ -16,12 +16,12 @@ from shipid.engine import engines, native
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.files import write_table
 from shipid.hybrid.physics import Physics
-from shipid.metrics import position_error, summary
+from shipid.metrics import position_error, summarise_errors
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain, partition, prepare, window_memory
 from shipid.study.screen import drivers, families, joined, notes, screen, spread
-from shipid.vessel.perturb import Family, members
+from shipid.vessel.perturb import Family, draw_members
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
@@ -40,13 +40,13 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
     (family,), base = families(plan, "wrong"), plan.vessels["gunnerus-28.9"]
     dataset = obtain(plan)
     rows = []
-    for variant in members(family.model_copy(update={"members": count}), base):
+    for variant in draw_members(family.model_copy(update={"members": count}), base):
         vessel, errors = base.with_values(variant.values), []
         for windows in partition(plan, dataset)[:2]:
             hidden = window_memory(vessel, dataset, windows)
             paths = Physics(vessel, windows.horizon, 1.0).paths(windows.instants(hidden=hidden))
             errors.append(position_error(paths, windows.future))
-        whole = summary(np.concatenate(errors, axis=1))
+        whole = summarise_errors(np.concatenate(errors, axis=1))
         rows.append({"member": variant.name, "factors": variant.factors, **whole})
     return rows
 
@@ -65,7 +65,7 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
         assert row["factors"] == {path: screened_row[path] for path in row["factors"]}
 
 
-@pytest.mark.skipif(native.compiler() is None, reason="no C compiler on this machine")
+@pytest.mark.skipif(native.find_compiler() is None, reason="no C compiler on this machine")
 def test_single_precision_gives_six_digits(plan: Plan) -> None:
     double, single = (
         joined(list(screen(plan, obtain(plan), families(plan, "wrong"), 5, engine=engine)))

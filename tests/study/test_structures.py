@@ -19,7 +19,7 @@ from shipid.identification.solve import Solution, identify
 from shipid.identification.structures import exchange
 from shipid.report.structures import write_structures
 from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform
+from shipid.simulation.perform import perform_manoeuvres
 from shipid.study.structures import (
     ERRORS_OF,
     SHOWN,
@@ -61,7 +61,7 @@ def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
         )
         for a, b, n, side in TRIALS
     ]  # type: ignore[arg-type]
-    frame = perform(vessel, runs, step=0.1, interval=0.5)
+    frame = perform_manoeuvres(vessel, runs, step=0.1, interval=0.5)
     rng = np.random.default_rng(seed)
     for name, deviation in NOISE.items():
         frame[name] += rng.normal(0, deviation, len(frame))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.errors import DocumentError
 from shipid.vessel.load import load_vessel
 
@@ -151,7 +151,9 @@ def test_table_that_is_switched_off_is_read_all_the_same(tmp_path: Path) -> None
 def test_a_path_is_a_path_whatever_its_type(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A `Path` never is the name of a bundled vessel; a text that is neither is refused in words."""
     monkeypatch.chdir(tmp_path)
-    Path("ship.toml").write_bytes(b"\xef\xbb\xbf" + (bundled("models")["mariner"]).read_bytes())  # as some editors do
+    Path("ship.toml").write_bytes(
+        b"\xef\xbb\xbf" + (bundled_documents("models")["mariner"]).read_bytes()
+    )  # as some editors do
     by_path, by_text = load_vessel(Path("ship.toml")), load_vessel("./ship.toml")
     assert by_path.digest == by_text.digest == load_vessel("mariner").digest
     with pytest.raises(DocumentError, match="no such file"):

@@ -11,9 +11,9 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.physics import TERMS, Term
-from shipid.physics.inertia import mass
+from shipid.physics.inertia import total_mass
 from shipid.vessel import dynamics as module
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.drawn import seeds
 
@@ -24,7 +24,7 @@ def values(vessel: Vessel) -> np.ndarray:
 
 def rates(vessel: Vessel, tau: Any = None, **given: float) -> dict[str, float]:
     """d(state)/dt by name; what is not given is zero; actuators have reached their commands."""
-    model = dynamics(vessel)
+    model = vessel_dynamics(vessel)
     states = (*model.state, *model.hidden)
     groups = [[given.get(name.replace(".", "_"), 0.0) for name in names] for names in (states, model.memory)]
     groups += [
@@ -103,10 +103,10 @@ def test_a_current_carries_a_ship_that_heels_in_her_turn(name: str, coriolis: st
     """Galilei: 120 s of a turn with a heel of some degrees; she was off by phi^2 V_c t."""
     ship = load_vessel(name).with_values({"current.kind": "uniform", "inertia.coriolis": coriolis})
     V_c, beta_c, psi = np.array([0.0, 1.5]), np.array([0.0, 2.2]), np.array([0.4, 0.4])
-    start = dict.fromkeys(dynamics(ship).state, np.zeros(2)) | {"psi": psi}
+    start = dict.fromkeys(vessel_dynamics(ship).state, np.zeros(2)) | {"psi": psi}
     start |= {"u": 6.0 + V_c * np.cos(beta_c - psi), "v": V_c * np.sin(beta_c - psi)}
     shaft = 8.0 if name == "naval-51" else 1.2
-    orders = {key: np.full(2, shaft if key.endswith(".n") else 0.4) for key in dynamics(ship).commands}
+    orders = {key: np.full(2, shaft if key.endswith(".n") else 0.4) for key in vessel_dynamics(ship).commands}
     path = rollout(ship, start, orders, {"V_c": V_c, "beta_c": beta_c}, step=0.2, num_steps=600, method="rk4")
     assert np.abs(path["phi"]).max() > 0.01
     carried = [V_c[1] * 120 * ratio for ratio in (np.cos(2.2), np.sin(2.2))]
@@ -118,18 +118,18 @@ def test_a_current_carries_a_ship_that_heels_in_her_turn(name: str, coriolis: st
 
 def test_vessels_of_one_structure_share_one_compilation() -> None:
     base = load_vessel("gunnerus-28.9")
-    assert dynamics(base) is dynamics(base.with_values({"inertia.m": 5e5, "wind.C_X.3": 0.1}))
-    assert dynamics(base) is not dynamics(base.with_values({"wind.off": True}))
+    assert vessel_dynamics(base) is vessel_dynamics(base.with_values({"inertia.m": 5e5, "wind.C_X.3": 0.1}))
+    assert vessel_dynamics(base) is not vessel_dynamics(base.with_values({"wind.off": True}))
 
 
 def test_written_out_sum_equals_mapped_sum(monkeypatch: pytest.MonkeyPatch) -> None:
     vessel = load_vessel("gunnerus-33.9").with_values({"hull.crossflow.strips": 30})
     given = {"u": 3.0, "v": 0.6, "r": 0.07, "port_n": 2.0}
     written_out = rates(vessel, **given)
-    assert not dynamics(vessel).sums
+    assert not vessel_dynamics(vessel).sums
     monkeypatch.setattr(module, "_compiled", {})
     monkeypatch.setattr(module, "UNROLL_UP_TO", 10)
-    assert len(dynamics(vessel).sums) == 1
+    assert len(vessel_dynamics(vessel).sums) == 1
     for name, value in rates(vessel, **given).items():
         assert value == pytest.approx(written_out[name], rel=1e-12)
 
@@ -138,12 +138,12 @@ def test_actuator_memory_replaces_the_command(draw_inputs: Callable[..., Mapping
     base = load_vessel("gunnerus-28.9")
     lag = {"kind": "first_order", "T": 1.0, "rate": 0.17}
     lagged = base.with_values({"thruster.port.actuator.n": lag})
-    model = dynamics(lagged)
+    model = vessel_dynamics(lagged)
     assert model.memory == {"port.n": "rev/s"}
     drawn = draw_inputs(base, 1)
     state, commands = ([float(x[0]) for x in drawn[group].values()] for group in ("start", "commands"))
     environment = [float(x[0]) for x in drawn["environment"].values()]
-    direct = dynamics(base).rates(state, [], commands, environment, values(base), np.zeros(3))
+    direct = vessel_dynamics(base).rates(state, [], commands, environment, values(base), np.zeros(3))
     ordered_otherwise = [99.0, *commands[1:]]
     through = model.rates(state, commands[:1], ordered_otherwise, environment, values(lagged), np.zeros(3))
     np.testing.assert_allclose(np.array(through), np.array(direct), rtol=1e-14)
@@ -182,7 +182,7 @@ def test_another_function_under_the_name_of_a_term_is_another_model(seed: int, m
 def mass_matrix(vessel: Vessel) -> np.ndarray:
     inertia = {k: v for k, v in vessel.document["inertia"].items() if k != "source"}
     added = {k: v for k, v in vessel.document["added_mass"].items() if k not in ("source", "coriolis")}
-    return np.array(mass(inertia, added))[np.ix_(vessel.axes, vessel.axes)]
+    return np.array(total_mass(inertia, added))[np.ix_(vessel.axes, vessel.axes)]
 
 
 def test_without_coriolis_the_mass_does_not_turn() -> None:

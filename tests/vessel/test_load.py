@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipid.document import replace
+from shipid.document import replace_values
 from shipid.errors import DocumentError
-from shipid.vessel.load import Vessel, check_vessel, load_vessel, sources
+from shipid.vessel.load import Vessel, check_document, load_vessel, term_sources
 
 UNIT = re.compile(
     r"-|prime|bis|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*"
@@ -55,7 +55,7 @@ def test_structure_is_what_compiles() -> None:
 def test_new_numbers_make_the_vessel_that_a_document_of_them_makes(vessel: Vessel) -> None:
     """The short way, for numbers alone, and the whole check agree."""
     values = {path: value * 1.01 for path, value in vessel.parameters.items() if not path.startswith("wind.gamma")}
-    short, whole = vessel.with_values(values), check_vessel(replace(vessel.document, values), vessel.file)
+    short, whole = vessel.with_values(values), check_document(replace_values(vessel.document, values), vessel.file)
     assert short == whole
     assert (short.parameters, short.units, short.structure) == (whole.parameters, whole.units, whole.structure)
 
@@ -75,7 +75,7 @@ def test_new_numbers_make_the_vessel_that_a_document_of_them_makes(vessel: Vesse
 def test_new_numbers_that_make_no_vessel_are_changed_as_in_a_document(values: dict[str, float]) -> None:
     base = load_vessel("gunnerus-28.9")
     changed = []
-    for check in (base.with_values, lambda new: check_vessel(replace(base.document, new), base.file)):
+    for check in (base.with_values, lambda new: check_document(replace_values(base.document, new), base.file)):
         with pytest.raises(DocumentError) as caught:
             check(values)
         changed.append(str(caught.value))
@@ -95,22 +95,22 @@ BOW = '[thruster.bow]\nkind = "tunnel"\nx = 3.0\nz = 0.1\nF_1 = 300.0\nF_2 = 5.0
 
 def test_a_source_is_that_of_the_document_that_wrote_the_block(tmp_path: Path) -> None:
     """A block added above is not given the source of the vessel below, nor one below that of the document above."""
-    below = sources(load_vessel("kvlcc2-l7"))
+    below = term_sources(load_vessel("kvlcc2-l7"))
     named, bare, patch = tmp_path / "named.toml", tmp_path / "bare.toml", tmp_path / "patch.toml"
     named.write_text(f'extends = "kvlcc2-l7"\nname = "N"\nsource = "the yard"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
     bare.write_text(f'extends = "kvlcc2-l7"\nname = "B"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
     patch.write_text('base = "./named.toml"\n[set]\n"hull.mmg.Y_u" = 0.0\n')
     expected = {**below, "thruster.bow": "the yard", "hull.mmg": "the yard"}
-    assert sources(load_vessel(str(named))) == expected
-    assert sources(load_vessel(str(patch))) == expected
-    assert sources(load_vessel(str(bare))) == {**below, "thruster.bow": ""}
+    assert term_sources(load_vessel(str(named))) == expected
+    assert term_sources(load_vessel(str(patch))) == expected
+    assert term_sources(load_vessel(str(bare))) == {**below, "thruster.bow": ""}
     text = named.read_text().replace("x = 3.0", 'x = 3.0\nsource = "a drawing"')
     named.write_text(text)
-    assert sources(load_vessel(str(named)))["thruster.bow"] == "a drawing"
+    assert term_sources(load_vessel(str(named)))["thruster.bow"] == "a drawing"
 
 
 def test_every_term_of_a_bundled_vessel_names_its_source(bundled_vessel: Vessel) -> None:
-    assert all(len(source) > 10 for source in sources(bundled_vessel).values())
+    assert all(len(source) > 10 for source in term_sources(bundled_vessel).values())
 
 
 @pytest.mark.parametrize("value", [None, 1e308, -1e30, 10**400, 1e-200])

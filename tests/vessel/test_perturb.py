@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError, ShipidError
-from shipid.physics.grammar import derivative
+from shipid.physics.grammar import hull_derivative
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import Family, Perturbation, Variant, draw, members, resolve, uniform
+from shipid.vessel.perturb import (
+    Family,
+    Perturbation,
+    Variant,
+    draw_members,
+    draw_variant,
+    resolve_families,
+    uniform_draw,
+)
 
 HULL = {"parameters": ["hull.derivatives.*"], "factor": (0.4, 1.6)}
 MASS = {"parameters": ["inertia.m"], "factor": (0.6, 1.4)}
@@ -35,38 +43,38 @@ HIGH = family(HULL, MASS, PROPELLERS)
 
 def test_draws_are_pinned_to_the_bit(base: Vessel) -> None:
     """Studies are repeated years later on other machines: these three may never change."""
-    assert draw(HIGH, 0, base).values["hull.derivatives.Y_uv"] == float.fromhex("-0x1.b61404608a1acp+14")
-    assert draw(HIGH, 3, base).values["inertia.m"] == float.fromhex("0x1.ab6a56474a5bbp+18")
-    assert draw(HIGH, 7, base).values["thruster.port.D_p"] == float.fromhex("0x1.0760ee106f0c7p+1")
+    assert draw_variant(HIGH, 0, base).values["hull.derivatives.Y_uv"] == float.fromhex("-0x1.b61404608a1acp+14")
+    assert draw_variant(HIGH, 3, base).values["inertia.m"] == float.fromhex("0x1.ab6a56474a5bbp+18")
+    assert draw_variant(HIGH, 7, base).values["thruster.port.D_p"] == float.fromhex("0x1.0760ee106f0c7p+1")
 
 
 def test_more_members_change_no_draw(base: Vessel) -> None:
-    few, many = members(HIGH, base), members(family(HULL, MASS, PROPELLERS, members=20), base)
+    few, many = draw_members(HIGH, base), draw_members(family(HULL, MASS, PROPELLERS, members=20), base)
     assert [variant.values for variant in many[:8]] == [variant.values for variant in few]
 
 
 def test_more_paths_change_no_other_draw(base: Vessel) -> None:
-    one = draw(family({**MASS, "parameters": ["inertia.m"]}), 4, base)
-    two = draw(family({**MASS, "parameters": ["inertia.*", "added_mass.X_udot"]}), 4, base)
+    one = draw_variant(family({**MASS, "parameters": ["inertia.m"]}), 4, base)
+    two = draw_variant(family({**MASS, "parameters": ["inertia.*", "added_mass.X_udot"]}), 4, base)
     assert two.values["inertia.m"] == one.values["inertia.m"]
     assert len(two.values) > len(one.values)
-    longer = draw(family({**PROPELLERS, "parameters": [*PROPELLERS["parameters"], "thruster.*.k_T"]}), 4, base)
-    assert longer.factors["thruster.port.k_T"] == draw(HIGH, 4, base).factors["thruster.port.D_p"]
+    longer = draw_variant(family({**PROPELLERS, "parameters": [*PROPELLERS["parameters"], "thruster.*.k_T"]}), 4, base)
+    assert longer.factors["thruster.port.k_T"] == draw_variant(HIGH, 4, base).factors["thruster.port.D_p"]
 
 
 @pytest.mark.parametrize("change", [{"seed": 3}, {"name": "other"}])
 def test_seed_and_name_make_other_draws(base: Vessel, change: dict[str, Any]) -> None:
-    assert draw(family(HULL, **change), 0, base).values != draw(family(HULL), 0, base).values
+    assert draw_variant(family(HULL, **change), 0, base).values != draw_variant(family(HULL), 0, base).values
 
 
 def test_members_differ_and_each_parameter_has_a_separate_draw(base: Vessel) -> None:
-    drawn = members(family(HULL), base)
+    drawn = draw_members(family(HULL), base)
     assert len({variant.values["hull.derivatives.Y_uv"] for variant in drawn}) == 8
     assert len(set(drawn[0].factors.values())) == 32
 
 
 def test_factors_keep_their_bounds(base: Vessel) -> None:
-    factors = np.array([list(variant.factors.values()) for variant in members(family(HULL, members=40), base)])
+    factors = np.array([list(variant.factors.values()) for variant in draw_members(family(HULL, members=40), base)])
     assert factors.shape == (40, 32)
     assert 0.4 <= factors.min() < 0.45
     assert 1.55 < factors.max() <= 1.6
@@ -74,7 +82,7 @@ def test_factors_keep_their_bounds(base: Vessel) -> None:
 
 def test_uniform_is_uniform() -> None:
     """Kolmogorov-Smirnov distance of 4,000 draws below its 0.1 % limit; neighbours are not correlated."""
-    drawn = np.array([uniform(2, "high", member, "inertia.m", 0, 0) for member in range(4000)])
+    drawn = np.array([uniform_draw(2, "high", member, "inertia.m", 0, 0) for member in range(4000)])
     assert drawn.min() >= 0
     assert drawn.max() < 1
     steps = np.arange(4000) / 4000
@@ -83,17 +91,17 @@ def test_uniform_is_uniform() -> None:
 
 
 def test_keys_of_a_draw_do_not_run_together() -> None:
-    assert uniform("a", "bc") != uniform("ab", "c")
-    assert uniform(1, 23) != uniform(12, 3)
+    assert uniform_draw("a", "bc") != uniform_draw("ab", "c")
+    assert uniform_draw(1, 23) != uniform_draw(12, 3)
 
 
 def test_together_is_one_factor(base: Vessel) -> None:
-    for variant in members(HIGH, base):
+    for variant in draw_members(HIGH, base):
         assert variant.values["thruster.port.D_p"] == variant.values["thruster.starboard.D_p"] != 1.9
 
 
 def test_a_path_drawn_twice_multiplies_two_draws(base: Vessel) -> None:
-    once, twice = draw(family(MASS), 0, base), draw(family(MASS, MASS), 0, base)
+    once, twice = draw_variant(family(MASS), 0, base), draw_variant(family(MASS, MASS), 0, base)
     second = twice.factors["inertia.m"] / once.factors["inertia.m"]
     assert 0.6 <= second <= 1.4
     assert second != pytest.approx(once.factors["inertia.m"])
@@ -105,10 +113,10 @@ def test_a_path_drawn_twice_multiplies_two_draws(base: Vessel) -> None:
 def test_selection_by_order(base: Vessel, condition: str, count: int) -> None:
     block = {"remove": [f"hull.derivatives.*[order {condition}]"]}
     if count:
-        assert len(draw(family(block), 0, base).values) == count
+        assert len(draw_variant(family(block), 0, base).values) == count
         return
     with pytest.raises(DocumentError, match="selects nothing"):
-        draw(family(block), 0, base)
+        draw_variant(family(block), 0, base)
 
 
 def rebuilt(variant: Variant, folder: Path) -> Vessel:
@@ -118,7 +126,7 @@ def rebuilt(variant: Variant, folder: Path) -> Vessel:
 
 
 def test_the_patch_document_rebuilds_the_variant_exactly(base: Vessel, tmp_path: Path) -> None:
-    for variant in members(HIGH, base):
+    for variant in draw_members(HIGH, base):
         vessel = rebuilt(variant, tmp_path)
         assert list(vessel.parameters.values()) == variant.parameters
         assert list(vessel.parameters) == list(base.parameters)
@@ -128,27 +136,27 @@ def test_the_patch_document_rebuilds_the_variant_exactly(base: Vessel, tmp_path:
 
 @pytest.mark.parametrize("value", [1e-7, 1e22, 123456789.123456789, 1 / 3, -0.0, 1.0000000000000002e-100])
 def test_the_patch_document_keeps_every_bit(base: Vessel, tmp_path: Path, value: float) -> None:
-    variant = draw(family({"set": {"hull.derivatives.X_u|v|": value}}), 0, base)
+    variant = draw_variant(family({"set": {"hull.derivatives.X_u|v|": value}}), 0, base)
     number = rebuilt(variant, tmp_path).parameters["hull.derivatives.X_u|v|"]
     assert number.hex() == value.hex()
 
 
 def test_a_pattern_that_selects_nothing_is_refused(base: Vessel) -> None:
     with pytest.raises(DocumentError, match="selects nothing") as caught:
-        draw(family({"parameters": ["inertia.mass"], "factor": 1.1}), 0, base, file="study.toml")
+        draw_variant(family({"parameters": ["inertia.mass"], "factor": 1.1}), 0, base, file="study.toml")
     assert "'inertia.m'" in str(caught.value)
     assert str(caught.value).startswith("study.toml: ")
 
 
 def test_setting_an_unknown_path_is_refused(base: Vessel) -> None:
     with pytest.raises(DocumentError, match=r"no parameter 'inertia.M': did you mean 'inertia.m'"):
-        draw(family({"set": {"inertia.M": 1.0}}), 0, base)
+        draw_variant(family({"set": {"inertia.M": 1.0}}), 0, base)
 
 
 @pytest.mark.parametrize("block", [{"set": {"wind.off": 1.0}}, {"remove": ["wind.*"]}])
 def test_who_would_leave_out_a_term_reads_how(base: Vessel, block: dict[str, Any]) -> None:
     with pytest.raises(DocumentError, match=r"a vessel that `extends` this one, with `off = true`"):
-        draw(family(block), 0, base)
+        draw_variant(family(block), 0, base)
 
 
 def test_a_complaint_counts_the_blocks_that_the_family_has_in_the_document(base: Vessel) -> None:
@@ -158,24 +166,24 @@ def test_a_complaint_counts_the_blocks_that_the_family_has_in_the_document(base:
         ([HULL, wrong], [MASS], "family.high.extends.perturb.1.set"),
     ):
         low = family(*parent, name="low")
-        high = resolve([low, family(*child, base=None, extends="low")])[1]
+        high = resolve_families([low, family(*child, base=None, extends="low")])[1]
         with pytest.raises(DocumentError) as caught:
-            draw(high, 0, base)
+            draw_variant(high, 0, base)
         assert caught.value.path == path
 
 
 def test_what_was_0_has_a_new_value_and_no_factor(base: Vessel) -> None:
-    variant = draw(family({"set": {"inertia.x_G": 2.5}}, MASS), 0, base)
+    variant = draw_variant(family({"set": {"inertia.x_G": 2.5}}, MASS), 0, base)
     assert base.parameters["inertia.x_G"] == 0
     assert variant.from_zero == {"inertia.x_G": 2.5}
     assert set(variant.factors) == {"inertia.m"}
-    assert draw(family({"set": {"inertia.x_G": 0.0}}), 0, base).from_zero == {}
+    assert draw_variant(family({"set": {"inertia.x_G": 0.0}}), 0, base).from_zero == {}
 
 
 @pytest.mark.parametrize("block", [{"remove": ["inertia.m"]}, {"parameters": ["inertia.I_z"], "factor": -1.0}])
 def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, Any]) -> None:
     with pytest.raises(DocumentError, match="would not be a valid vessel: inertia") as caught:
-        draw(family(block), 0, base, file="study.toml")
+        draw_variant(family(block), 0, base, file="study.toml")
     assert caught.value.file == "study.toml"
 
 
@@ -198,9 +206,9 @@ def test_a_block_has_one_meaning(block: dict[str, Any], remedy: str) -> None:
 def test_extends_puts_the_other_rules_first(base: Vessel) -> None:
     moderate = family(HULL, name="moderate", seed=1)
     high = family(MASS, name="high", base=None, extends="moderate")
-    written_out = resolve([high, moderate])[0]
+    written_out = resolve_families([high, moderate])[0]
     assert (written_out.base, written_out.seed, written_out.extends) == ("gunnerus-28.9", 2, None)
-    assert draw(written_out, 0, base) == draw(family(HULL, MASS), 0, base)
+    assert draw_variant(written_out, 0, base) == draw_variant(family(HULL, MASS), 0, base)
 
 
 @pytest.mark.parametrize(
@@ -215,7 +223,7 @@ def test_extends_puts_the_other_rules_first(base: Vessel) -> None:
 )
 def test_families_that_cannot_be_written_out(families: list[dict[str, Any]], remedy: str, path: str) -> None:
     with pytest.raises(DocumentError, match=remedy) as caught:
-        resolve([Family(**given) for given in families], "study.toml")
+        resolve_families([Family(**given) for given in families], "study.toml")
     assert caught.value.path == path
     assert "\n" not in str(caught.value)
 
@@ -224,20 +232,22 @@ def test_a_member_is_a_whole_number() -> None:
     """A draw is a hash of its number: before, member 1.0 was another ship than member 1 and had the same name."""
     base = load_vessel("gunnerus-28.9")
     family = Family(name="f", members=3, perturb=[{"parameters": ["hull.*"], "factor": (0.6, 1.4)}])
-    first = draw(family, 1, base)
+    first = draw_variant(family, 1, base)
     for one in (np.int64(1), 1.0, np.float64(1)):
-        assert draw(family, one, base) == first  # type: ignore[arg-type]
-    assert members(family, base, numbers=np.arange(3.0))[1] == first  # type: ignore[arg-type]
+        assert draw_variant(family, one, base) == first  # type: ignore[arg-type]
+    assert draw_members(family, base, numbers=np.arange(3.0))[1] == first  # type: ignore[arg-type]
     for odd in (-1, 1.5, "1", None, True):
         with pytest.raises(ShipidError, match="member must be a whole number, 0 or more, not"):
-            draw(family, odd, base)  # type: ignore[arg-type]
+            draw_variant(family, odd, base)  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match="counter must be a whole number"):
-        draw(family, 1, base, counter=0.5)  # type: ignore[arg-type]
+        draw_variant(family, 1, base, counter=0.5)  # type: ignore[arg-type]
 
 
 def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) -> None:
-    variant = draw(family({"remove": ["hull.derivatives.*[order >= 3]"]}, members=1), 0, base)
-    third = {path for path in base.parameters if "hull.d" in path and derivative(path.rsplit(".", 1)[-1]).order >= 3}
+    variant = draw_variant(family({"remove": ["hull.derivatives.*[order >= 3]"]}, members=1), 0, base)
+    third = {
+        path for path in base.parameters if "hull.d" in path and hull_derivative(path.rsplit(".", 1)[-1]).order >= 3
+    }
     assert set(variant.values) == third
     assert len(third) == 3 + 6 + 6
     assert set(variant.values.values()) == {0.0}
@@ -246,7 +256,7 @@ def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) 
 
 
 def test_a_changed_base_is_refused(base: Vessel, tmp_path: Path) -> None:
-    text = draw(HIGH, 0, base).document()
+    text = draw_variant(HIGH, 0, base).document()
     assert base.digest in text
     file = tmp_path / "patch.toml"
     file.write_text(text.replace(base.digest, "0" * 16))

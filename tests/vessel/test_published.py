@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.vessel.published import container, cybership2, naval, otter, supply, tanker
 
@@ -66,7 +66,7 @@ def drawn(source: ModuleType, count: int) -> list[dict[str, float]]:
 def test_accelerations_are_those_of_the_published_equations(name: str) -> None:
     """To 1e-9 at 200 states and orders, all actuators at their orders; 1e-12 of the largest of an axis is rounding."""
     published, vessel = VESSELS[name], load_vessel(name)
-    model, values = dynamics(vessel), list(vessel.parameters.values())
+    model, values = vessel_dynamics(vessel), list(vessel.parameters.values())
     axes = model.state[model.num_dof :]
     computed, expected = [], []
     for given in drawn(published.source, STATES):

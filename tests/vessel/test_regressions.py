@@ -9,11 +9,11 @@ from scipy.special import elliprd
 from shipid.vessel.regressions import (
     K_T_TERMS,
     form_factor,
-    friction,
-    motora,
-    thrust_coefficient,
-    waves_of,
-    wetted_surface,
+    ittc_friction,
+    motora_added_mass,
+    mumford_surface,
+    series_thrust_coefficient,
+    wave_resistance_of_hull,
 )
 
 KVLCC2 = (320.0, 58.0, 20.8, 0.81)
@@ -22,14 +22,14 @@ KCS = (230.0, 32.2, 10.8, 0.651)
 
 def test_friction_is_the_ittc_line() -> None:
     """Re 7.2e6: the 7 m model of KVLCC2, see models/kvlcc2-l7.toml; Re 1e9: 1.53e-3 (ITTC 1957, table)."""
-    assert friction(1.0, 1e9, 1.0) == pytest.approx(1.53e-3, rel=0.005)
-    assert friction(1.0, 1e7, 1.0) == pytest.approx(3.0e-3, rel=0.005)
+    assert ittc_friction(1.0, 1e9, 1.0) == pytest.approx(1.53e-3, rel=0.005)
+    assert ittc_friction(1.0, 1e7, 1.0) == pytest.approx(3.0e-3, rel=0.005)
 
 
 def test_surface_and_form_of_published_ships() -> None:
     """SIMMAN: 27,194 m^2 of KVLCC2, 9,539 m^2 of KCS; k of KVLCC2 about 0.2 to 0.3, of KCS 0.1."""
-    assert wetted_surface(*KVLCC2) == pytest.approx(27194, rel=0.05)
-    assert wetted_surface(*KCS) == pytest.approx(9539, rel=0.05)
+    assert mumford_surface(*KVLCC2) == pytest.approx(27194, rel=0.05)
+    assert mumford_surface(*KCS) == pytest.approx(9539, rel=0.05)
     assert 0.15 < form_factor(*KVLCC2) < 0.35
     assert 0.05 < form_factor(*KCS) < 0.15
 
@@ -46,7 +46,7 @@ def test_added_masses_of_published_ships(
     sizes: tuple[float, float, float, float], m_x: float, m_y: float, J_z: float
 ) -> None:
     """Over the mass, J_z over m L^2 too: Yasukawa and Yoshimura (2015), table 3; Son and Nomoto (1982)."""
-    surge, sway, gyration = motora(*sizes)
+    surge, sway, gyration = motora_added_mass(*sizes)
     assert surge == pytest.approx(m_x, rel=0.15)
     assert sway == pytest.approx(m_y, rel=0.05)
     assert (gyration / sizes[0]) ** 2 == pytest.approx(J_z, rel=0.12)
@@ -60,7 +60,7 @@ def test_added_masses_of_a_beamy_ship_are_near_those_of_an_ellipsoid(ratio: floa
         2 / 3 * a * b * c * elliprd(*others, axis) for axis, others in ((a**2, (b**2, c**2)), (b**2, (a**2, c**2)))
     )
     far = (a**2 - b**2) ** 2 * (beta - alpha) / (2 * (a**2 - b**2) + (a**2 + b**2) * (alpha - beta))
-    surge, sway, gyration = motora(1.0, 2 * b, c, np.pi / 6)
+    surge, sway, gyration = motora_added_mass(1.0, 2 * b, c, np.pi / 6)
     assert surge == pytest.approx(alpha / (2 - alpha), rel=0.4)
     assert 1.0 < sway / (beta / (2 - beta)) < 1.6  # a ship's sides are flatter
     assert gyration == pytest.approx(np.sqrt(far / 5), rel=0.35)
@@ -69,14 +69,16 @@ def test_added_masses_of_a_beamy_ship_are_near_those_of_an_ellipsoid(ratio: floa
 def test_wave_resistance_of_the_worked_example() -> None:
     """The example of Holtrop and Mennen (1982): 557.11 kN at 25 knots, with c_2 of a bulb and c_5 of a transom."""
     weight = 37500 * 1025 * 9.81
-    over = waves_of(205.0, 32.0, 10.0, volume=37500.0, C_P=0.5833, entrance=12.08, speed=25 * 1852 / 3600)
+    over = wave_resistance_of_hull(
+        205.0, 32.0, 10.0, volume=37500.0, C_P=0.5833, entrance=12.08, speed=25 * 1852 / 3600
+    )
     assert over * weight * 0.7595 * 0.9592 == pytest.approx(557.11e3, rel=2e-3)
 
 
 def test_the_series_is_near_the_screw_of_kvlcc2() -> None:
     """P / D = 0.721: K_T = 0.2931 - 0.2753 J - 0.1385 J^2 (Yasukawa and Yoshimura 2015), another area ratio."""
     J = np.linspace(0, 0.6, 7)
-    assert thrust_coefficient(J, 0.721) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.025)
+    assert series_thrust_coefficient(J, 0.721) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.025)
 
 
 def test_the_table_of_the_series_adds_up() -> None:

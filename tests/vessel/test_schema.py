@@ -6,14 +6,14 @@ from typing import Any
 import casadi as ca
 import pytest
 
-from shipid.document import bundled
+from shipid.document import bundled_documents
 from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
-from shipid.physics.signals import named
+from shipid.physics.signals import rows_of_role
 from shipid.vessel.load import load_vessel
 from shipid.vessel.schema import (
-    parameters,
-    signals,
-    structural,
+    function_parameters,
+    function_signals,
+    structural_keys,
     term_parameters,
     vessel_model,
 )
@@ -23,16 +23,16 @@ from shipid.vessel.schema import (
 def test_every_argument_of_a_term_is_declared(key: str) -> None:
     """Positional arguments are signals or component arrays; keyword-only ones have a unit."""
     term = TERMS[key]
-    given = {*MOTION, *named("command"), *named("environment")}
+    given = {*MOTION, *rows_of_role("command"), *rows_of_role("environment")}
     source = term.components or term.drawn
     if source is not None:
-        given |= set(source(**dict.fromkeys(structural(term), 3)))
+        given |= set(source(**dict.fromkeys(structural_keys(term), 3)))
     given |= set(GIVEN)
     if term.rates is not None:
         assert term.states is not None
-        assert set(signals(term.rates)) <= given
-    assert set(signals(term.function)) <= given
-    known = {"return", *signals(term.function), *(p.name for p in parameters(term.function))}
+        assert set(function_signals(term.rates)) <= given
+    assert set(function_signals(term.function)) <= given
+    known = {"return", *function_signals(term.function), *(p.name for p in function_parameters(term.function))}
     assert known == set(term.function.__annotations__)
 
 
@@ -65,7 +65,7 @@ def _unknown(schema: dict[str, Any], node: dict[str, Any], value: Any, path: str
     return min(complaints, key=len, default=[f"{path} fits nothing"])
 
 
-@pytest.mark.parametrize("name", list(bundled("models")))
+@pytest.mark.parametrize("name", list(bundled_documents("models")))
 def test_json_schema_knows_the_keys_of_bundled_vessels(name: str) -> None:
     schema = vessel_model().model_json_schema()
     document = load_vessel(name).document
@@ -80,9 +80,9 @@ def test_json_schema_knows_the_keys_of_bundled_vessels(name: str) -> None:
 def test_an_actuator_is_a_pair_of_pure_functions(kind: str) -> None:
     """`output(state)` and `advance(command, state, dt)`; a reached command stays reached."""
     memory = ACTUATORS[kind]
-    assert signals(memory.output) == ("state",)
-    assert signals(memory.advance) == ("command", "state", "dt")
-    numbers = {p.name: 1.0 for p in parameters(memory.advance) if p.default is None}
+    assert function_signals(memory.output) == ("state",)
+    assert function_signals(memory.advance) == ("command", "state", "dt")
+    numbers = {p.name: 1.0 for p in function_parameters(memory.advance) if p.default is None}
     assert float(memory.advance(ca.SX(0.7), ca.SX(0.7), ca.SX(0.5), **numbers)) == pytest.approx(0.7)
 
 
@@ -93,6 +93,6 @@ def test_what_a_term_gives_has_its_parameters_in_the_same_block(key: str) -> Non
     names = [parameter.name for parameter in term_parameters(term)]
     assert len(names) == len(set(names))
     for function in (term.function, *term.gives.values()):
-        assert {parameter.name for parameter in parameters(function)} <= set(names)
+        assert {parameter.name for parameter in function_parameters(function)} <= set(names)
     if key == "thruster.quadratic":
-        assert "c_uu" in set(names) - {parameter.name for parameter in parameters(term.function)}
+        assert "c_uu" in set(names) - {parameter.name for parameter in function_parameters(term.function)}

@@ -7,16 +7,16 @@ import pytest
 
 from shipid.engine.rollout import rollout
 from shipid.simulation.approach import Controls, balanced_shaft
-from shipid.vessel.dynamics import dynamics
-from shipid.vessel.load import Vessel, check_vessel, load_vessel
-from shipid.vessel.stability import growth, growths
+from shipid.vessel.dynamics import vessel_dynamics
+from shipid.vessel.load import Vessel, check_document, load_vessel
+from shipid.vessel.stability import yaw_growth, yaw_growths
 
 U, M, I_Z, Y_VDOT, N_RDOT = 4.0, 2e5, 2e7, -1.5e5, -1.2e7
 Y_V, Y_R, N_R = -4e4, 1e5, -4e6
 
 
 def ship(N_v: float) -> Vessel:
-    return check_vessel(
+    return check_document(
         {
             "name": "A ship with linear damping",
             "dof": 3,
@@ -37,15 +37,15 @@ def test_it_is_the_root_of_the_equations_of_sway_and_yaw(N_v: float) -> None:
     vessel = ship(N_v)
     slopes = np.array([[Y_V, Y_R - M * U], [N_v, N_R]]) / np.array([[M - Y_VDOT], [I_Z - N_RDOT]])
     expected = np.linalg.eigvals(slopes).real.max()
-    assert growth(vessel, U, {"screw.n": 1.0}) == pytest.approx(expected, rel=1e-6)
+    assert yaw_growth(vessel, U, {"screw.n": 1.0}) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "gunnerus-33.9"])
 def test_water_heave_and_roll_are_no_yaw(name: str) -> None:
     """Time as a motion had a growth of 0, and of the first ship a memory of roll, and roll itself, are slower."""
     plane, waves = load_vessel(name), load_vessel(f"{name}-6dof")
-    n = dict.fromkeys(dynamics(plane).commands, 2.0)
-    flat, all_axes = growth(plane, 5.0, n), growth(waves, 5.0, n)
+    n = dict.fromkeys(vessel_dynamics(plane).commands, 2.0)
+    flat, all_axes = yaw_growth(plane, 5.0, n), yaw_growth(waves, 5.0, n)
     assert flat < -0.09
     assert all_axes == pytest.approx(flat, rel=0.02)
 
@@ -57,9 +57,9 @@ def test_a_ship_whose_sides_differ_has_two(side: int) -> None:
     controls = Controls(vessel)
     n = balanced_shaft(controls, 1.1787)
     assert n is not None
-    rates = growths(vessel, 1.1787, controls.ahead(n))
-    assert rates[0] < 0 < rates[1] == growth(vessel, 1.1787, controls.ahead(n))
-    start = dict.fromkeys(dynamics(vessel).state, np.zeros(1)) | {"u": np.full(1, 1.1787)}
+    rates = yaw_growths(vessel, 1.1787, controls.ahead(n))
+    assert rates[0] < 0 < rates[1] == yaw_growth(vessel, 1.1787, controls.ahead(n))
+    start = dict.fromkeys(vessel_dynamics(vessel).state, np.zeros(1)) | {"u": np.full(1, 1.1787)}
     start |= {"r": np.full(1, 1e-6 * (1, -1)[side])}
     orders = {name: np.full(1, value) for name, value in controls.ahead(n).items()}
     path = rollout(vessel, start, orders, step=0.1, num_steps=800, method="rk4", keep=("r",), engine="casadi")

@@ -12,10 +12,10 @@ import pytest
 
 from shipid.errors import ShipidError
 from shipid.simulation.manoeuvre import TurningCircle, Zigzag
-from shipid.simulation.perform import perform
-from shipid.vessel.dynamics import dynamics
+from shipid.simulation.perform import perform_manoeuvres
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.template import PROPULSORS, Particulars, added_mass, first_guess, hull, inertia
+from shipid.vessel.template import PROPULSORS, Particulars, added_mass_values, first_guess, hull_values, inertia_values
 
 MARINER = Particulars(160.93, 23.17, 7.47, 0.597, 7.7175)
 KVLCC2 = Particulars(320.0, 58.0, 20.8, 0.810, 7.97, ship_type="tanker")
@@ -33,7 +33,7 @@ def test_a_first_guess_turns_and_zigzags(given: Particulars, propulsor: str) -> 
         TurningCircle(name="turn", n_rpm=60 * proposal.n, duration=25 * pace),
         Zigzag(name="zigzag", n_rpm=60 * proposal.n, duration=25 * pace, approach="steady"),
     ]
-    log = perform(proposal.vessel, kinds, step=pace / 60)
+    log = perform_manoeuvres(proposal.vessel, kinds, step=pace / 60)
     turn, zigzag = (log[log["run"] == name] for name in ("turn", "zigzag"))
     assert turn["u"].iloc[0] == pytest.approx(given.service, rel=0.02)
     assert 1.0 < (turn["east"].max() - turn["east"].min()) / given.length < 9.0
@@ -44,8 +44,8 @@ def test_a_first_guess_turns_and_zigzags(given: Particulars, propulsor: str) -> 
 def test_clarke_near_the_mariner_as_measured() -> None:
     """Derivatives of Chislett and Stroem-Tejsen (1965), in 1e-5 of L^2 primes: four within 10 %, the moments less."""
     to_square = MARINER.draught / MARINER.length
-    linear = {name: 1e5 * to_square * hull(MARINER)[name].number for name in ("Y_v", "N_r", "N_v")}
-    masses = added_mass(MARINER)
+    linear = {name: 1e5 * to_square * hull_values(MARINER)[name].number for name in ("Y_v", "N_r", "N_v")}
+    masses = added_mass_values(MARINER)
     unit = 0.5 * 1025 * MARINER.length**3
     assert linear["Y_v"] == pytest.approx(-1160, rel=0.1)
     assert linear["N_r"] == pytest.approx(-184, rel=0.1)
@@ -56,10 +56,10 @@ def test_clarke_near_the_mariner_as_measured() -> None:
 
 def test_formulae_near_kvlcc2_as_measured() -> None:
     """Table 3 of Yasukawa and Yoshimura (2015)."""
-    estimates = {name: value.number for name, value in hull(KVLCC2).items()}
+    estimates = {name: value.number for name, value in hull_values(KVLCC2).items()}
     for name, measured in {"Y_v": -0.315, "Y_r": 0.083, "N_v": -0.137, "N_r": -0.049, "Y_vrr": -0.391}.items():
         assert estimates[name] == pytest.approx(measured, rel=0.25), name
-    assert -added_mass(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
+    assert -added_mass_values(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
 
 
 def test_yaw_of_a_stern_pushed_aside_is_reported_stable_or_not() -> None:
@@ -97,7 +97,7 @@ def test_no_drift_drives_a_dead_ship_ahead_or_astern() -> None:
         values, nothing = list(ship.parameters.values()), np.zeros(0)
         for angle in np.radians(range(0, 181, 5)):
             state = [0.0, 0.0, 0.0, U * np.cos(angle), U * np.sin(angle), 0.0]
-            rates = np.array(dynamics(ship).rates(state, *[nothing] * 3, values, np.zeros(3))).ravel()[3:]
+            rates = np.array(vessel_dynamics(ship).rates(state, *[nothing] * 3, values, np.zeros(3))).ravel()[3:]
             on = (ship.mass @ rates)[0] * np.sign(np.cos(angle))
             assert on < 1e-9 * ship.document["constants"]["rho"] * L * T * U**2, angle
 
@@ -204,9 +204,9 @@ def test_a_beamy_ship_has_the_yaw_inertia_of_the_charts() -> None:
     """R/V Gunnerus before she was lengthened (L / B = 3.0): 0.57 of I_z, by her identified model."""
     sizes = load_vessel("gunnerus-28.9").document["particulars"]
     given = Particulars(sizes["L_pp"], sizes["B"], sizes["T"], 0.55)
-    share = -added_mass(given)["N_rdot"].number / inertia(given)["I_z"].number
+    share = -added_mass_values(given)["N_rdot"].number / inertia_values(given)["I_z"].number
     assert 0.3 < share < 0.6  # Clarke's formula: 0.10
-    assert added_mass(MARINER)["N_rdot"].note == "Clarke et al. (1983)"
+    assert added_mass_values(MARINER)["N_rdot"].note == "Clarke et al. (1983)"
 
 
 def test_no_motion_of_the_water_has_an_energy_below_0() -> None:
@@ -220,7 +220,7 @@ def test_no_motion_of_the_water_has_an_energy_below_0() -> None:
         drawn += 1
         water = {
             k: -v.number
-            for k, v in added_mass(Particulars(1.0, 1 / slenderness, 1 / slenderness / flatness, block)).items()
+            for k, v in added_mass_values(Particulars(1.0, 1 / slenderness, 1 / slenderness / flatness, block)).items()
         }
         coupling = (water["Y_rdot"] + water["N_vdot"]) / 2
         assert np.linalg.eigvalsh([[water["Y_vdot"], coupling], [coupling, water["N_rdot"]]]).min() > 0

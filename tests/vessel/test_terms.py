@@ -12,9 +12,9 @@ import pytest
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics import ACTUATORS, TERMS, Term
 from shipid.units import unit_fault
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
-from shipid.vessel.schema import parameters
+from shipid.vessel.schema import function_parameters
 from shipid.vessel.terms import check_term, split_keys
 from tests.cli.running import ended
 from tests.documented import code
@@ -294,7 +294,7 @@ def test_every_listed_term_passes(key: str) -> None:
 
 @pytest.mark.parametrize("kind", ACTUATORS)
 def test_units_of_actuators_are_those_of_terms_or_of_the_command(kind: str) -> None:
-    units = [str(parameter.unit) for parameter in parameters(ACTUATORS[kind].advance)]
+    units = [str(parameter.unit) for parameter in function_parameters(ACTUATORS[kind].advance)]
     assert all(unit.endswith("of the command") or not unit_fault(unit) for unit in units)
 
 
@@ -304,16 +304,16 @@ def test_a_term_that_is_put_in_later_is_checked_too(tmp_path: Path, monkeypatch:
     vessel = load_vessel(ship("hull.drag", tmp_path))
     registered("hull.drag", signature("nu_r: SX, C: Annotated[SX, 'kg m^-1']"), tmp_path, monkeypatch)
     with pytest.raises(ShipidError, match="must be behind a"):
-        dynamics(vessel)
+        vessel_dynamics(vessel)
     registered("hull.drag", signature(f"nu_r: SX, *, C: {NEWTON}, D: {NEWTON}"), tmp_path, monkeypatch)
     with pytest.raises(DocumentError, match=r"ship\.toml: hull\.drag\.D: missing"):
-        dynamics(vessel)
+        vessel_dynamics(vessel)
     for more in (f"D: {NEWTON} = 2.0", f"L_pp: {NEWTON}"):
         registered("hull.drag", signature(f"nu_r: SX, *, C: {NEWTON}, {more}"), tmp_path, monkeypatch)
         with pytest.raises(
             ShipidError, match=r"ship\.toml: its terms take other numbers than when it was read: load it"
         ):
-            dynamics(vessel)
+            vessel_dynamics(vessel)
     monkeypatch.setitem(TERMS, "hull.drag", Term(3))  # type: ignore[arg-type]
     with pytest.raises(ShipidError, match=r"^hull\.drag must be a function, not 3$"):
-        dynamics(vessel)
+        vessel_dynamics(vessel)

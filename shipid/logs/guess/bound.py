@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.words import numbered, parts_of, side_of, words_of_side
-from shipid.physics.signals import is_command, is_shaft, row_of, signal_of, steers
+from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of, signal_row
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
 
@@ -27,7 +27,9 @@ def name_commands(state: State, vessel: Vessel) -> None:
     """
     controls = Controls(vessel)
     drives, helm = controls.effects
-    without = {name for name in controls.commands if (is_shaft(name) or steers(name)) and name not in (*drives, *helm)}
+    without = {
+        name for name in controls.commands if (is_shaft(name) or is_steering(name)) and name not in (*drives, *helm)
+    }
     idle = without if drives else set()
     _drop_guesses(state, {signal_of(name) for name in controls.commands})
     _take_tunnels(state, [name for name in controls.commands if name in idle and is_shaft(name)])
@@ -265,6 +267,6 @@ def _side(name: str, vessel: Vessel) -> str:
 
 
 def _shown(name: str) -> str:
-    row = row_of(name)
+    row = signal_row(name)
     assert row is not None
     return row.read_in

@@ -13,7 +13,7 @@ from shipid.logs.guess.clues import State
 from shipid.logs.guess.defects import when
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import is_command, is_shaft, signal_of, steers
+from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of
 
 NODES, SPLITS = 120, 60  # places at which a part may begin or end
 LEAST = 0.05  # share of all motion that a part has, at least
@@ -60,7 +60,7 @@ def ask_for_changes(state: State) -> None:
             how = f"the {what} is {part.ratio:.3g} times as much, beside its integral, as elsewhere"
             _ask(state, about, f"has {columns} another unit or sign {_from_to(state, first, end)}? There {how}")
     for one in state.suggestions:
-        if is_command(one.name) and steers(signal_of(one.name)):
+        if is_command(one.name) and is_steering(signal_of(one.name)):
             _ask_for_angle(state, one.name, one.source)
         elif is_command(one.name) and is_shaft(one.name):
             _ask_for_shaft(state, one.name, one.source)

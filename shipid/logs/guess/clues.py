@@ -26,7 +26,7 @@ from shipid.logs.guess.words import (
 )
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
-from shipid.physics.signals import SIGNALS, signal_of, steers
+from shipid.physics.signals import SIGNALS, is_steering, signal_of
 
 FOREIGN = re.compile(r"kn\W?m|mnm|[km]w|bar|[kmh]?pa|°c|degc|l/h|kg/h|t/h|kg|db|m/s\^?2|m/s²|kwh|kv|ma|bfts?|beaufort")
 """Units of quantities that no column of a dataset has, in lower case."""
@@ -140,7 +140,7 @@ def unit_of_another(name: str, meaning: str) -> str | None:
     said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or shaft_unit(name) else [])
     for word in said:
         text = word.strip().lower()
-        if meaning in SIGNALS and steers(meaning) and re.fullmatch(UNIT_WORDS["%"], text):
+        if meaning in SIGNALS and is_steering(meaning) and re.fullmatch(UNIT_WORDS["%"], text):
             continue
         if (
             is_known(without_prefix(text)[0])

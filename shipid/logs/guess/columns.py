@@ -13,7 +13,7 @@ from typing import get_args
 
 import numpy as np
 
-from shipid.arguments import names_of, of_class, one_of, path_of
+from shipid.arguments import as_names, as_path, check_choice, check_class
 from shipid.errors import DataError
 from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
@@ -40,8 +40,8 @@ from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import reasons
 from shipid.logs.guess.wind import choose_wind
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import named
-from shipid.vessel.dynamics import dynamics
+from shipid.physics.signals import rows_of_role
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 BOTH_SIDES = 0.2  # of all turning, that is to the lesser side, at least: then a trim by the loss of speed is no heel
@@ -99,12 +99,12 @@ def guess(
     ------
     DataError : if the log cannot be read, has no clock, no heading or no position, or does not move as in that frame.
     """
-    names = names_of("names", names, DataError)
+    names = as_names("names", names, DataError)
     if vessel is not None:
-        of_class("vessel", vessel, Vessel, "as of `load_vessel`, or None", DataError)
+        check_class("vessel", vessel, Vessel, "as of `load_vessel`, or None", DataError)
     if frame is not None:
-        one_of("frame", frame, get_args(Frame), DataError)
-    source = read_source(path_of("path", path, DataError), names)
+        check_choice("frame", frame, get_args(Frame), DataError)
+    source = read_source(as_path("path", path, DataError), names)
     sniffed = source.sniffed
     columns = evidence.filled(sniffed.t, sniffed.columns.items())
     spiky = take_spikes(sniffed.t, columns)
@@ -112,7 +112,7 @@ def guess(
     state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), joined, spiky)
     state.sides, state.words, state.other = sniffed.sides, sniffed.words, sniffed.other
     state.units |= {name: "quaternion" for name, parts in sniffed.in_parts.items() if len(parts) == 4}
-    state.commands = () if vessel is None else dynamics(vessel).commands
+    state.commands = () if vessel is None else vessel_dynamics(vessel).commands
     numbering = tuple(
         name for name, values in columns.items() if np.array_equal(values, np.arange(len(values)) + values[0])
     )
@@ -178,7 +178,7 @@ def _runs(state: State, source: Source) -> None:
 
 def _others(state: State) -> None:
     """Choose roll, pitch and other environment columns by their names alone."""
-    further = [name for name, row in named("environment").items() if row.names and name not in ("V_w", "beta_w")]
+    further = [name for name, row in rows_of_role("environment").items() if row.names and name not in ("V_w", "beta_w")]
     for meaning in ("phi", "theta", *further):
         steep = {name for name in state.called(meaning) if _is_steep(state, name, meaning)}
         for name in [name for name in state.called(meaning) if name not in steep][:1]:

@@ -15,7 +15,7 @@ from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twins
 from shipid.logs.guess.words import fits, is_electrical, is_engine, is_order, numbered, parts_of, units_in
 from shipid.logs.mapping import to_si
-from shipid.physics.signals import SIGNALS, is_command, is_shaft, named, signal_of, steers
+from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, rows_of_role, signal_of
 
 AZIMUTH = "thruster"  # component of the command of an azimuth unit whose name has no side
 SCREW = SIGNALS["n"].component  # of a shaft speed or pitch without a side: that of the azimuth unit where there is one
@@ -53,7 +53,7 @@ def choose_commands(state: State) -> None:
 
 def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
-    angles = _named(state, [signal for signal in named("command") if steers(signal)])
+    angles = _named(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
     turned = {name for name, signal in angles if _centred(state, name, signal)}
     power = {name: 0.0 if r is None else state.effect(r, state.columns[name]) for name in state.eligible()}
     by_name = bool(angles)
@@ -139,7 +139,7 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
             remedy = f"Write factor = (deg at {full:g}) / {full:g}"
             state.ask((signal,), f"{name!r} is in {words[0]}: of which angle? {remedy}")
             return " of an angle that the log does not say"
-    if unit_in_name(name, SIGNALS[signal].unit) is not None or not steers(signal):
+    if unit_in_name(name, SIGNALS[signal].unit) is not None or not is_steering(signal):
         return ""
     if state.ask_for_unit(signal, name, unit):
         return " in a unit that is not known"
@@ -186,7 +186,9 @@ def _screws(state: State) -> set[str]:
         if np.ptp(columns[pair[0]] - columns[pair[1]]) > TOGETHER * max(np.ptp(columns[name]) for name in pair)
         for name in pair
     }
-    return apart | {name for signal in named("command") if not steers(signal) for name in state.called(signal)}
+    return apart | {
+        name for signal in rows_of_role("command") if not is_steering(signal) for name in state.called(signal)
+    }
 
 
 def _centred(state: State, name: str, signal: str) -> bool:
@@ -251,7 +253,7 @@ def _held(values: Array) -> float:
 
 
 def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
-    for signal in (signal for signal in named("command") if not steers(signal)):
+    for signal in (signal for signal in rows_of_role("command") if not is_steering(signal)):
         for name, _ in sorted(_named(state, [signal]), key=lambda one: state.side_of(one[0]) in TUNNELS):
             usual = SIGNALS[signal].component
             fallback = AZIMUTH if azimuth and usual == SCREW else usual

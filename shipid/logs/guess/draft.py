@@ -92,7 +92,7 @@ def moment(value: float, unit: str) -> str:
 
 
 def _read(text: str) -> Mapping:
-    raw = document.loads(text)
+    raw = document.parse_toml(text)
     document.check_values(raw, None)
     return parse_mapping(raw, Path("draft.toml"))
 

@@ -15,7 +15,7 @@ from shipid.logs.guess.evidence import GAP
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.mapping import to_si
 from shipid.logs.repairs import FLAGS, Despike, despike
-from shipid.physics.signals import is_command, is_shaft, read_unit, steers
+from shipid.physics.signals import is_command, is_shaft, is_steering, read_unit
 
 SHARES = (0.5, 0.75, 0.9)  # of the size of the smallest lapse, that may part lapses from all other rows
 
@@ -62,7 +62,7 @@ def _report_brief(state: State, one: Suggestion, found: list[Lapse], t: Array, r
             how = "is 0" if kind == "zero" else f"leaves its course by {far} and comes back"
             beside = f" between values of {far}" * (kind == "zero")
             said.append(f"{how} {_places(state, some, t)}{beside}")
-    what = "shaft" if is_shaft(one.name) else "rudder" if steers(one.name) else "gear"
+    what = "shaft" if is_shaft(one.name) else "rudder" if is_steering(one.name) else "gear"
     sentence = f"{one.source!r} {', and '.join(said).rstrip(',')}: faster than the {what} moves elsewhere"
     if repair is None and state.joined:
         state.ask((one.name,), f"{sentence}. Leave these cells empty, and draft again")

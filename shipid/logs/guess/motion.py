@@ -15,7 +15,7 @@ from shipid.logs.guess.clues import State, names_another, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
 from shipid.logs.guess.words import fits, is_order
 from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
-from shipid.physics.signals import named
+from shipid.physics.signals import rows_of_role
 from shipid.units import GRAVITY
 
 CLEAR = 1.5  # times the unexplained share of the best, that a hypothesis with fitting names may leave
@@ -480,7 +480,7 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
     candidates = [
         entry
         for entry in _rates(state, change, state.eligible("r"))
-        if entry[1] in called or entry[0].left < MISLED or not fits(entry[1]).keys() & named("command").keys()
+        if entry[1] in called or entry[0].left < MISLED or not fits(entry[1]).keys() & rows_of_role("command").keys()
     ]  # a large ship may turn by as many deg/min as her rudder has degrees
     by_name = [
         entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1

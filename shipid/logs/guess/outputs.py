@@ -7,13 +7,13 @@ import numpy as np
 from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
 from shipid.logs.guess.commands import unique
 from shipid.logs.guess.words import fits, is_order, side_of
-from shipid.physics.signals import SIGNALS, is_shaft, named, row_of, signal_of
+from shipid.physics.signals import SIGNALS, is_shaft, rows_of_role, signal_of, signal_row
 
 
 def reserve_outputs(state: State) -> dict[str, str]:
     """Column -> output, for columns whose name says one and nothing else; they are taken, so that no other step is."""
     chosen: dict[str, str] = {}
-    for signal, row in named("output").items():
+    for signal, row in rows_of_role("output").items():
         for name in state.called(signal):
             scores, unit = fits(name), unit_in_name(name, row.unit)
             rivals = [score for meaning, score in scores.items() if meaning != signal]
@@ -43,7 +43,7 @@ def _component(state: State, signal: str) -> str:
     """Component of the only shaft, or of the only angle, in the draft; else that of the signal."""
     usual = SIGNALS[signal].component
     commands = [
-        one.name for one in state.suggestions if (row := row_of(one.name)) is not None and row.role == "command"
+        one.name for one in state.suggestions if (row := signal_row(one.name)) is not None and row.role == "command"
     ]
     alike = [name for name in commands if is_shaft(name) == (SIGNALS["n"].component == usual)]
     alike = [name for name in alike if is_shaft(name) or SIGNALS[signal_of(name)].component == usual]

@@ -10,7 +10,7 @@ from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import choose_commands
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.words import numbered
-from shipid.vessel.dynamics import dynamics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.template import Particulars, first_guess
 from tests.logs.simulated import si_log, state_with_pose
@@ -27,7 +27,7 @@ def vessel(**known: object) -> Vessel:
 
 def drafted(columns: dict[str, np.ndarray], ship: Vessel) -> tuple[State, dict[str, str]]:
     state = state_with_pose(columns)
-    state.r, state.commands = R, dynamics(ship).commands
+    state.r, state.commands = R, vessel_dynamics(ship).commands
     outputs = reserve_outputs(state)
     choose_commands(state)
     suggest_outputs(state, outputs)
@@ -151,7 +151,7 @@ SAYINGS = {
 @pytest.mark.parametrize("seed", range(4))
 def test_a_name_that_says_the_component_is_taken_for_it(ship: str, saying: str, seed: int) -> None:
     """In any order of the columns, none for two components, and nothing is asked about which is which."""
-    commands, random = dynamics(SHIPS[ship]).commands, np.random.default_rng(seed)
+    commands, random = vessel_dynamics(SHIPS[ship]).commands, np.random.default_rng(seed)
     said = {name: SAYINGS[saying](*name.split(".")) for name in commands}
     columns = {
         said[name]: (RUDDER if name.endswith("delta") else RPM) * random.uniform(0.7, 1.2)
@@ -189,7 +189,7 @@ def test_sides_letters_and_numbers_take_a_column_each(
 ) -> None:
     """Numbers count from starboard, and that is asked."""
     random = np.random.default_rng(1)
-    rudders = {name: RUDDER for name in dynamics(SHIPS[ship]).commands if name.endswith("delta")}
+    rudders = {name: RUDDER for name in vessel_dynamics(SHIPS[ship]).commands if name.endswith("delta")}
     values = {name: RPM * random.uniform(0.7, 1.2) for name in columns}
     state, names = drafted(rudders | values, SHIPS[ship])
     assert {name: source for name, source in names.items() if source in columns} == expected
