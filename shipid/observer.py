@@ -35,7 +35,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import check_class
 from shipid.checked import CheckedModel
-from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, after_pauses, clock_slack, stretches
+from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, after_pauses, clock_slack, stretch_rows
 from shipid.data.windows import PathSource, Windows
 from shipid.engine.casadi import summed_rates
 from shipid.engine.samples import map_over_samples
@@ -441,7 +441,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     table = {name: frame[name].to_numpy(dtype=float) for name in map(str, frame) if name not in ("run", "flags")}
     places = [
         part
-        for _, rows in stretches(dataset)
+        for _, rows in stretch_rows(dataset)
         for part in np.split(rows, np.flatnonzero(after_pauses(table["t"][rows], filters.pause)))
     ]
     _check_intervals(dataset, filters, places)

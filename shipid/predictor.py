@@ -23,7 +23,7 @@ from shipid.arguments import (
     check_number,
     check_whole_number,
 )
-from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, locked, run_folds
+from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, locked_view, run_folds
 from shipid.document import plain_values
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, suggest_name
@@ -154,7 +154,7 @@ class Predictor:
         if level is not None:
             self.check_level(level, kind)
         instants = self._known(instants)
-        alone = locked(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
+        alone = locked_view(self._paths(self.physics.paths(instants) if paths is None else paths, instants))
         home = type(self.corrector)
         with locate_errors(f"{home.__name__}.predict", home):
             try:
@@ -438,12 +438,14 @@ def _as_numbers(instants: Instants) -> Instants:
         raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
     columns = {}
     for name in (str(name) for name in instants.columns if name != "run"):  # the name of the run, as of a table
-        columns[name] = locked(as_float_array(f"column {name!r}", instants.columns[name], DataError))
+        columns[name] = locked_view(as_float_array(f"column {name!r}", instants.columns[name], DataError))
         if columns[name].shape != count:
             raise DataError(f"must be {count} as 'u', not {columns[name].shape}", path=name)
 
     def floats(what: str, given: Mapping[str, Array], leading: int | None = None) -> dict[str, Array]:
-        arrays = {name: locked(as_float_array(f"{what} {name!r}", values, DataError)) for name, values in given.items()}
+        arrays = {
+            name: locked_view(as_float_array(f"{what} {name!r}", values, DataError)) for name, values in given.items()
+        }
         for name, array in arrays.items():
             if leading is not None and (array.ndim != leading + 1 or array.shape[leading:] != count):
                 wanted = f"({'P, ' * leading}{count[0]}{'' if leading else ','})"

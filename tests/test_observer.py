@@ -16,7 +16,7 @@ import pytest
 from casadi import SX
 from scipy.linalg import expm
 
-from shipid.data.causal import causal_columns, last_known
+from shipid.data.causal import causal_columns, last_known_rows
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.engine import samples
@@ -514,11 +514,11 @@ def test_interpolated_rows_hold_the_last_known_value() -> None:
     values, t = rng.normal(size=60), 0.5 * np.arange(160)
     t = t[(t > fixes[0]) & (t < fixes[-1])]
     whole = np.interp(t, fixes, values)
-    held = whole[last_known(t, whole)]
+    held = whole[last_known_rows(t, whole)]
     for k in range(5, len(t)):
         later = fixes > t[k]
         other = np.interp(t, fixes, np.where(later, values + rng.normal(size=60), values))
-        assert held[k] == pytest.approx(other[last_known(t, other)][k], abs=1e-12)
+        assert held[k] == pytest.approx(other[last_known_rows(t, other)][k], abs=1e-12)
     assert np.corrcoef(held, whole)[0, 1] > 0.2
 
 

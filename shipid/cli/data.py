@@ -221,7 +221,7 @@ def data_check(
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position, thrust of a vessel."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
-    from shipid.data.held import nothing_varies
+    from shipid.data.held import warn_of_constant_commands
 
     check_ending(html, ".html")
     log = read_dataset(dataset)
@@ -250,7 +250,7 @@ def data_check(
             rows = checks.loc[~ok, ["run", "check", "sentence"]].to_numpy()
             answer.rows("failed", checks[~ok], text_table(["run", "failed", "what to look at"], rows))
         answer.say(f"{len(checks) - failed} of {len(checks)} checks passed", passed=len(checks) - failed)
-        notes = nothing_varies(log, log.runs)
+        notes = warn_of_constant_commands(log, log.runs)
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
         if failed:
             raise typer.Exit(1)

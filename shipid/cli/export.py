@@ -64,14 +64,14 @@ def aboard_command(
     adaptive: Adaptive = None,
 ) -> None:
     """Play a log as if at sea: every instant uses the past alone. Show what an officer would have seen."""
-    from shipid.study.aboard import play, summed_up, write
+    from shipid.study.aboard import play_aboard, replay_summary, write_replay_points
 
     check_band(level, kind, adaptive)
     check_ending(html, ".html")
-    played = play(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
+    played = play_aboard(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
     if out is not None:
-        write(played, out)
-    lines = summed_up(played)
+        write_replay_points(played, out)
+    lines = replay_summary(played)
     for line in lines:
         typer.echo(line.text)
     if out is not None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
     from shipid.identification.outcome import Identified
     from shipid.identification.settings import Identify
-    from shipid.study.structures import Compared
+    from shipid.study.structures import StructureComparison
     from shipid.vessel.load import Vessel
 
 
@@ -94,7 +94,7 @@ def identify_command(
     from shipid.data.dataset import read_dataset
     from shipid.files import check_new
     from shipid.identification.outcome import check, read_settings, run_identification, write_patch
-    from shipid.study.structures import comparable
+    from shipid.study.structures import check_comparison
     from shipid.vessel.load import load_vessel
 
     if structures is None and folds is not None:
@@ -128,7 +128,7 @@ def identify_command(
     elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
         raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
     else:
-        comparable(log, declared, names, **how)
+        check_comparison(log, declared, names, **how)
     with open_answer(as_json) as answer, _errors_of_settings(settings):
         _look_first(ship, log, runs or (), test or (), answer)
         if structures is not None:
@@ -188,12 +188,12 @@ def _compare_structures(
 ) -> None:
     """Compare structures of the hull, print the comparison, and write the vessel with the structure chosen."""
     from shipid.identification.statistics import LEVEL
-    from shipid.study.structures import compare_structures, structures_content, write_chosen
+    from shipid.study.structures import compare_structures, structures_content, write_chosen_structure
 
     with end_on_interrupt(), show_steps() as say:
         compared = compare_structures(ship, log, declared, names, level=LEVEL if band is None else band, say=say, **how)
     _show_structures(compared, answer)
-    written = write_chosen(compared, file)
+    written = write_chosen_structure(compared, file)
     answer.say(f"vessel with the structure {compared.chosen} -> {written}", chosen=compared.chosen, file=written)
     if html is not None:
         from shipid.report.structures import write_structures
@@ -202,7 +202,7 @@ def _compare_structures(
         answer.say(f"page -> {write_structures(page, html)}", page=html)
 
 
-def _show_structures(compared: Compared, answer: Answer) -> None:
+def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     """Print errors on runs held out, standard manoeuvres, and errors by side."""
     from shipid.identification.sides import HEADS, shown
 

@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Array, Dataset, stretches
+from shipid.data.dataset import Array, Dataset, stretch_rows
 from shipid.errors import DataError, suggest_name
 
-ROUNDING = 1e-7  # of a column's largest step: below it a second difference is zero
+LEAST_BEND = 1e-7  # of a column's largest step: below it a second difference is zero
 
 
-def last_known(t: Array, values: Array) -> NDArray[np.intp]:
+def last_known_rows(t: Array, values: Array) -> NDArray[np.intp]:
     """For each row (N,) the latest row whose value depends on no fix after it; the first rows hold the first.
 
     A bend at row i (slopes before and after differ) says that a fix lies within one step of row i. The line through row
@@ -28,7 +28,7 @@ def last_known(t: Array, values: Array) -> NDArray[np.intp]:
     """
     count, steps = len(values), np.diff(t)
     slope = np.diff(values) / steps
-    limit = ROUNDING * max(float(np.abs(slope).max(initial=0.0)), 1e-300)
+    limit = LEAST_BEND * max(float(np.abs(slope).max(initial=0.0)), 1e-300)
     of_clock = np.abs(slope) * 2 * np.spacing(np.abs(t).max()) / steps  # seconds since 1970 are rounded to some 1e-7
     bend = np.zeros(count, dtype=bool)
     bend[1:-1] = np.abs(np.diff(slope)) > limit + of_clock[1:] + of_clock[:-1]
@@ -53,11 +53,11 @@ def causal_columns(dataset: Dataset, columns: Sequence[str] = ("u", "v")) -> Dat
         if name not in frame:
             raise DataError(f"missing column: {suggest_name(name, list(map(str, frame.columns)))}", path=name)
         whole = frame[name].to_numpy(dtype=float).copy()
-        for _, rows in stretches(dataset):
+        for _, rows in stretch_rows(dataset):
             t, values = frame["t"].to_numpy()[rows], whole[rows]
             if len(rows) < 3:
                 continue
-            whole[rows] = values[last_known(t, values)]
+            whole[rows] = values[last_known_rows(t, values)]
         frame[name] = whole
     metadata = {**dataset.metadata, "causal": list(columns)}
     return replace(dataset, frame=frame, metadata=metadata)

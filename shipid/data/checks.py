@@ -15,34 +15,38 @@ from shipid.data.dataset import (
     Dataset,
     clock_slack,
     cumulative_integral,
-    pieces,
-    pieces_by_run,
     shares_clock,
-    unit_of,
+    stretches_by_run,
+    stretches_of_runs,
+    unit_of_column,
 )
-from shipid.data.lapses import Lapse, lapses
+from shipid.data.lapses import CommandFault, find_command_faults
 from shipid.errors import DataError
 from shipid.physics.signals import is_all_round, signal_row
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
-GAP = 3.0  # usual steps: a longer one is a time without rows
-JITTER, FROZEN, OVERLAP = 0.05, 0.02, 0.5
-ROUGHER = 1.2  # times, on an uneven clock or on an even one: this one is wrong, by more than the noise hides
+GAP_STEPS = 3.0  # usual steps: a longer one is a time without rows
+JITTER_LIMIT, FROZEN_LIMIT, OVERLAP_LIMIT = 0.05, 0.02, 0.5
+ROUGHNESS_RATIO = 1.2  # times, on an uneven clock or on an even one: this one is wrong, by more than the noise hides
 SCALE_ERROR, HEADING_ERROR, PATH_ERROR = 0.1, 0.25, 0.05
-TURNING = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
-STRETCH, WINDOW = 30.0, 10.0  # s
-SURE = 4.0  # standard errors beyond which a difference is no chance: one clean run in some ten thousand
-EXACT = 1e-4  # of a change: a smaller misfit is none
-DELAY, DELAYS, EXPLAINED = 0.3, 3.0, 0.35  # s: least delay reported, longest tried; share of the misfit it explains
-FEWEST, MOST = 20, 5000  # windows that show a delay
-LAPSES = {
+LEAST_YAW_RATE = np.radians(0.2)  # rms of r under which a run is too straight to compare headings
+DRIFT_SECONDS, WINDOW_SECONDS = 30.0, 10.0  # s
+STANDARD_ERRORS = 4.0  # standard errors beyond which a difference is no chance: one clean run in some ten thousand
+ROUNDING_OF_CHANGE = 1e-4  # of a change: a smaller misfit is none
+LEAST_DELAY, LONGEST_DELAY, DELAY_SHARE = (
+    0.3,
+    3.0,
+    0.35,
+)  # s: least delay reported, longest tried; share of the misfit it explains
+LEAST_DELAY_WINDOWS, MOST_DELAY_WINDOWS = 20, 5000  # windows that show a delay
+FAULT_WORDS = {
     "zero": "is 0 for a moment, faster than it moves elsewhere",
     "spike": "leaves its course and comes back, faster than it moves elsewhere",
     "still": "repeats one value while the ship turns to both sides, and is noisy in other turns",
     "pause": "is 0 for a moment, with the same order before and after, which may have been ordered",
 }
-LIVELY, WILD = 0.1, 6.0  # of the larger changes: less says nothing; of the usual misfit: more is a spike
+LEAST_CHANGE, SPIKE_MISFIT = 0.1, 6.0  # of the larger changes: less says nothing; of the usual misfit: more is a spike
 
 
 def check_dataset(dataset: Dataset) -> pd.DataFrame:
@@ -53,40 +57,50 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     Raises DataError for what is no dataset.
     """
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    by_run = pieces_by_run(dataset)
+    by_run = stretches_by_run(dataset)
     motions = {run: _motion(stretches) for run, stretches in by_run.items()}
-    faulty = _faulty_commands(dataset)
+    faulty = _check_commands(dataset)
     table = []
     for run, stretches in by_run.items():
-        heading = [*_heading(stretches)]
+        heading = [*_check_heading(stretches)]
         rate_is_right = any(row["check"] == "heading scale" and row["ok"] and row["value"] for row in heading)
-        results = [*_clock(stretches), *_ranges(stretches, {"r"} if rate_is_right else set()), *heading]
-        results += [*_path(stretches), _frozen(stretches), _overlap(run, motions, shares_clock(dataset))]
+        results = [*_check_clock(stretches), *_check_ranges(stretches, {"r"} if rate_is_right else set()), *heading]
+        results += [
+            *_check_path(stretches),
+            _check_frozen(stretches),
+            _check_overlap(run, motions, shares_clock(dataset)),
+        ]
         table += [{"run": run, **row} for row in [*results, *faulty.get(run, [])]]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
-def _row(check: str, value: float, unit: str, limit: float, sentence: str, ok: bool | None = None) -> dict[str, Any]:
+def _check_row(
+    check: str, value: float, unit: str, limit: float, sentence: str, ok: bool | None = None
+) -> dict[str, Any]:
     passed = value <= limit if ok is None else ok
     return {"check": check, "value": value, "unit": unit, "limit": limit, "ok": bool(passed), "sentence": sentence}
 
 
-def _clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
+def _check_clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     steps = np.concatenate([np.diff(rows["t"]) for rows in stretches])
     if not len(steps):
-        yield _row("gap", 0.0, "s", 0.0, "a single row", ok=False)
+        yield _check_row("gap", 0.0, "s", 0.0, "a single row", ok=False)
         return
     usual, longest = float(np.median(steps)), float(steps.max())
     slack = max(clock_slack(rows["t"].to_numpy()) for rows in stretches)
-    yield _row(
-        "gap", longest, "s", GAP * usual + slack, f"the longest step is {longest:.3g} s, the usual one {usual:.3g} s"
+    yield _check_row(
+        "gap",
+        longest,
+        "s",
+        GAP_STEPS * usual + slack,
+        f"the longest step is {longest:.3g} s, the usual one {usual:.3g} s",
     )
     jitter = float(np.sqrt(np.mean((steps - usual) ** 2))) / usual
     sentence = f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS)"
-    fits = _bears_out(stretches) if jitter > JITTER and longest <= GAP * usual + slack else False
-    rounded = fits is None and float(np.std(steps)) <= JITTER * usual
+    fits = _clock_fits_motion(stretches) if jitter > JITTER_LIMIT and longest <= GAP_STEPS * usual + slack else False
+    rounded = fits is None and float(np.std(steps)) <= JITTER_LIMIT * usual
     words = "; are the times those of the samples, or of their arrival?"
-    if jitter <= JITTER:
+    if jitter <= JITTER_LIMIT:
         words = ""
     elif fits:
         words = "; positions and heading bear them out"
@@ -94,10 +108,12 @@ def _clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         words = "; so little comes of a clock that rounds"
     elif fits is None:
         words += " Positions and heading are too noisy, or too steady, to tell"
-    yield _row("jitter", jitter, "1", JITTER, f"{sentence}{words}", ok=jitter <= JITTER or rounded or bool(fits))
+    yield _check_row(
+        "jitter", jitter, "1", JITTER_LIMIT, f"{sentence}{words}", ok=jitter <= JITTER_LIMIT or rounded or bool(fits)
+    )
 
 
-def _bears_out(stretches: list[pd.DataFrame]) -> bool | None:
+def _clock_fits_motion(stretches: list[pd.DataFrame]) -> bool | None:
     """Whether positions or heading are smoother on their clock than on one with even steps; None: they cannot tell.
 
     Neither may be rougher on it. Noise hides both a clock that is right and one that is wrong.
@@ -106,16 +122,18 @@ def _bears_out(stretches: list[pd.DataFrame]) -> bool | None:
     smoother = False
     for names in (("north", "east"), ("psi",)):
         uneven, even = (
-            rms(np.array([_roughness(rows, name, clock) for rows in long for name in names] or [0.0]))
+            root_mean_square(
+                np.array([_roughness_on_clock(rows, name, clock) for rows in long for name in names] or [0.0])
+            )
             for clock in (True, False)
         )
-        if uneven > ROUGHER * even:
+        if uneven > ROUGHNESS_RATIO * even:
             return False
-        smoother |= even > ROUGHER * uneven
+        smoother |= even > ROUGHNESS_RATIO * uneven
     return True if smoother else None
 
 
-def _roughness(rows: pd.DataFrame, name: str, clock: bool) -> float:
+def _roughness_on_clock(rows: pd.DataFrame, name: str, clock: bool) -> float:
     """Median distance of the values of a column from the line between their neighbours, by the clock or even steps."""
     values, t = rows[name].to_numpy(), rows["t"].to_numpy()
     values = np.unwrap(values) if name == "psi" else values
@@ -123,20 +141,20 @@ def _roughness(rows: pd.DataFrame, name: str, clock: bool) -> float:
     return float(np.median(np.abs(values[1:-1] - (1 - share) * values[:-2] - share * values[2:])))
 
 
-def _ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[dict[str, Any]]:
+def _check_ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[dict[str, Any]]:
     """Whether values are plausible; those that others prove are, however large."""
     for name in map(str, stretches[0].columns):
         row = signal_row(name)
         if row is not None and row.plausible is not None:
             largest = max(float(rows[name].abs().max()) for rows in stretches)
-            unit = unit_of(name) or ""
+            unit = unit_of_column(name) or ""
             sentence = f"{name} reaches {largest:.3g} {unit}" + ("" if name in proved else ": right unit?")
-            yield _row(f"range {name}", largest, unit, row.plausible, sentence, ok=name in proved or None)
+            yield _check_row(f"range {name}", largest, unit, row.plausible, sentence, ok=name in proved or None)
 
 
-def _faulty_commands(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
+def _check_commands(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
     """Run -> a failure for each command that lapses in it; what is usual for a command say all runs together."""
-    parts = [*pieces(dataset)]
+    parts = [*stretches_of_runs(dataset)]
     psi = np.concatenate([np.unwrap(rows["psi"]) for _, rows in parts])
     t = np.concatenate([rows["t"] for _, rows in parts])
     runs = np.concatenate([np.full(len(rows), run, dtype=object) for run, rows in parts])
@@ -145,25 +163,25 @@ def _faulty_commands(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
     follows[np.cumsum([len(rows) for _, rows in parts])[:-1] - 1] = False
     if not follows.any():
         return {}
-    follows &= steps <= GAP * np.median(steps[follows])
+    follows &= steps <= GAP_STEPS * np.median(steps[follows])
     found: dict[str, list[dict[str, Any]]] = {}
     for name in dataset.commands:
         values = np.concatenate([np.unwrap(rows[name]) if is_all_round(name) else rows[name] for _, rows in parts])
-        by_run: dict[str, list[Lapse]] = {}
-        for lapse in lapses(name, t, values, psi, follows):
+        by_run: dict[str, list[CommandFault]] = {}
+        for lapse in find_command_faults(name, t, values, psi, follows):
             by_run.setdefault(runs[lapse.first], []).append(lapse)
         for run, some in by_run.items():
             count = sum(lapse.end - lapse.first for lapse in some)
-            said = [words for kind, words in LAPSES.items() if any(lapse.kind == kind for lapse in some)]
+            said = [words for kind, words in FAULT_WORDS.items() if any(lapse.kind == kind for lapse in some)]
             where = f"{count} row{'s' * (count > 1)}, the first at t = {t[some[0].first]:.10g} s"
             ordered = all(lapse.kind == "pause" for lapse in some)
             by = "a break" if any(lapse.kind == "still" for lapse in some) else "despike or a break"
             sentence = f"{name} {' and '.join(said)}: {where}. If it was not so, mend it in the mapping by {by}"
-            found.setdefault(run, []).append(_row(f"lapses {name}", float(count), "1", 0.0, sentence, ok=ordered))
+            found.setdefault(run, []).append(_check_row(f"lapses {name}", float(count), "1", 0.0, sentence, ok=ordered))
     return found
 
 
-def noise_of(values: Array) -> float:
+def white_noise_of(values: Array) -> float:
     """Standard deviation of the white noise of a smooth signal (N,), from its second differences.
 
     E (x[i-1] - 2 x[i] + x[i+1])^2 = 6 sigma^2 for a signal that is straight over three rows; what curves adds to it, so
@@ -175,7 +193,7 @@ def noise_of(values: Array) -> float:
 
 
 @dataclass(frozen=True)
-class _Turning:
+class _TurningWindows:
     """Changes of heading and integrals of r over windows (K,) [rad], and the standard deviation of their difference."""
 
     seen: Array
@@ -183,7 +201,7 @@ class _Turning:
     error: Array
 
 
-def _turning(stretches: list[pd.DataFrame]) -> _Turning:
+def _compare_turning(stretches: list[pd.DataFrame]) -> _TurningWindows:
     """Compare heading and yaw rate over windows that do not overlap, with the error that their noise makes."""
     seen, integrated, errors = [], [], []
     for rows in stretches:
@@ -192,66 +210,74 @@ def _turning(stretches: list[pd.DataFrame]) -> _Turning:
         if len(t) < 5:
             continue
         usual = float(np.median(np.diff(t)))
-        width = max(4, min(round(WINDOW / usual), (len(t) - 1) // 4))
+        width = max(4, min(round(WINDOW_SECONDS / usual), (len(t) - 1) // 4))
         edges = np.arange(0, len(t), width)
         total = cumulative_integral(t, r)
         seen.append(np.diff(psi[edges]))
         integrated.append(np.diff(total[edges]))
         # noise of both ends, noise of the rate, and what the trapezoid rule leaves of its curvature
         curvature = float(np.sqrt(np.mean(np.diff(r, 2) ** 2)))
-        variance = 2 * noise_of(psi) ** 2 + width * (usual * noise_of(r)) ** 2 + width * (usual * curvature / 12) ** 2
+        variance = (
+            2 * white_noise_of(psi) ** 2
+            + width * (usual * white_noise_of(r)) ** 2
+            + width * (usual * curvature / 12) ** 2
+        )
         errors.append(np.full(len(edges) - 1, np.sqrt(variance)))
     join = [np.concatenate(parts) if parts else np.empty(0) for parts in (seen, integrated, errors)]
-    return _Turning(*join)
+    return _TurningWindows(*join)
 
 
-def _heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
+def _check_heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     """Changes of psi over windows against the integral of r: scale, and the difference beyond the noise.
 
     A difference is reported where it is large and not made by noise: neither a noisy log in good order nor a small
     error of an exact one fails.
     """
-    windows = _turning(stretches)
+    windows = _compare_turning(stretches)
     if len(windows.seen) < 2:
         return
-    size = rms(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
-    change = rms(windows.seen)
-    if max(size, change / WINDOW) < TURNING:
-        yield _row("heading scale", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
+    size = root_mean_square(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
+    change = root_mean_square(windows.seen)
+    if max(size, change / WINDOW_SECONDS) < LEAST_YAW_RATE:
+        yield _check_row("heading scale", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
         return
-    error, noise = windows.seen - windows.integrated, rms(windows.error)
-    chance = noise * np.sqrt(1 + SURE * np.sqrt(2 / len(error)))  # of a mean square of so many
+    error, noise = windows.seen - windows.integrated, root_mean_square(windows.error)
+    chance = noise * np.sqrt(1 + STANDARD_ERRORS * np.sqrt(2 / len(error)))  # of a mean square of so many
     power = float(np.sum(windows.integrated**2)) or 1.0
     scale = float(np.sum(windows.seen * windows.integrated)) / power
-    spread = rms(windows.seen - scale * windows.integrated) / np.sqrt(power)
+    spread = root_mean_square(windows.seen - scale * windows.integrated) / np.sqrt(power)
     words = "; wrong sign of r or psi?" if scale < 0 else "; degrees or another unit?"
     sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r{words}"
-    limit = SCALE_ERROR + SURE * spread
-    yield _row("heading scale", scale, "1", limit, sentence, ok=rms(error) <= chance or abs(scale - 1) <= limit)
-    off, by_noise = np.degrees(rms(error)), np.degrees(noise)
+    limit = SCALE_ERROR + STANDARD_ERRORS * spread
+    yield _check_row(
+        "heading scale", scale, "1", limit, sentence, ok=root_mean_square(error) <= chance or abs(scale - 1) <= limit
+    )
+    off, by_noise = np.degrees(root_mean_square(error)), np.degrees(noise)
     sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
-    yield _row("heading error", rms(error), "rad", HEADING_ERROR * change + chance, sentence)
+    yield _check_row("heading error", root_mean_square(error), "rad", HEADING_ERROR * change + chance, sentence)
     seen = [np.unwrap(rows["psi"]).astype(complex) for rows in stretches]
-    yield from _latency("heading latency", "heading", "yaw rate", stretches, seen, [_turned(one) for one in stretches])
+    yield from _check_latency(
+        "heading latency", "heading", "yaw rate", stretches, seen, [_integrated_rate(one) for one in stretches]
+    )
 
 
-def _turned(rows: pd.DataFrame) -> Plane:
+def _integrated_rate(rows: pd.DataFrame) -> Plane:
     return cumulative_integral(rows["t"].to_numpy(), rows["r"].to_numpy()).astype(complex)
 
 
-def way(rows: pd.DataFrame) -> Plane:
+def travelled_path(rows: pd.DataFrame) -> Plane:
     """Integral of u, v, psi from the first row of a stretch, north + i east [m]."""
     t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
     rate = (u + 1j * v) * np.exp(1j * psi)
     return cumulative_integral(t, rate.real) + 1j * cumulative_integral(t, rate.imag)
 
 
-def _latency(
+def _check_latency(
     check: str, what: str, against: str, stretches: list[pd.DataFrame], seen: list[Plane], integrated: list[Plane]
 ) -> Iterator[dict[str, Any]]:
-    delay = delay_of(zip((rows["t"].to_numpy() for rows in stretches), seen, integrated, strict=True))
+    delay = measure_delay(zip((rows["t"].to_numpy() for rows in stretches), seen, integrated, strict=True))
     if delay is not None:
-        yield _row(check, abs(delay.seconds), "s", delay.limit, delay.said(what, against)[1])
+        yield _check_row(check, abs(delay.seconds), "s", delay.limit, delay.said(what, against)[1])
 
 
 @dataclass(frozen=True)
@@ -273,7 +299,7 @@ class Delay:
         return late, f"{late} comes {by}"
 
 
-def delay_of(stretches: Iterable[tuple[Array, Plane, Plane]]) -> Delay | None:
+def measure_delay(stretches: Iterable[tuple[Array, Plane, Plane]]) -> Delay | None:
     """Delay at which changes of a signal over windows fit those of an integral times any scale; None for few windows.
 
     stretches : t (N,) [s] without a hole, signal and integral of its rate (N,). A delay is sure if it explains much of
@@ -281,32 +307,36 @@ def delay_of(stretches: Iterable[tuple[Array, Plane, Plane]]) -> Delay | None:
     """
     stretches = [one for one in stretches if len(one[0]) >= 8]
     usual = max((float(np.median(np.diff(t))) for t, _, _ in stretches), default=1.0)
-    longest = max(DELAYS, 3 * usual)
+    longest = max(LONGEST_DELAY, 3 * usual)
     none = round(longest / max(usual / 2, longest / 24))
     delays = np.linspace(-longest, longest, 2 * none + 1)
     changes, integrals, variances = [np.empty(0, complex)], [np.empty((len(delays), 0), complex)], [np.empty(0)]
-    least = max(usual, sum(t[-1] - t[0] for t, _, _ in stretches) / MOST)
+    least = max(usual, sum(t[-1] - t[0] for t, _, _ in stretches) / MOST_DELAY_WINDOWS)
     for t, signal, total in stretches:
-        width = min(max(WINDOW, 4 * usual), (t[-1] - t[0]) / 6)
+        width = min(max(WINDOW_SECONDS, 4 * usual), (t[-1] - t[0]) / 6)
         first = np.arange(t[0] + longest, t[-1] - longest - width, max(width / 4, least))
-        changes.append(_moved(t, signal, first + width) - _moved(t, signal, first))
-        moved = [_moved(t, total, first + width - delay) - _moved(t, total, first - delay) for delay in delays]
+        changes.append(_complex_at(t, signal, first + width) - _complex_at(t, signal, first))
+        moved = [
+            _complex_at(t, total, first + width - delay) - _complex_at(t, total, first - delay) for delay in delays
+        ]
         integrals.append(np.array(moved))
-        variances.append(np.full(len(first), 2 * (noise_of(signal.real) ** 2 + noise_of(signal.imag) ** 2)))
+        variances.append(np.full(len(first), 2 * (white_noise_of(signal.real) ** 2 + white_noise_of(signal.imag) ** 2)))
     change, integrated = np.concatenate(changes), np.concatenate(integrals, axis=1)
-    if len(change) < FEWEST:
+    if len(change) < LEAST_DELAY_WINDOWS:
         return None
     misfit, size = _misfit(change, integrated), np.abs(integrated[none])
-    moving = size >= LIVELY * np.percentile(size, 90)
-    keep = (misfit <= WILD * np.median(misfit[:, moving], axis=1, keepdims=True) + 1e-9).any(axis=0)
+    moving = size >= LEAST_CHANGE * np.percentile(size, 90)
+    keep = (misfit <= SPIKE_MISFIT * np.median(misfit[:, moving], axis=1, keepdims=True) + 1e-9).any(axis=0)
     left = (_misfit(change[keep], integrated[:, keep]) ** 2).sum(axis=1)
     noise, best = float(np.concatenate(variances)[keep].sum()), int(np.argmin(left))
     gain = float(left[none] - left[best])
     explained = gain / float(left[none]) if gain > 0 else 0.0
     # without a delay both misfits are noise, of the log or of its digits, and differ by its scatter alone
-    chance = SURE * noise * np.sqrt(2 / keep.sum()) + EXACT**2 * float(np.sum(np.abs(change[keep]) ** 2))
-    sure = gain > chance and left[none] > 2 * noise and explained > EXPLAINED
-    return Delay(float(delays[best]) if sure else 0.0, max(DELAY, 0.75 * usual), explained)
+    chance = STANDARD_ERRORS * noise * np.sqrt(2 / keep.sum()) + ROUNDING_OF_CHANGE**2 * float(
+        np.sum(np.abs(change[keep]) ** 2)
+    )
+    sure = gain > chance and left[none] > 2 * noise and explained > DELAY_SHARE
+    return Delay(float(delays[best]) if sure else 0.0, max(LEAST_DELAY, 0.75 * usual), explained)
 
 
 def _misfit(change: Plane, integrated: Plane) -> Array:
@@ -316,24 +346,32 @@ def _misfit(change: Plane, integrated: Plane) -> Array:
     return np.asarray(np.abs(change - (scale / power)[:, None] * integrated))
 
 
-def _moved(t: Array, values: Plane, instants: Array) -> Plane:
+def _complex_at(t: Array, values: Plane, instants: Array) -> Plane:
     return np.interp(instants, t, values.real) + 1j * np.interp(instants, t, values.imag)
 
 
-def _path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
+def _check_path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     """RMS distance between positions and integrated u, v, psi over stretches of 30 s that start together."""
     speeds = [np.hypot(rows["u"].to_numpy(), rows["v"].to_numpy()) for rows in stretches]
     lengths = [
         cumulative_integral(rows["t"].to_numpy(), speed)[-1] for rows, speed in zip(stretches, speeds, strict=True)
     ]
-    error = rms(np.concatenate([_drift(rows) for rows in stretches]))
+    error = root_mean_square(np.concatenate([_drift_of_positions(rows) for rows in stretches]))
     duration = sum(float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for rows in stretches)
-    distance = sum(lengths) / duration * min(STRETCH, duration) if duration > 0 else 0.0
-    noise = rms(np.array([_path_noise(rows, speed) for rows, speed in zip(stretches, speeds, strict=True)]))
-    sentence = f"positions leave integrated velocities by {error:.2g} m (RMS) in {STRETCH:g} s, {distance:.3g} m run"
-    yield _row("path", error, "m", PATH_ERROR * distance + SURE / 2 * noise, f"{sentence}; {noise:.2g} m by noise")
+    distance = sum(lengths) / duration * min(DRIFT_SECONDS, duration) if duration > 0 else 0.0
+    noise = root_mean_square(
+        np.array([_path_noise(rows, speed) for rows, speed in zip(stretches, speeds, strict=True)])
+    )
+    sentence = (
+        f"positions leave integrated velocities by {error:.2g} m (RMS) in {DRIFT_SECONDS:g} s, {distance:.3g} m run"
+    )
+    yield _check_row(
+        "path", error, "m", PATH_ERROR * distance + STANDARD_ERRORS / 2 * noise, f"{sentence}; {noise:.2g} m by noise"
+    )
     seen = [(rows["north"] + 1j * rows["east"]).to_numpy() for rows in stretches]
-    yield from _latency("path latency", "position", "velocity", stretches, seen, [way(rows) for rows in stretches])
+    yield from _check_latency(
+        "path latency", "position", "velocity", stretches, seen, [travelled_path(rows) for rows in stretches]
+    )
 
 
 def _path_noise(rows: pd.DataFrame, speed: Array) -> float:
@@ -343,17 +381,17 @@ def _path_noise(rows: pd.DataFrame, speed: Array) -> float:
         return 0.0
     step = float(np.median(steps))
     position, velocity = (
-        sum(noise_of(rows[name].to_numpy()) ** 2 for name in pair) for pair in (("north", "east"), "uv")
+        sum(white_noise_of(rows[name].to_numpy()) ** 2 for name in pair) for pair in (("north", "east"), "uv")
     )
-    heading = (float(np.mean(speed)) * noise_of(np.unwrap(rows["psi"]))) ** 2
-    return float(np.sqrt(2 * position + STRETCH * step * (velocity + heading)))
+    heading = (float(np.mean(speed)) * white_noise_of(np.unwrap(rows["psi"]))) ** 2
+    return float(np.sqrt(2 * position + DRIFT_SECONDS * step * (velocity + heading)))
 
 
-def _drift(rows: pd.DataFrame) -> Array:
+def _drift_of_positions(rows: pd.DataFrame) -> Array:
     """Distance [m] between positions and integrated velocities, which start together every 30 s, (N,)."""
     t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
     rates = (u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi))
-    part = np.floor((t - t[0]) / STRETCH + 1e-9).astype(int)
+    part = np.floor((t - t[0]) / DRIFT_SECONDS + 1e-9).astype(int)
     start = np.flatnonzero(np.diff(part, prepend=-1))[np.cumsum(np.diff(part, prepend=-1) > 0) - 1]
     errors = [
         rows[name].to_numpy() - cumulative_integral(t, rate)
@@ -365,10 +403,10 @@ def _drift(rows: pd.DataFrame) -> Array:
 def check_series(dataset: Dataset) -> pd.DataFrame:
     """Signals that the checks of motion compare: run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s]."""
     parts = []
-    for run, rows in pieces(dataset):
+    for run, rows in stretches_of_runs(dataset):
         t = rows["t"].to_numpy()
         rate = np.gradient(np.unwrap(rows["psi"]), t) if len(t) > 2 else np.full(len(t), np.nan)
-        part = rows[["t", "r", "u", "v"]].assign(run=run, psi_rate=rate, drift=_drift(rows))
+        part = rows[["t", "r", "u", "v"]].assign(run=run, psi_rate=rate, drift=_drift_of_positions(rows))
         parts.append(part)
     return pd.concat(parts, ignore_index=True)
 
@@ -390,49 +428,51 @@ def _motion(stretches: list[pd.DataFrame]) -> _Motion:
     return _Motion(rows["t"].to_numpy(), keys, bool(lively.sum() >= 0.5 * len(rows)))
 
 
-def _frozen(stretches: list[pd.DataFrame]) -> dict[str, Any]:
+def _check_frozen(stretches: list[pd.DataFrame]) -> dict[str, Any]:
     """Share of the rows whose motion is that of the row before."""
     states = ["north", "east", "psi", "u", "v", "r"]
     same = np.concatenate([(rows[states].diff().iloc[1:] == 0).all(axis=1).to_numpy() for rows in stretches])
     frozen = float(same.mean()) if len(same) else 0.0
-    return _row("frozen", frozen, "1", FROZEN, f"{100 * frozen:.3g} % of the rows repeat the row before")
+    return _check_row("frozen", frozen, "1", FROZEN_LIMIT, f"{100 * frozen:.3g} % of the rows repeat the row before")
 
 
-def _overlap(run: str, motions: Mapping[str, _Motion], shared: bool) -> dict[str, Any]:
+def _check_overlap(run: str, motions: Mapping[str, _Motion], shared: bool) -> dict[str, Any]:
     """Share of the rows of a run that another run has, too."""
-    others = ((_within(motions[run], one, shared), name) for name, one in motions.items() if name != run)
+    others = ((_share_in_other_run(motions[run], one, shared), name) for name, one in motions.items() if name != run)
     double, other = max(others, default=(0.0, ""))
     where = f", most in {other!r}" if double > 0 else ""
     sentence = f"{100 * double:.3g} % of the rows belong to another run, too{where}"
-    return _row("overlap", double, "1", OVERLAP, sentence)
+    return _check_row("overlap", double, "1", OVERLAP_LIMIT, sentence)
 
 
-def copies(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> dict[str, str]:
+def copies_of_other_runs(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> dict[str, str]:
     """Runs, and the one of some others with their motion in most rows: recorded twice, or cut from one log twice."""
     return _copies_among(dataset, runs, list(others), grow=False)
 
 
-def repeated(dataset: Dataset, runs: Iterable[str]) -> dict[str, str]:
-    """Runs, and the one of those before them with their motion in most rows, as in `copies`."""
+def copies_of_earlier_runs(dataset: Dataset, runs: Iterable[str]) -> dict[str, str]:
+    """Runs, and the one of those before them with their motion in most rows, as in `copies_of_other_runs`."""
     return _copies_among(dataset, runs, [], grow=True)
 
 
 def _copies_among(dataset: Dataset, runs: Iterable[str], earlier: list[str], *, grow: bool) -> dict[str, str]:
-    motions = {run: _motion(parts) for run, parts in pieces_by_run(dataset).items()}
+    motions = {run: _motion(parts) for run, parts in stretches_by_run(dataset).items()}
     known = {key for run in earlier for key in motions[run].keys.tolist()}
     found: dict[str, str] = {}
     for run in runs:
         keys = motions[run].keys.tolist()
-        if sum(key in known for key in keys) >= OVERLAP * len(keys) and earlier:  # of few runs: only then one by one
-            share, other = max((_alike(motions[run], motions[name]), name) for name in earlier)
-            found |= {run: other} if share >= OVERLAP else {}
+        if (
+            sum(key in known for key in keys) >= OVERLAP_LIMIT * len(keys) and earlier
+        ):  # of few runs: only then one by one
+            share, other = max((_share_of_same_motion(motions[run], motions[name]), name) for name in earlier)
+            found |= {run: other} if share >= OVERLAP_LIMIT else {}
         if grow:
             earlier.append(run)
             known.update(keys)
     return found
 
 
-def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
+def _share_in_other_run(mine: _Motion, other: _Motion, shared: bool) -> float:
     """Share of the rows of a run that another run has, too: the same instants of one clock, or the same motion."""
     if shared:
         t, instants = mine.t, other.t
@@ -442,14 +482,14 @@ def _within(mine: _Motion, other: _Motion, shared: bool) -> float:
         share = float(np.mean(near <= slack))
         if share > 0:
             return share
-    return _alike(mine, other)
+    return _share_of_same_motion(mine, other)
 
 
-def _alike(mine: _Motion, other: _Motion) -> float:
+def _share_of_same_motion(mine: _Motion, other: _Motion) -> float:
     """Share of the rows of a run that have the motion of a row of another run."""
     return float(np.mean(np.isin(mine.keys, other.keys))) if mine.lively else 0.0
 
 
-def rms(values: Array) -> float:
+def root_mean_square(values: Array) -> float:
     """Root mean square of values of any shape."""
     return float(np.sqrt(np.mean(values**2)))

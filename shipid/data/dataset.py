@@ -23,19 +23,19 @@ from shipid.files import open_file, read_arrow, replace_whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, is_wrapped_angle, rows_of_role, signal_of
 
 Array = NDArray[np.float64]
-Rows = pd.DataFrame | Mapping[str, NDArray[Any]]
-"""Rows of one unbroken stretch, as `pieces` or `columns_of_pieces` gives them."""
+StretchRows = pd.DataFrame | Mapping[str, NDArray[Any]]
+"""Rows of one unbroken stretch, as `stretches_of_runs` or `stretch_columns` gives them."""
 
 STANDARD_DEVIATIONS = {"u": "std_u", "v": "std_v", "r": "std_r"}
 """State -> column of its standard deviation, where it was estimated instead of measured."""
 BREAK = "break"
 """Name of the flag on the first row after a break: nothing connects it to the row before."""
 
-DATED = 1e8  # s: a clock that is farther is one of dates, seconds since 1970
+FIRST_DATED_TIME = 1e8  # s: a clock that is farther is one of dates, seconds since 1970
 MOST_FLAGS = 62  # bits of an integer
-RARE = 3.0  # times the shortest interval of late: a pause is longer
-FORGOTTEN = 1.1  # times: by so much the shortest interval of late grows with each row
-_KEY = b"shipid"
+PAUSE_STEPS = 3.0  # times the shortest interval of late: a pause is longer
+SHORTEST_STEP_GROWTH = 1.1  # times: by so much the shortest interval of late grows with each row
+_METADATA_KEY = b"shipid"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Dataset:
     ----------
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
         (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w`, outputs
-        (`propeller.thrust` [N]) and the rest of `optional()`. SI units, radians; time increases within a run; no NaN.
+        (`propeller.thrust` [N]) and the rest of `optional_columns()`. SI units, radians; time increases within a run; no NaN.
         u and v are horizontal, along and across the heading, and r = d(psi)/dt, also where the ship heels.
     metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
         has a separate clock (simulation) and `"shared"` where all runs are parts of one recording (the default).
@@ -98,27 +98,27 @@ class Dataset:
         return sha.hexdigest()[:16]
 
 
-def required() -> dict[str, str]:
+def required_columns() -> dict[str, str]:
     """Columns that every dataset has beside `run` and `flags`, with their SI units: the clock, position and motion."""
     return {"t": "s"} | {name: row.unit for name, row in SIGNALS.items() if row.column == "required"}
 
 
-def optional() -> dict[str, str]:
+def optional_columns() -> dict[str, str]:
     """Columns that a dataset may have beside its commands, with their SI units."""
     measured = {name: row.unit for name, row in SIGNALS.items() if row.column == "optional"}
     return measured | {column: SIGNALS[name].unit for name, column in STANDARD_DEVIATIONS.items()}
 
 
-def unit_of(name: str) -> str | None:
+def unit_of_column(name: str) -> str | None:
     """SI unit of a column by its name; None if no column may have this name."""
     if is_command(name) or is_output(name):
         return SIGNALS[signal_of(name)].unit
-    return (required() | optional()).get(name)
+    return (required_columns() | optional_columns()).get(name)
 
 
-def units_of(names: Iterable[str]) -> dict[str, str]:
+def units_of_columns(names: Iterable[str]) -> dict[str, str]:
     """SI unit of every column that has one."""
-    return {name: unit for name in names if (unit := unit_of(name)) is not None}
+    return {name: unit for name in names if (unit := unit_of_column(name)) is not None}
 
 
 def flag_bit(metadata: dict[str, Any], name: str) -> int:
@@ -127,32 +127,32 @@ def flag_bit(metadata: dict[str, Any], name: str) -> int:
     return 1 << names.index(name) if name in names else 0
 
 
-def pieces(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
+def stretches_of_runs(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
     """Unbroken stretches of every run, as (run, rows): a new one starts at each row flagged `break`."""
-    for name, places in stretches(dataset):
+    for name, places in stretch_rows(dataset):
         yield name, dataset.frame.iloc[places]
 
 
-def columns_of_pieces(dataset: Dataset) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
+def stretch_columns(dataset: Dataset) -> Iterator[tuple[str, dict[str, NDArray[Any]]]]:
     """Unbroken stretches of every run, as (run, columns): name -> array (N,), the column `run` left out.
 
-    With 120 runs `cut_windows` takes 0.4 of the time that it takes with `pieces`.
+    With 120 runs `cut_windows` takes 0.4 of the time that it takes with `stretches_of_runs`.
     """
     columns = {str(name): column.to_numpy() for name, column in dataset.frame.items() if name != "run"}
-    for name, places in stretches(dataset):
+    for name, places in stretch_rows(dataset):
         yield name, {column: values[places] for column, values in columns.items()}
 
 
-def pieces_by_run(dataset: Dataset) -> dict[str, list[pd.DataFrame]]:
+def stretches_by_run(dataset: Dataset) -> dict[str, list[pd.DataFrame]]:
     """Run -> its unbroken stretches, in the order of the table."""
     by_run: dict[str, list[pd.DataFrame]] = {}
-    for run, rows in pieces(dataset):
+    for run, rows in stretches_of_runs(dataset):
         by_run.setdefault(run, []).append(rows)
     return by_run
 
 
-def stretches(dataset: Dataset) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Yield (run, indices of rows in the table) of every stretch that `pieces` yields."""
+def stretch_rows(dataset: Dataset) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Yield (run, indices of rows in the table) of every stretch that `stretches_of_runs` yields."""
     broken = (dataset.frame["flags"].to_numpy() & flag_bit(dataset.metadata, BREAK)) != 0
     for name, places in dataset.frame.groupby("run", sort=False).indices.items():
         rows = np.asarray(places)
@@ -166,7 +166,7 @@ def shares_clock(dataset: Dataset) -> bool:
     return bool(dataset.metadata.get("clock", "shared") != "run")
 
 
-def outside_spans(dataset: Dataset, spans: Iterable[tuple[float, float]]) -> NDArray[np.bool_]:
+def rows_outside_spans(dataset: Dataset, spans: Iterable[tuple[float, float]]) -> NDArray[np.bool_]:
     """Rows (N,) at no moment of the spans (start, end) [s]."""
     t = dataset.frame["t"].to_numpy()
     seen = np.zeros(len(t), dtype=bool)
@@ -175,7 +175,7 @@ def outside_spans(dataset: Dataset, spans: Iterable[tuple[float, float]]) -> NDA
     return ~seen
 
 
-def kept_rows(dataset: Dataset, kept: NDArray[np.bool_]) -> Dataset:
+def keep_rows(dataset: Dataset, kept: NDArray[np.bool_]) -> Dataset:
     """The dataset with the rows `kept` (N,) alone, broken where rows are missing."""
     if kept.all():
         return dataset
@@ -186,7 +186,7 @@ def kept_rows(dataset: Dataset, kept: NDArray[np.bool_]) -> Dataset:
     return replace(dataset, frame=frame, metadata={**dataset.metadata, "flags": names})
 
 
-def apart_from(dataset: Dataset, runs: Iterable[str]) -> Dataset:
+def without_shared_moments(dataset: Dataset, runs: Iterable[str]) -> Dataset:
     """The dataset in which no other run sees a moment of these runs, which stay whole; broken where rows are missing.
 
     On a shared clock runs may overlap: the same rows of a log, cut twice.
@@ -195,8 +195,8 @@ def apart_from(dataset: Dataset, runs: Iterable[str]) -> Dataset:
         return dataset
     mine = dataset.frame["run"].isin(list(runs)).to_numpy()
     t = dataset.frame["t"].to_numpy()
-    spans = [(t[places[0]], t[places[-1]]) for _, places in stretches(dataset) if mine[places[0]]]
-    return kept_rows(dataset, mine | outside_spans(dataset, spans))
+    spans = [(t[places[0]], t[places[-1]]) for _, places in stretch_rows(dataset) if mine[places[0]]]
+    return keep_rows(dataset, mine | rows_outside_spans(dataset, spans))
 
 
 def clock_slack(t: Array) -> float:
@@ -211,13 +211,13 @@ def clock_slack(t: Array) -> float:
 def after_pauses(t: Array, longest: float) -> NDArray[np.bool_]:
     """Whether each row at t (N,) [s] of one stretch comes after a pause, by it and the rows before it alone.
 
-    A pause is longer than `longest` [s] and than `RARE` times the shortest interval of late, which grows by the factor
-    `FORGOTTEN` with each row. The recorder of exported C has the same rule.
+    A pause is longer than `longest` [s] and than `PAUSE_STEPS` times the shortest interval of late, which grows by the factor
+    `SHORTEST_STEP_GROWTH` with each row. The recorder of exported C has the same rule.
     """
     found, least = np.zeros(len(t), dtype=bool), 0.0
     for i, apart in enumerate(np.diff(t).tolist(), start=1):
-        found[i] = apart > longest and not apart <= RARE * least
-        least = min(least * FORGOTTEN, apart) if least else apart
+        found[i] = apart > longest and not apart <= PAUSE_STEPS * least
+        least = min(least * SHORTEST_STEP_GROWTH, apart) if least else apart
     return found
 
 
@@ -226,7 +226,7 @@ def cumulative_integral(t: Array, rate: Array) -> Array:
     return np.append(0.0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)))
 
 
-def sample(rows: Rows, instants: Array) -> dict[str, NDArray[Any]]:
+def sample_columns(rows: StretchRows, instants: Array) -> dict[str, NDArray[Any]]:
     """Every column of one unbroken stretch at given instants [s] (any shape): name -> array of that shape.
 
     States and wind are linear between rows (angles unwrapped first); commands and flags keep the value of the last
@@ -247,14 +247,14 @@ def sample(rows: Rows, instants: Array) -> dict[str, NDArray[Any]]:
     return result
 
 
-def in_force(rows: Rows, edges: Array) -> dict[str, Array]:
+def mean_commands(rows: StretchRows, edges: Array) -> dict[str, Array]:
     """Commands of one unbroken stretch in force in steps between instants `edges` [s] (T + 1, ...): name -> (T, ...).
 
     The mean over each step of the commands, which hold from row to row and after the last row; so an order that changes
     within a step counts for the rest of it.
     """
     t, widths = np.asarray(rows["t"]), np.diff(edges, axis=0)
-    at_start, slack = sample(rows, edges[:-1]), clock_slack(t)
+    at_start, slack = sample_columns(rows, edges[:-1]), clock_slack(t)
     later = np.maximum(edges - t[-1], 0.0)
     result: dict[str, Array] = {}
     for name in filter(is_command, map(str, rows)):
@@ -278,7 +278,7 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     if other is not None:
         raise DataError(f"the column {other!r} has no name: names of columns are text")
     names = [str(name) for name in frame.columns]
-    for name in ("run", "flags", *required()):
+    for name in ("run", "flags", *required_columns()):
         if name not in names:
             raise DataError(f"missing column; there are: {', '.join(names)}", path=name)
     for name in names:
@@ -291,7 +291,7 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
     if int(frame["flags"].max()) >= 1 << len(metadata.get("flags", [])) or int(frame["flags"].min()) < 0:
         raise DataError("a row has a flag bit that metadata['flags'] does not name", path="flags")
     units = metadata.get("units", {})
-    for name, unit in units_of(names).items():
+    for name, unit in units_of_columns(names).items():
         if units.get(name, unit) != unit:
             raise DataError(f"metadata['units'] says {units[name]!r}, must be {unit!r}", path=name)
     run, names_of_runs = pd.factorize(frame["run"])
@@ -328,14 +328,14 @@ def check_metadata(metadata: Any) -> None:
 
 
 def _check_column(name: str, column: pd.Series[Any]) -> None:
-    unit = unit_of(name)
+    unit = unit_of_column(name)
     if name == "run":
         right, wanted = pd.api.types.is_string_dtype(column.dtype), "text"
     elif name == "flags":
         right, wanted = pd.api.types.is_integer_dtype(column.dtype), "integers"
     elif unit is None:
         raise DataError(
-            f"unknown column: {suggest_name(name, [*required(), *optional(), 'run', 'flags'])} "
+            f"unknown column: {suggest_name(name, [*required_columns(), *optional_columns(), 'run', 'flags'])} "
             f"(or <component>.<signal>, signals {', '.join((*rows_of_role('command'), *rows_of_role('output')))})",
             path=name,
         )
@@ -361,13 +361,13 @@ def write_dataset(dataset: Dataset, file: str | os.PathLike[str]) -> Path:
     target = as_path("file", file, DataError)
     if target.suffix != ".parquet":
         raise DataError("a dataset is a Parquet file: let the name end in .parquet", file=target)
-    metadata = {"units": units_of(map(str, dataset.frame.columns)), **dataset.metadata}
+    metadata = {"units": units_of_columns(map(str, dataset.frame.columns)), **dataset.metadata}
     try:
         text = json.dumps(metadata)
     except (TypeError, ValueError) as error:
         raise DataError(f"the metadata must be plain data, as JSON holds it ({error})", file=target) from None
     table = pyarrow.Table.from_pandas(dataset.frame, preserve_index=False)
-    table = table.replace_schema_metadata({**(table.schema.metadata or {}), _KEY: text.encode()})
+    table = table.replace_schema_metadata({**(table.schema.metadata or {}), _METADATA_KEY: text.encode()})
     try:
         with replace_whole(target) as part, part.open("wb") as stream:  # Arrow takes no name that is not UTF-8
             pyarrow.parquet.write_table(table, stream, compression="zstd")
@@ -394,7 +394,7 @@ def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
         raise DataError("cannot be read (no such file)", file=file) from None
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
-    stored = (table.schema.metadata or {}).get(_KEY)
+    stored = (table.schema.metadata or {}).get(_METADATA_KEY)
     if stored is None:
         raise DataError("a Parquet file, but not a dataset of shipid: no metadata under 'shipid'", file=file)
     try:

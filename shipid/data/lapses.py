@@ -12,27 +12,44 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.physics.signals import is_all_round, is_shaft, is_steering
 
-Rows = NDArray[np.bool_]
+RowMask = NDArray[np.bool_]
 
-SLOW = 2.0  # s: in longer steps a rudder goes anywhere and back
-LONGEST, MOMENT = 20.0, 5.0  # s: of a zero, and of one in an order
-FEW_ROWS, FEWEST = 50, 3  # rows of a log; zeros of an order, at least
-ANGLE, SHARE, PART = np.radians(5.0), 0.1, 0.25  # least size of an angle, of a usual value, of the range
-AGREE = 0.25  # of its size: by so much at most are the values before and after a lapse apart
-FAST, FASTER, FASTEST = 1.2, 2.0, 4.0  # times the largest other step: rows of 0 in noise, other zeros, spikes
-BEYOND = 0.1  # of the range, that a spike of 1.2 times the largest other step lies outside of it
-STEPPED = 0.2  # share of the changes that are large, of an order, at least
-LIVELY, TO_AND_FRO = 0.3, 0.3  # of noise: share of the rows that change, and of the changes that turn back, at least
-HELD = 3  # times as long as a zero an order is held before and after it
-SELDOM, OFTEN = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
-WIDE, GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
-STILL, TIMES, REST = 50, 10.0, 0.5  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
-BOTH = np.radians(20.0)  # by which the ship turns meanwhile, to each side: to one she turns by a held helm, too
-TURNING = np.radians(5.0)  # by which she turns in `STILL` rows of another turn
+LONGEST_USABLE_STEP = 2.0  # s: in longer steps a rudder goes anywhere and back
+LONGEST_ZERO, LONGEST_PAUSE = 20.0, 5.0  # s: of a zero, and of one in an order
+LEAST_LOG_ROWS, LEAST_PAUSES = 50, 3  # rows of a log; zeros of an order, at least
+LEAST_FAULT_ANGLE, LEAST_SHARE_OF_VALUE, LEAST_SHARE_OF_RANGE = (
+    np.radians(5.0),
+    0.1,
+    0.25,
+)  # least size of an angle, of a usual value, of the range
+AGREEMENT_SHARE = 0.25  # of its size: by so much at most are the values before and after a lapse apart
+NOISY_STEP_RATIO, ZERO_STEP_RATIO, SPIKE_STEP_RATIO = (
+    1.2,
+    2.0,
+    4.0,
+)  # times the largest other step: rows of 0 in noise, other zeros, spikes
+BEYOND_RANGE = 0.1  # of the range, that a spike of 1.2 times the largest other step lies outside of it
+STEPPED_SHARE = 0.2  # share of the changes that are large, of an order, at least
+NOISY_CHANGE_SHARE, NOISY_REVERSAL_SHARE = (
+    0.3,
+    0.3,
+)  # of noise: share of the rows that change, and of the changes that turn back, at least
+HELD_LENGTHS = 3  # times as long as a zero an order is held before and after it
+MOST_ZERO_ROWS, MOST_SPIKE_ROWS = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
+WIDEST_RUDDER, FASTEST_GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
+STILL_ROWS, STILL_RATIO, SHORT_REPEAT_SHARE = (
+    50,
+    10.0,
+    0.5,
+)  # rows; times nearly all other repetitions; share of rows in shorter ones, at least
+TURN_TO_BOTH_SIDES = np.radians(
+    20.0
+)  # by which the ship turns meanwhile, to each side: to one she turns by a held helm, too
+TURN_OF_ROWS = np.radians(5.0)  # by which she turns in `STILL_ROWS` rows of another turn
 
 
 @dataclass(frozen=True)
-class Lapse:
+class CommandFault:
     """Rows from `first` until before `end` of a command that lapses, and how.
 
     kind : a `pause` is a zero in an order, which somebody may have given.
@@ -45,7 +62,7 @@ class Lapse:
     size: float
 
 
-def lapses(name: str, t: Array, values: Array, psi: Array, follows: Rows) -> list[Lapse]:
+def find_command_faults(name: str, t: Array, values: Array, psi: Array, follows: RowMask) -> list[CommandFault]:
     """Return the rows in which a command lapses, by time.
 
     Parameters
@@ -59,21 +76,21 @@ def lapses(name: str, t: Array, values: Array, psi: Array, follows: Rows) -> lis
     A value stands still where it is the same to the digit for long while the ship turns to both sides, and in other
     turns is not.
     """
-    if len(values) < FEW_ROWS or not follows.any() or not np.ptp(values) > 0:
+    if len(values) < LEAST_LOG_ROWS or not follows.any() or not np.ptp(values) > 0:
         return []
-    found = [*_zeros_and_spikes(name, t, values, follows), *_still(name, values, psi, follows)]
+    found = [*_zeros_and_spikes(name, t, values, follows), *_find_still_values(name, values, psi, follows)]
     return sorted(found, key=lambda one: one.first)
 
 
-def _zeros_and_spikes(name: str, t: Array, values: Array, follows: Rows) -> Iterator[Lapse]:
+def _zeros_and_spikes(name: str, t: Array, values: Array, follows: RowMask) -> Iterator[CommandFault]:
     step = float(np.median(np.diff(t)[follows]))
-    if step > SLOW:
+    if step > LONGEST_USABLE_STEP:
         return
     low, high = np.percentile(values, [0.5, 99.5])
-    floor = ANGLE if is_steering(name) else SHARE * float(np.percentile(np.abs(values), 75))
-    least = max(floor, PART * float(high - low)) if is_steering(name) else floor
-    zeros = _zeros(t, values, follows, floor, step)
-    spikes = _spikes(name, values, follows, least)
+    floor = LEAST_FAULT_ANGLE if is_steering(name) else LEAST_SHARE_OF_VALUE * float(np.percentile(np.abs(values), 75))
+    least = max(floor, LEAST_SHARE_OF_RANGE * float(high - low)) if is_steering(name) else floor
+    zeros = _find_zeros(t, values, follows, floor, step)
+    spikes = _find_spikes(name, values, follows, least)
     other = follows.copy()  # steps that no lapse makes
     kept = np.ones(len(values), dtype=bool)
     for one in (*zeros, *spikes):
@@ -82,55 +99,59 @@ def _zeros_and_spikes(name: str, t: Array, values: Array, follows: Rows) -> Iter
     steps = np.abs(np.diff(values))
     changes = steps[other & (steps > 0)]
     most = float(changes.max(initial=0.0))
-    if not len(changes) or np.mean(changes > least) > STEPPED:
-        zeros = [] if is_steering(name) else _of_order(t, values, zeros, step)
-        spikes = [one for one in spikes if _beyond_orders(values, one, kept)]
+    if not len(changes) or np.mean(changes > least) > STEPPED_SHARE:
+        zeros = [] if is_steering(name) else _find_pauses(t, values, zeros, step)
+        spikes = [one for one in spikes if _is_beyond_orders(values, one, kept)]
     else:
         noise = _is_noise(np.diff(values)[other])
         zeros = [one for one in zeros if _is_fast(name, values, one, most, noise)]
-        spikes = [one for one in spikes if one.size > FASTEST * most or _beyond(values, one, kept, most)]
+        spikes = [
+            one for one in spikes if one.size > SPIKE_STEP_RATIO * most or _is_beyond_range(values, one, kept, most)
+        ]
     spikes = [one for one in spikes if _is_no_kick(name, values, one, step)]
-    for some, share in ((zeros, SELDOM), (spikes, OFTEN)):
+    for some, share in ((zeros, MOST_ZERO_ROWS), (spikes, MOST_SPIKE_ROWS)):
         if sum(one.end - one.first for one in some) <= share * len(values):
             yield from some
 
 
-def _is_fast(name: str, values: Array, zero: Lapse, most: float, noise: bool) -> bool:
+def _is_fast(name: str, values: Array, zero: CommandFault, most: float, noise: bool) -> bool:
     """Whether a zero comes and goes faster than a column does elsewhere, whose largest other step is `most`.
 
     Among noise, some rows of exactly 0 say more, also where an angle is another one afterwards.
     """
     long, back = noise and zero.end - zero.first > 1, _is_back(values, zero)
-    return zero.size > (FAST if long and back else FASTER) * most and (back or (long and is_steering(name)))
+    return zero.size > (NOISY_STEP_RATIO if long and back else ZERO_STEP_RATIO) * most and (
+        back or (long and is_steering(name))
+    )
 
 
-def _is_back(values: Array, lapse: Lapse) -> bool:
+def _is_back(values: Array, lapse: CommandFault) -> bool:
     """Whether the values before and after a lapse agree."""
-    return bool(abs(values[lapse.end] - values[lapse.first - 1]) < AGREE * lapse.size)
+    return bool(abs(values[lapse.end] - values[lapse.first - 1]) < AGREEMENT_SHARE * lapse.size)
 
 
-def _is_no_kick(name: str, values: Array, spike: Lapse, step: float) -> bool:
+def _is_no_kick(name: str, values: Array, spike: CommandFault, step: float) -> bool:
     """Whether a spike of an angle begins away from 0, goes where no rudder goes, or is faster than all gears."""
     beside, top = abs(values[spike.first - 1]), float(np.abs(values[spike.first : spike.end]).min())
-    away = bool(beside > ANGLE) or (top > WIDE and not is_all_round(name))
-    return away or spike.size > GEAR * step or not is_steering(name)
+    away = bool(beside > LEAST_FAULT_ANGLE) or (top > WIDEST_RUDDER and not is_all_round(name))
+    return away or spike.size > FASTEST_GEAR * step or not is_steering(name)
 
 
-def _zeros(t: Array, values: Array, follows: Rows, least: float, step: float) -> list[Lapse]:
+def _find_zeros(t: Array, values: Array, follows: RowMask, least: float, step: float) -> list[CommandFault]:
     """Stretches of 0 between values far from it."""
     found = []
-    for first, end in _spans(values == 0.0):
+    for first, end in _spans_of_rows(values == 0.0):
         if first == 0 or end == len(values) or not follows[first - 1 : end].all():
             continue
         size = float(min(abs(values[first - 1]), abs(values[end])))
-        if size > least and t[end] - t[first - 1] < LONGEST + 1.5 * step:
-            found.append(Lapse(first, end, "zero", size))
+        if size > least and t[end] - t[first - 1] < LONGEST_ZERO + 1.5 * step:
+            found.append(CommandFault(first, end, "zero", size))
     return found
 
 
-def _spikes(name: str, values: Array, follows: Rows, least: float) -> list[Lapse]:
+def _find_spikes(name: str, values: Array, follows: RowMask, least: float) -> list[CommandFault]:
     """One or two rows that leave the values before and after, which agree."""
-    found: dict[int, Lapse] = {}
+    found: dict[int, CommandFault] = {}
     for rows in (1, 2):
         before, after = values[: -rows - 1], values[rows + 1 :]
         inside = np.stack([values[1 + k : len(values) - rows + k] for k in range(rows)])
@@ -138,88 +159,94 @@ def _spikes(name: str, values: Array, follows: Rows, least: float) -> list[Lapse
         size = np.minimum(np.abs(inside - before), np.abs(inside - after)).min(axis=0)
         one_side = np.abs(np.sum(np.sign(off), axis=0)) == rows
         whole = np.stack([follows[k : len(follows) - rows + k] for k in range(rows + 1)]).all(axis=0)
-        hit = (size > least) & one_side & (np.abs(after - before) < AGREE * size) & whole & ~(inside == 0).any(axis=0)
+        hit = (
+            (size > least)
+            & one_side
+            & (np.abs(after - before) < AGREEMENT_SHARE * size)
+            & whole
+            & ~(inside == 0).any(axis=0)
+        )
         if is_all_round(name):
             hit &= np.abs(size / (2 * np.pi) - 1) > 0.05  # it crosses its 0 for a row
         if not is_steering(name):
-            hit &= np.abs(before) > SHARE * size  # a thruster that runs for a moment lapses not
+            hit &= np.abs(before) > LEAST_SHARE_OF_VALUE * size  # a thruster that runs for a moment lapses not
         for row in map(int, np.flatnonzero(hit) + 1):
             if row not in found and row - 1 not in found:
-                found[row] = Lapse(row, row + rows, "spike", float(size[row - 1]))
+                found[row] = CommandFault(row, row + rows, "spike", float(size[row - 1]))
     return list(found.values())
 
 
-def _of_order(t: Array, values: Array, zeros: list[Lapse], step: float) -> list[Lapse]:
+def _find_pauses(t: Array, values: Array, zeros: list[CommandFault], step: float) -> list[CommandFault]:
     """Zeros in orders of thrust, which step: some, of a moment each, with one order held before and after."""
     chosen = []
     for one in zeros:
-        rows = HELD * (one.end - one.first)
+        rows = HELD_LENGTHS * (one.end - one.first)
         about = np.append(values[max(one.first - rows, 0) : one.first], values[one.end : one.end + rows])
-        moment = t[one.end] - t[one.first - 1] < MOMENT + 1.5 * step
+        moment = t[one.end] - t[one.first - 1] < LONGEST_PAUSE + 1.5 * step
         if moment and len(about) == 2 * rows and np.all(about == about[0]):
             chosen.append(replace(one, kind="pause"))
-    return chosen if len(chosen) >= FEWEST else []
+    return chosen if len(chosen) >= LEAST_PAUSES else []
 
 
-def _beyond(values: Array, spike: Lapse, kept: Rows, most: float) -> bool:
+def _is_beyond_range(values: Array, spike: CommandFault, kept: RowMask, most: float) -> bool:
     """Whether a spike lies outside of all that is no lapse, and is larger than all other steps."""
     low, high = float(values[kept].min()), float(values[kept].max())
     inside = values[spike.first : spike.end]
     off = np.maximum(low - inside, inside - high).min()
-    return bool(off > BEYOND * (high - low) and spike.size > FAST * most)
+    return bool(off > BEYOND_RANGE * (high - low) and spike.size > NOISY_STEP_RATIO * most)
 
 
-def _beyond_orders(values: Array, spike: Lapse, kept: Rows) -> bool:
+def _is_beyond_orders(values: Array, spike: CommandFault, kept: RowMask) -> bool:
     """Whether a spike in orders is farther than all orders are apart."""
-    return spike.size > float(np.ptp(values[kept])) and _beyond(values, spike, kept, 0.0)
+    return spike.size > float(np.ptp(values[kept])) and _is_beyond_range(values, spike, kept, 0.0)
 
 
-def _still(name: str, values: Array, psi: Array, follows: Rows) -> Iterator[Lapse]:
+def _find_still_values(name: str, values: Array, psi: Array, follows: RowMask) -> Iterator[CommandFault]:
     """Stretches of one value, to the digit, in which the ship turns, of a column that changes in other turns."""
     edges = np.flatnonzero(np.concatenate([[True], (np.diff(values) != 0) | ~follows, [True]]))
     lengths = np.diff(edges)
-    long = lengths >= STILL
+    long = lengths >= STILL_ROWS
     if not long.any() or long.all():
         return
     rows = np.repeat(lengths, lengths)
-    elsewhere = rows < STILL
-    if np.mean(elsewhere) < REST:
+    elsewhere = rows < STILL_ROWS
+    if np.mean(elsewhere) < SHORT_REPEAT_SHARE:
         return
     usual = float(np.percentile(rows[elsewhere], 90))
-    turning = _turning(psi) & follows & elsewhere[1:]
-    if turning.sum() < STILL or not _is_noise(np.diff(values)[turning]):
+    turning = _turning_steps(psi) & follows & elsewhere[1:]
+    if turning.sum() < STILL_ROWS or not _is_noise(np.diff(values)[turning]):
         return
     ends = float(values.min()), float(values.max())
     for first, count in zip(edges[:-1][long], lengths[long], strict=True):
         value = float(values[first])
         stopped = value in ends or (value == 0.0 and is_shaft(name))
-        if count > TIMES * usual and not stopped and _turns(psi[first : first + count]):
-            yield Lapse(int(first), int(first + count), "still", 0.0)
+        if count > STILL_RATIO * usual and not stopped and _turns_both_ways(psi[first : first + count]):
+            yield CommandFault(int(first), int(first + count), "still", 0.0)
 
 
 def _is_noise(changes: Array) -> bool:
     """Whether changes (N,) from row to row are those of a noisy column: there are many, to and fro."""
     signs = np.sign(changes[changes != 0])
-    many = len(signs) > LIVELY * len(changes) and len(signs) > 1
-    return bool(many and np.mean(signs[1:] != signs[:-1]) > TO_AND_FRO)
+    many = len(signs) > NOISY_CHANGE_SHARE * len(changes) and len(signs) > 1
+    return bool(many and np.mean(signs[1:] != signs[:-1]) > NOISY_REVERSAL_SHARE)
 
 
-def _turning(psi: Array) -> Rows:
-    """Steps (N - 1,) about which the ship turns, in `STILL` rows."""
-    reach = STILL // 2
+def _turning_steps(psi: Array) -> RowMask:
+    """Steps (N - 1,) about which the ship turns, in `STILL_ROWS` rows."""
+    reach = STILL_ROWS // 2
     rows = np.arange(len(psi) - 1)
     change = psi[np.minimum(rows + reach, len(psi) - 1)] - psi[np.maximum(rows - reach, 0)]
-    return np.asarray(np.abs(change) > TURNING)
+    return np.asarray(np.abs(change) > TURN_OF_ROWS)
 
 
-def _turns(psi: Array) -> bool:
+def _turns_both_ways(psi: Array) -> bool:
     """Whether the ship turns far to both sides."""
     rise = float(np.max(psi - np.minimum.accumulate(psi)))
     fall = float(np.max(np.maximum.accumulate(psi) - psi))
-    return bool(min(rise, fall) > BOTH)
+    return bool(min(rise, fall) > TURN_TO_BOTH_SIDES)
 
 
-def _spans(rows: Rows) -> list[tuple[int, int]]:
+def _spans_of_rows(rows: RowMask) -> list[tuple[int, int]]:
     """First row of each stretch of chosen rows (N,), and the row after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(int), [0]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.checks import rms
-from shipid.data.dataset import Dataset, pieces, unit_of
+from shipid.data.checks import root_mean_square
+from shipid.data.dataset import Dataset, stretches_of_runs, unit_of_column
 from shipid.engine.casadi import evaluate_outputs, memory_along
 from shipid.errors import DataError
 from shipid.simulation.log import body_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-OFF = 0.15  # of the prediction: a larger scale error or scatter is reported
+LARGEST_SCATTER = 0.15  # of the prediction: a larger scale error or scatter is reported
 
 
-def common_outputs(vessel: Vessel, dataset: Dataset) -> list[str]:
+def outputs_in_common(vessel: Vessel, dataset: Dataset) -> list[str]:
     """Outputs that were measured and that the vessel predicts; none where a command was not recorded."""
     model = vessel_dynamics(vessel)
     if not set(model.commands) <= set(dataset.commands):
@@ -29,13 +29,13 @@ def common_outputs(vessel: Vessel, dataset: Dataset) -> list[str]:
 def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     """Outputs that the vessel predicts in the recorded motion, by the recorded orders, through the actuators' lags.
 
-    Returns one row for each row of the dataset, with `run`, `t` [s] and a column [SI] for each of `common_outputs`.
+    Returns one row for each row of the dataset, with `run`, `t` [s] and a column [SI] for each of `outputs_in_common`.
     Nothing is simulated but the actuators, so that errors of the hull do not count. Currents are taken as 0.
     """
-    model, wanted = vessel_dynamics(vessel), common_outputs(vessel, dataset)
+    model, wanted = vessel_dynamics(vessel), outputs_in_common(vessel, dataset)
     places = [list(model.outputs).index(name) for name in wanted]
     values, parts = np.array(list(vessel.parameters.values())), []
-    for run, rows in pieces(dataset):
+    for run, rows in stretches_of_runs(dataset):
         columns = {str(name): rows[name].to_numpy() for name in rows.columns if name != "run"}
         still = np.zeros(len(rows))
         motion = columns | body_velocities(columns)
@@ -60,14 +60,20 @@ def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     by least squares) and `error` (root mean square of the difference); empty without a common output.
     """
     predicted = predicted_outputs(vessel, dataset)
-    measured = pd.concat([rows for _, rows in pieces(dataset)], ignore_index=True)
+    measured = pd.concat([rows for _, rows in stretches_of_runs(dataset)], ignore_index=True)
     table: list[dict[str, Any]] = []
     for name in predicted.columns[2:]:
         for run, rows in predicted.groupby("run", sort=False):
             y, f = measured[name].to_numpy()[rows.index], rows[name].to_numpy()
             scale = float(f @ y) / float(f @ f) if f.any() else np.inf
-            row = {"output": name, "run": str(run), "unit": unit_of(name), "measured": rms(y), "predicted": rms(f)}
-            table.append({**row, "scale": scale, "error": rms(y - f)})
+            row = {
+                "output": name,
+                "run": str(run),
+                "unit": unit_of_column(name),
+                "measured": root_mean_square(y),
+                "predicted": root_mean_square(f),
+            }
+            table.append({**row, "scale": scale, "error": root_mean_square(y - f)})
     return pd.DataFrame(table, columns=["output", "run", "unit", "measured", "predicted", "scale", "error"])
 
 
@@ -76,7 +82,7 @@ def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
 
     DataError if no output that the vessel predicts was measured.
     """
-    if not common_outputs(vessel, dataset):
+    if not outputs_in_common(vessel, dataset):
         measured = ", ".join(dataset.outputs) or "none"
         predicted = ", ".join(vessel_dynamics(vessel).outputs) or "none"
         raise DataError(
@@ -84,11 +90,17 @@ def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
         )
     table = compare_outputs(vessel, dataset)
     scatter = table["error"] / table["predicted"].clip(lower=1e-300)
-    ok = scatter <= OFF
+    ok = scatter <= LARGEST_SCATTER
     words = np.where(table["scale"] < 0, "; wrong sign?", "; right unit, right size of the component?")
     said = [
         f"{row.output} is {row.scale:.3g} times what {vessel.name} predicts (difference {100 * off:.2g} %)"
         for row, off in zip(table.itertuples(), scatter, strict=True)
     ]
-    rows = {"check": "output " + table["output"], "run": table["run"], "value": scatter, "unit": "1", "limit": OFF}
+    rows = {
+        "check": "output " + table["output"],
+        "run": table["run"],
+        "value": scatter,
+        "unit": "1",
+        "limit": LARGEST_SCATTER,
+    }
     return pd.DataFrame({**rows, "ok": ok, "sentence": np.array(said, dtype=object) + np.where(ok, "", words)})

@@ -11,32 +11,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.arguments import check_choice, check_class, check_positive, check_whole_number
-from shipid.data.checks import GAP
+from shipid.data.checks import GAP_STEPS
 from shipid.data.dataset import (
     Array,
     Dataset,
-    Rows,
+    StretchRows,
     clock_slack,
-    columns_of_pieces,
     cumulative_integral,
-    in_force,
-    pieces,
-    sample,
+    mean_commands,
+    sample_columns,
     shares_clock,
+    stretch_columns,
+    stretches_of_runs,
 )
 from shipid.errors import DataError
 from shipid.units import plural_word
 
-Mask = NDArray[np.bool_]
+WindowMask = NDArray[np.bool_]
 Commands = Literal["held", "known"]
 PathSource = Literal["position", "velocity"]
 """Columns that give the true path: logged positions, or velocities that are integrated."""
-NESTED, HELD_OUT, FOLDS = 1, 2, 3
+NESTED, HELD_OUT, FOLDED = 1, 2, 3
 """Purposes of a draw of runs: one seed gives each a separate order."""
 VALIDATION_SHARE = 0.2  # method, section 4: 80 % of the manoeuvres train, 20 % validate
-MANY = 100  # instants asked for each row, from which on every row is one
-COARSE = 1.1  # times the step: rows farther apart are no jitter
-MISSED = 0.25  # of the way between two rows: where velocities miss more of it, a straight line is safer
+INSTANTS_PER_ROW = 100  # instants asked for each row, from which on every row is one
+COARSE_STEPS = 1.1  # times the step: rows farther apart are no jitter
+LARGEST_MISS = 0.25  # of the way between two rows: where velocities miss more of it, a straight line is safer
 FUTURE_STATES = ("u", "v", "r", "psi")
 """True states that a window holds over its horizon, beside the path."""
 
@@ -70,7 +70,7 @@ class Instants:
 
     def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Instants:
         """Choose instants by a mask, by indices or by a slice; DataError for anything else."""
-        chosen = _places(chosen, len(self))
+        chosen = _checked_choice(chosen, len(self))
 
         def last(values: Mapping[str, Array] | None) -> dict[str, Array] | None:
             return None if values is None else {name: array[..., chosen] for name, array in values.items()}
@@ -152,7 +152,7 @@ class Windows:
 
     def select(self, chosen: NDArray[Any] | Sequence[int] | slice) -> Windows:
         """Choose windows by a mask, by indices or by a slice; DataError for anything else."""
-        chosen = _places(chosen, len(self))
+        chosen = _checked_choice(chosen, len(self))
         return Windows(
             run=self.run[chosen],
             t=self.t[chosen],
@@ -168,12 +168,12 @@ class Windows:
 
     def locked(self) -> Windows:
         """The same windows, whose numbers nobody can change: who writes into them gets an error."""
-        parts: dict[str, Any] = {"t": locked(self.t), "future": locked(self.future)}
+        parts: dict[str, Any] = {"t": locked_view(self.t), "future": locked_view(self.future)}
         for name in ("columns", "planned", "past", "states"):
-            parts[name] = {key: locked(values) for key, values in getattr(self, name).items()}
+            parts[name] = {key: locked_view(values) for key, values in getattr(self, name).items()}
         return replace(self, **parts)
 
-    def touching(self, intervals: Iterable[tuple[float, float]]) -> Mask:
+    def touching(self, intervals: Iterable[tuple[float, float]]) -> WindowMask:
         """Windows that share a moment, past and future included, with any closed interval of the recording, (S,)."""
         touched = np.zeros(len(self), dtype=bool)
         for start, end in intervals:
@@ -181,14 +181,14 @@ class Windows:
         return touched
 
 
-def locked(array: NDArray[Any]) -> NDArray[Any]:
+def locked_view(array: NDArray[Any]) -> NDArray[Any]:
     """A view of an array that cannot be written to."""
     view = array.view()
     view.flags.writeable = False
     return view
 
 
-def _places(chosen: Any, count: int) -> NDArray[Any] | slice:
+def _checked_choice(chosen: Any, count: int) -> NDArray[Any] | slice:
     """A mask, indices (n,) or a slice of so many entries; DataError for what chooses no row of them."""
     if isinstance(chosen, slice):
         return chosen
@@ -257,37 +257,37 @@ def cut_windows(
     check_choice("path", path, get_args(PathSource), DataError)
     shared = shares_clock(dataset)
     parts = []
-    for run, rows in sorted(columns_of_pieces(dataset), key=itemgetter(0)):
+    for run, rows in sorted(stretch_columns(dataset), key=itemgetter(0)):
         t = rows["t"]
         instants = _instants(t, past * step, horizon * step, interval)
         if len(instants):
             grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], t[-1])  # (T + 1, S)
-            values = sample(rows, grid)
+            values = sample_columns(rows, grid)
             parts.append(
                 Windows(
                     run=np.full(len(instants), run),
                     t=instants,
                     columns={name: column[0] for name, column in values.items()},
-                    future=true_path(rows, grid, values, path, longest=step)[1:],
-                    planned=in_force(rows, instants + step * np.arange(horizon + 1)[:, None]),
+                    future=true_path_at(rows, grid, values, path, longest=step)[1:],
+                    planned=mean_commands(rows, instants + step * np.arange(horizon + 1)[:, None]),
                     horizon=horizon,
                     step=step,
                     shared_clock=shared,
-                    past=past_of(rows, instants, past, step, path),
+                    past=past_of_instants(rows, instants, past, step, path),
                     states={name: values[name][1:] for name in FUTURE_STATES},
                 )
             )
     if not parts:
         history = f" and the past of {past * step:g} s" if past else ""
         raise DataError(f"no run is as long as the horizon of {horizon * step:g} s{history}")
-    return concatenate(parts)
+    return join_windows(parts)
 
 
 def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     """Times of the rows t (N,) at which windows are cut, (S,): a past and a future [s] of each lie within t."""
     slack, first = clock_slack(t), t[0] + past
     last = np.floor((t[-1] - first - ahead + slack) / interval)
-    if last > MANY * len(t):  # so close that no row is left out
+    if last > INSTANTS_PER_ROW * len(t):  # so close that no row is left out
         rows = np.flatnonzero((t >= first - slack) & (t <= t[-1] - ahead + slack))
         return np.asarray(t[rows])
     wanted = first + interval * np.arange(max(0, int(last) + 1))
@@ -295,7 +295,7 @@ def _instants(t: Array, past: float, ahead: float, interval: float) -> Array:
     return np.asarray(t[rows[t[rows] >= first - slack]])
 
 
-def past_of(rows: Rows, instants: Array, past: int, step: float, path: PathSource) -> dict[str, Array]:
+def past_of_instants(rows: StretchRows, instants: Array, past: int, step: float, path: PathSource) -> dict[str, Array]:
     """Columns of one unbroken stretch at P, ..., 1 steps before the instants (S,) [s], name -> (P, S); none for P = 0.
 
     x, y [m] are the positions then in the frame (11) of the instant, by the same true path as the future, but straight
@@ -306,20 +306,20 @@ def past_of(rows: Rows, instants: Array, past: int, step: float, path: PathSourc
     t = np.asarray(rows["t"])
     grid = np.concatenate([instants - step * np.arange(past, 0, -1)[:, None], instants[None]])  # (P + 1, S)
     grid = np.clip(grid, t[0], t[-1])
-    values = sample(rows, grid)
-    before = true_path(rows, grid, values, path, origin=-1)[:-1]
+    values = sample_columns(rows, grid)
+    before = true_path_at(rows, grid, values, path, origin=-1)[:-1]
     kept = {name: column[:-1] for name, column in values.items() if name not in ("flags", "north", "east")}
     return {**kept, "x": before[..., 0], "y": before[..., 1]}
 
 
-def future_of(rows: Rows, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
+def future_of_instants(rows: StretchRows, instants: Array, horizon: int, step: float, path: PathSource) -> Array:
     """True paths (T, S, 2) [m] in the frame (11) after instants (S,) [s] of one unbroken stretch that holds them."""
     grid = np.minimum(instants + step * np.arange(horizon + 1)[:, None], np.asarray(rows["t"])[-1])
-    return true_path(rows, grid, sample(rows, grid), path, longest=step)[1:]
+    return true_path_at(rows, grid, sample_columns(rows, grid), path, longest=step)[1:]
 
 
-def true_path(
-    rows: Rows,
+def true_path_at(
+    rows: StretchRows,
     instants: Array,
     values: Mapping[str, Array],
     path: PathSource,
@@ -329,39 +329,43 @@ def true_path(
 ) -> Array:
     """True positions (T, ..., 2) [m] at instants (T, ...) [s] of one unbroken stretch, in the frame (11) of the first.
 
-    values : what `sample` gives at the instants. origin : index of another instant to take the frame of.
-    longest : time [s]; logged positions are joined by straight lines, or, between rows farther apart, as in `_bent`.
+    values : what `sample_columns` gives at the instants. origin : index of another instant to take the frame of.
+    longest : time [s]; logged positions are joined by straight lines, or, between rows farther apart, as in `_bent_positions`.
     """
-    north, east = travelled(rows, instants) if path == "velocity" else _bent(rows, instants, values, longest)
+    north, east = (
+        travelled_position(rows, instants) if path == "velocity" else _bent_positions(rows, instants, values, longest)
+    )
     return np.stack(to_frame(north, east, north[origin], east[origin], values["psi"][origin]), axis=-1)
 
 
-def _bent(rows: Rows, instants: Array, values: Mapping[str, Array], longest: float) -> tuple[Array, Array]:
+def _bent_positions(
+    rows: StretchRows, instants: Array, values: Mapping[str, Array], longest: float
+) -> tuple[Array, Array]:
     """North and east [m] at instants, of one stretch whose rows farther apart than `longest` [s] a curve joins.
 
     The curve is what u, v, psi travel, and what is then missing to the next row grows evenly; so it passes through the
     rows, and a steady current or offset of the velocities bends nothing. At rows it is `values` to the bit. Where the
-    velocities miss more than `MISSED` of the way between two rows the line stays straight.
+    velocities miss more than `LARGEST_MISS` of the way between two rows the line stays straight.
     """
     t = np.asarray(rows["t"])
     slack, apart = clock_slack(t), np.diff(t)
     names = ("north", "east")
     if not (apart > longest + slack).any():
         return values["north"], values["east"]
-    at_rows = travelled(rows, t)
+    at_rows = travelled_position(rows, t)
     way = np.hypot(*(np.diff(np.asarray(rows[name])) for name in names))
     missed = np.hypot(*(np.diff(np.asarray(rows[name]) - along) for name, along in zip(names, at_rows, strict=True)))
-    bends = np.append((apart > longest + slack) & (missed <= MISSED * way), False)
+    bends = np.append((apart > longest + slack) & (missed <= LARGEST_MISS * way), False)
     row = np.clip(np.searchsorted(t, instants + slack, side="right") - 1, 0, len(t) - 1)
     between = bends[row] & (instants > t[row] + slack)
     north, east = (
         np.where(between, values[name] + along - np.interp(instants, t, at), values[name])
-        for name, along, at in zip(names, travelled(rows, instants), at_rows, strict=True)
+        for name, along, at in zip(names, travelled_position(rows, instants), at_rows, strict=True)
     )
     return north, east
 
 
-def travelled(rows: Rows, instants: Array) -> tuple[Array, Array]:
+def travelled_position(rows: StretchRows, instants: Array) -> tuple[Array, Array]:
     """North and east [m] travelled since the first row: trapezoid of R(psi) (u, v), exact between rows too."""
     t, psi, u, v = (np.asarray(rows[name]) for name in ("t", "psi", "u", "v"))
     row = np.clip(np.searchsorted(t, instants, side="right") - 1, 0, len(t) - 1)
@@ -374,7 +378,7 @@ def travelled(rows: Rows, instants: Array) -> tuple[Array, Array]:
     return along(u * np.cos(psi) - v * np.sin(psi)), along(u * np.sin(psi) + v * np.cos(psi))
 
 
-def concatenate(parts: Sequence[Windows]) -> Windows:
+def join_windows(parts: Sequence[Windows]) -> Windows:
     """All windows of several sets with the same horizon, step, clock and columns, in order."""
     first = parts[0]
     for part in parts[1:]:
@@ -396,7 +400,7 @@ def concatenate(parts: Sequence[Windows]) -> Windows:
     )
 
 
-def evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) -> NDArray[np.int64]:
+def choose_evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) -> NDArray[np.int64]:
     """At most `count` of some indices, evenly spread; `phase`, from 0 to 1, is the place of each in its stretch."""
     if len(indices) <= count:
         return indices
@@ -405,14 +409,14 @@ def evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) -> NDArra
     return chosen
 
 
-def gaps(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:
+def gaps_of_runs(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:
     """Times (start, end) [s] without rows, inside the unbroken stretches of each run; runs that have none are left out.
 
     They are longer than `least` [s] and than three usual steps of the stretch, as in the check `gap`. A window that
     reaches over one is interpolated there.
     """
     spans: dict[str, list[tuple[float, float]]] = {}
-    for run, rows in pieces(dataset):
+    for run, rows in stretches_of_runs(dataset):
         t = rows["t"].to_numpy()
         steps = np.diff(t)
         if not len(steps):
@@ -422,29 +426,29 @@ def gaps(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]
     return spans
 
 
-def longest_gap(spans: Mapping[str, Iterable[tuple[float, float]]]) -> str:
+def longest_gap_in_words(spans: Mapping[str, Iterable[tuple[float, float]]]) -> str:
     """The longest of some times without rows, in words."""
     length, start, run = max((end - start, start, run) for run, times in spans.items() for start, end in times)
     return f"the longest {length:.3g} s after t = {start:g} s of {run!r}"
 
 
 def gaps_in_words(dataset: Dataset, least: float) -> str:
-    """How many times without rows the runs have, and the longest; empty where they have none. least : as of `gaps`."""
-    spans = gaps(dataset, least)
+    """How many times without rows the runs have, and the longest; empty where they have none. least : as of `gaps_of_runs`."""
+    spans = gaps_of_runs(dataset, least)
     count = sum(map(len, spans.values()))
-    return f"{count} {plural_word(count, 'time')} without rows, {longest_gap(spans)}" if count else ""
+    return f"{count} {plural_word(count, 'time')} without rows, {longest_gap_in_words(spans)}" if count else ""
 
 
 def coarse_in_words(dataset: Dataset, step: float) -> str:
     """That rows of the coarsest run are farther apart than a step [s], in words; empty where they are not."""
     between = float(dataset.frame.groupby("run", sort=False)["t"].agg(lambda t: t.diff().median()).max())
-    if not between > COARSE * step:
+    if not between > COARSE_STEPS * step:
         return ""
     return f"rows are {between:.3g} s apart and the step is {step:g} s: path and motion between rows are interpolated"
 
 
-def without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:
-    """Whether instants [s], any shape, lie in a time without rows of one stretch at t (N,). least : as of `gaps`."""
+def is_without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:
+    """Whether instants [s], any shape, lie in a time without rows of one stretch at t (N,). least : as of `gaps_of_runs`."""
     steps, slack = np.diff(t), clock_slack(t)
     if not len(steps):
         return np.zeros(np.shape(instants), dtype=bool)
@@ -455,10 +459,10 @@ def without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:
 
 def _longest_step(t: Array, least: float) -> float:
     """Longest time [s] between two rows of a stretch at t (N,) that is no time without rows."""
-    return max(least, GAP * float(np.median(np.diff(t)))) + clock_slack(t)
+    return max(least, GAP_STEPS * float(np.median(np.diff(t)))) + clock_slack(t)
 
 
-def reach_over(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float]]]) -> Mask:
+def windows_over_spans(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float]]]) -> WindowMask:
     """Windows (S,) that see a part of the spans (start, end) [s] of their run, pasts and futures included."""
     seen = np.zeros(len(windows), dtype=bool)
     for run, times in spans.items():
@@ -468,7 +472,7 @@ def reach_over(windows: Windows, spans: Mapping[str, Iterable[tuple[float, float
     return seen
 
 
-def covered(windows: Windows) -> float:
+def covered_time(windows: Windows) -> float:
     """Recorded time [s] that windows see, pasts and futures included: the length of the union of their intervals.
 
     Runs with separate clocks are added up; on a shared clock a moment in two runs counts once.
@@ -479,7 +483,7 @@ def covered(windows: Windows) -> float:
     return sum((length + float(np.minimum(np.diff(np.sort(t)), length).sum()) for t in runs if len(t)), 0.0)
 
 
-def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[Mask, Mask]:
+def fold_masks(windows: Windows, validation_runs: Iterable[str]) -> tuple[WindowMask, WindowMask]:
     """Split windows into (training, validation), (S,) each, so that no moment is seen by both, futures included.
 
     Validation windows are those of the validation runs. A training window is one of another run that touches none
@@ -547,7 +551,7 @@ def run_folds(
     return [(np.flatnonzero(training), np.flatnonzero(judged)) for training, judged in masks]
 
 
-def _drawn(runs: Iterable[str], seed: int, purpose: int) -> list[str]:
+def _draw_order(runs: Iterable[str], seed: int, purpose: int) -> list[str]:
     """Draw the runs in random order, the same for any order in which they are given, another for each purpose.
 
     Else the first runs held out of the largest amount would be just the runs of a smaller one.
@@ -558,7 +562,7 @@ def _drawn(runs: Iterable[str], seed: int, purpose: int) -> list[str]:
 
 def split_folds(runs: Iterable[str], num_folds: int, seed: int) -> list[tuple[str, ...]]:
     """Deal the runs into folds of (nearly) equal number: the validation runs of every fold."""
-    drawn = _drawn(runs, seed, FOLDS)
+    drawn = _draw_order(runs, seed, FOLDED)
     if not 2 <= num_folds <= len(drawn):
         raise DataError(f"{len(drawn)} runs cannot be divided into {num_folds} folds: choose 2 to {len(drawn)}")
     return [tuple(drawn[fold::num_folds]) for fold in range(num_folds)]
@@ -566,7 +570,7 @@ def split_folds(runs: Iterable[str], num_folds: int, seed: int) -> list[tuple[st
 
 def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Split the runs into (rest, held out), `share` of them held out, at least one on each side."""
-    drawn = _drawn(runs, seed, HELD_OUT)
+    drawn = _draw_order(runs, seed, HELD_OUT)
     if len(drawn) < 2 or not 0 < share < 1:
         raise DataError(
             f"a share of {share:g} of {len(drawn)} runs cannot be held out: give two runs or more, and 0 < share < 1"
@@ -577,7 +581,7 @@ def split_runs(runs: Iterable[str], share: float, seed: int) -> tuple[tuple[str,
 
 def nested_runs(runs: Iterable[str], amounts: Iterable[int], seed: int) -> dict[int, tuple[str, ...]]:
     """Nested draws D_a c D_b c ... for amounts a < b < ...: the first ones of one random order."""
-    drawn, wanted = _drawn(runs, seed, NESTED), sorted(set(amounts))
+    drawn, wanted = _draw_order(runs, seed, NESTED), sorted(set(amounts))
     if wanted and not 1 <= wanted[0] <= wanted[-1] <= len(drawn):
         raise DataError(f"amounts {wanted} cannot be drawn from {len(drawn)} runs: choose 1 to {len(drawn)}")
     return {amount: tuple(drawn[:amount]) for amount in wanted}

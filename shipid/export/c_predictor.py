@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from shipid.data.dataset import FORGOTTEN, RARE
+from shipid.data.dataset import PAUSE_STEPS, SHORTEST_STEP_GROWTH
 from shipid.export.band import COLUMNS, factor_function
 from shipid.export.c import (
     ARE_FINITE,
@@ -112,8 +112,8 @@ def _values(
         **{key: str(value) for key, value in lengths.items()},
         **{f"HAS_{key}": str(int(value)) for key, value in has.items()},
         "NUM_STEPS": str(names.num_past),
-        "RARE": f"{RARE:g}",
-        "FORGOTTEN": repr(FORGOTTEN),
+        "RARE": f"{PAUSE_STEPS:g}",
+        "FORGOTTEN": repr(SHORTEST_STEP_GROWTH),
         "AFTER_PAUSES": _after_pauses(model, filters),
         "OFTEN": f"{step / PARTS_OF_STEP:g}",
         "NEAR": repr(step / PARTS_OF_STEP * (1 - 1e-6)),

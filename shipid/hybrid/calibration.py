@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.windows import evenly
+from shipid.data.windows import choose_evenly
 from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, chords_of, nearest, track, traits, turned
 from shipid.metrics import vector_lengths
 
@@ -249,7 +249,7 @@ def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
     deviation = np.sqrt(runs.weight @ (points - runs.weight @ points) ** 2)
     spread = np.maximum(deviation, np.maximum(1e-3 * np.abs(points).max(axis=0), 1e-9))
     each = max(-(-CENTRES // runs.count), 1)
-    chosen = np.concatenate([evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
+    chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
     parts = [slice(first, first + PART) for first in range(0, len(points), PART)]
     away = [nearest(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen]) for part in parts]
@@ -263,7 +263,7 @@ def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArra
         return rows
     place = np.unique(run[rows], return_inverse=True)[1]
     parts = np.split(rows[np.argsort(place, kind="stable")], np.cumsum(np.bincount(place))[:-1])
-    return np.sort(np.concatenate([evenly(part, WINDOWS) for part in parts]))
+    return np.sort(np.concatenate([choose_evenly(part, WINDOWS) for part in parts]))
 
 
 def _runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _Runs:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, NonNegativeInt, model_validator
 
 from shipid.arguments import as_float_array, check_mapping, check_number
 from shipid.checked import CheckedModel
-from shipid.data.windows import Instants, Windows, locked
+from shipid.data.windows import Instants, Windows, locked_view
 from shipid.document import parse_model
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.contract import fault_of_corrector
@@ -121,7 +121,7 @@ class Task:
     def __post_init__(self) -> None:
         if any(len(part) == 0 for fold in self.folds for part in fold):
             raise DataError("a fold has no windows to train on or to validate with: use more manoeuvres")
-        cases = {name: replace(case, paths=locked(case.paths)) for name, case in self.cases.items()}
+        cases = {name: replace(case, paths=locked_view(case.paths)) for name, case in self.cases.items()}
         object.__setattr__(self, "cases", cases)
         object.__setattr__(self, "windows", self.windows.locked())
 

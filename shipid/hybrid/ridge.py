@@ -25,7 +25,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shipid.data.windows import evenly
+from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, group_of
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
@@ -348,7 +348,7 @@ def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
     for number, name in enumerate(np.unique(run)):
         mine = np.flatnonzero(run == name)
         count = max(1, round(len(mine) * most / len(run)))
-        taken.append(evenly(mine, count, (0.5 + number * GOLDEN) % 1.0))
+        taken.append(choose_evenly(mine, count, (0.5 + number * GOLDEN) % 1.0))
     return np.sort(np.concatenate(taken))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
 from shipid.identification.residuals import CURRENT, build
@@ -69,7 +69,7 @@ def free_runs(
     a new run. Raises DataError for a length shorter than two steps, and what `residuals.build` raises.
     """
     check_length(settings, length)
-    spans = [float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for _, rows in pieces(dataset.select(runs))]
+    spans = [float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for _, rows in stretches_of_runs(dataset.select(runs))]
     steps = sum(spans) / settings.step
     if steps > MOST_STEPS:
         many = f"{settings.step:g} s makes {steps:.2g} steps of these runs, at most {MOST_STEPS:.0e}"

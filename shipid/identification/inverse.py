@@ -24,7 +24,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
 from shipid.physics.signals import is_wrapped_angle
@@ -258,7 +258,7 @@ def _runs(
     if missing is not None:
         raise DataError(f"no run {missing!r}", path="runs")
     result = []
-    for run, rows in pieces(dataset):
+    for run, rows in stretches_of_runs(dataset):
         if run not in runs or len(rows) <= LEAST_SAMPLES:
             continue
         stretch = _stretch(vessel, model, rows, environment.get(run, {}))

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, in_force, sample
+from shipid.data.dataset import Dataset, mean_commands, sample_columns
 from shipid.physics.signals import is_steering
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -84,5 +84,5 @@ def held_over_steps(
     other command with its mean over the step: else it would come late by up to a step.
     """
     model, edges = vessel_dynamics(vessel), np.append(instants, instants[-1] + step)
-    nearest, mean = sample(rows, instants + step / 2), in_force(rows, edges)
+    nearest, mean = sample_columns(rows, instants + step / 2), mean_commands(rows, edges)
     return {name: np.asarray((nearest if name in model.memory else mean)[name]) for name in model.commands}

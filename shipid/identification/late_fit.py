@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.document import short_names
 from shipid.identification.covariance import inverted
 from shipid.identification.late import COARSE, interval_of
@@ -127,7 +127,7 @@ def _causes(late: bool, gear: Sequence[str]) -> str:
 def _earlier(dataset: Dataset) -> Dataset:
     """The dataset with every command one row earlier; the last of a stretch stays."""
     frame = dataset.frame.copy()
-    for _, rows in pieces(dataset):
+    for _, rows in stretches_of_runs(dataset):
         for name in dataset.commands:
             values = rows[name].to_numpy()
             frame.loc[rows.index, name] = np.append(values[1:], values[-1:])

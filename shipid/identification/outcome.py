@@ -16,9 +16,9 @@ from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
 from shipid.arguments import as_names, check_class, check_function_or_none, check_number
-from shipid.data.dataset import Dataset, apart_from
-from shipid.data.held import held_commands, nothing_varies
-from shipid.data.outputs import common_outputs, compare_outputs
+from shipid.data.dataset import Dataset, without_shared_moments
+from shipid.data.held import constant_commands, warn_of_constant_commands
+from shipid.data.outputs import compare_outputs, outputs_in_common
 from shipid.data.windows import gaps_in_words
 from shipid.document import short_names
 from shipid.engine.engines import REPEATED
@@ -225,7 +225,7 @@ def without_shared(
 
     On a shared clock runs may overlap. Raises DataError where no run is left.
     """
-    apart = apart_from(dataset, held_out)
+    apart = without_shared_moments(dataset, held_out)
     before, after = (one.frame["run"].value_counts() for one in (dataset, apart))
     lost = {run: 1.0 - int(after.get(run, 0)) / int(before[run]) for run in runs}
     left = tuple(run for run in runs if after.get(run, 0) > 1)
@@ -415,7 +415,7 @@ def _groups(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ide
 def _outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) -> pd.DataFrame:
     """Measured outputs against those of the vessels, in the recorded motion."""
     part = dataset.select(runs)
-    if not common_outputs(pair[AFTER], part):
+    if not outputs_in_common(pair[AFTER], part):
         return pd.DataFrame(columns=["output", "unit", "measured", *pair])
     tables = {name: compare_outputs(vessel, part) for name, vessel in pair.items()}
 
@@ -687,8 +687,8 @@ def unrecorded(dataset: Dataset, runs: Sequence[str], settings: Identify) -> lis
 
 def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> list[str]:
     """A warning if the runs to fit vary no command, or not one of a component of which numbers are identified."""
-    said, components = nothing_varies(dataset, runs), {path.split(".")[1] for path in paths if "." in path}
-    held = [name for name in held_commands(dataset, runs) if name.rpartition(".")[0] in components]
+    said, components = warn_of_constant_commands(dataset, runs), {path.split(".")[1] for path in paths if "." in path}
+    held = [name for name in constant_commands(dataset, runs) if name.rpartition(".")[0] in components]
     if said or not held:
         return said
     are = plural_word(len(held), "is", "are")

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, clock_slack, pieces, sample, stretches
-from shipid.data.windows import without_rows
+from shipid.data.dataset import Dataset, clock_slack, sample_columns, stretch_rows, stretches_of_runs
+from shipid.data.windows import is_without_rows
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, suggest_name
 from shipid.identification.late import COARSE, Changes, between_rows, held_over_steps
@@ -85,7 +85,7 @@ def cut_segments(
         run: vessel.with_values(values) if values else vessel for run, values in (parameters_of_run or {}).items()
     }
     table = {name: dataset.frame[name].to_numpy() for name in map(str, dataset.frame.columns) if name != "run"}
-    for run, places in stretches(dataset):
+    for run, places in stretch_rows(dataset):
         if run in runs:
             rows = {name: values[places] for name, values in table.items()}
             result += _cut(vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags, commands)
@@ -106,7 +106,7 @@ def cut_segments(
 def too_short(dataset: Dataset, runs: Sequence[str], step: float, horizon: float) -> list[str]:
     """Runs without a stretch that is long enough for a prediction; arguments as of `cut_segments`."""
     longest = dict.fromkeys(runs, 0)
-    for run, rows in pieces(dataset.select(runs)):
+    for run, rows in stretches_of_runs(dataset.select(runs)):
         longest[run] = max(longest[run], _num_steps(rows["t"].to_numpy(), step))
     return [run for run, count in longest.items() if count < _least(step, horizon) / step]
 
@@ -144,7 +144,7 @@ def _cut(
     if count < least:
         return []
     grid = t[0] + step * np.arange(count + 1)
-    columns = sample(rows, grid)
+    columns = sample_columns(rows, grid)
     measured = near_a_row(t, grid, step)
     if between == "between":
         _check_step(vessel, rows, step)
@@ -154,7 +154,7 @@ def _cut(
     commands = {name: columns[name] for name in vessel_dynamics(vessel).commands}
     memory = memory_along(vessel, commands, grid) or {}
     result, begin = [], 0
-    beginnings = measured & ~without_rows(t, grid, step)  # a state between two rows is no beginning
+    beginnings = measured & ~is_without_rows(t, grid, step)  # a state between two rows is no beginning
     while begin < count:
         last = min(begin + each, count)
         first = begin + int(np.argmax(beginnings[begin : last + 1]))

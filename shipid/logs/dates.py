@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import DATED, Array
+from shipid.data.dataset import FIRST_DATED_TIME, Array
 
 DAY, HALF_DAY = 86400.0, 43200.0  # s
 NEXT_DAY = 600.0  # s: times of day that go back by more are of the next day, but for those that go back by an hour
@@ -169,7 +169,7 @@ def date_of(moment: float) -> str:
 
 def moment_of(t: float) -> str:
     """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
-    return f"{date_of(t)} UTC" if DATED < t < LAST_DATE else f"{t:.10g} s"
+    return f"{date_of(t)} UTC" if FIRST_DATED_TIME < t < LAST_DATE else f"{t:.10g} s"
 
 
 def rolled_over(step: float) -> str:
@@ -181,7 +181,7 @@ def rolled_over(step: float) -> str:
 
 def span_of(first: float, last: float) -> str:
     """Two times [s] of a log in words: dates where they count from 1970, else seconds."""
-    dates = min(first, last) > DATED and max(first, last) < LAST_DATE
+    dates = min(first, last) > FIRST_DATED_TIME and max(first, last) < LAST_DATE
     return f"{date_of(first)} to {date_of(last)} UTC" if dates else f"{first:.10g} to {last:.10g} s"
 
 
@@ -287,7 +287,9 @@ def hour_twice(t: Array) -> tuple[int, str] | None:
     row = int(np.argmax(steps < 0)) + 1 if np.any(steps < 0) else 0
     if row == 0 or not _hour_back(steps[row - 1]):
         return None
-    last, first = (date_of(one) if DATED < one < LAST_DATE else date_of(one % DAY)[11:] for one in t[row - 1 : row + 1])
+    last, first = (
+        date_of(one) if FIRST_DATED_TIME < one < LAST_DATE else date_of(one % DAY)[11:] for one in t[row - 1 : row + 1]
+    )
     remedy = "write UTC, or in every row the zone that holds there; else sort or split the log"
     return row, f"time goes back by an hour, from {last} to {first}: is it local time as daylight saving ends? {remedy}"
 

@@ -23,13 +23,13 @@ from shipid.data.dataset import (
     Array,
     Dataset,
     clock_slack,
-    optional,
-    pieces,
-    required,
-    sample,
-    units_of,
+    optional_columns,
+    required_columns,
+    sample_columns,
+    stretches_of_runs,
+    units_of_columns,
 )
-from shipid.data.kinematics import Noise, smooth
+from shipid.data.kinematics import Noise, smooth_motion
 from shipid.errors import DataError, is_utf_8, suggest_name
 from shipid.logs.cells import column_of, numbers_of, of_ais, of_minutes, of_parts, of_quaternion
 from shipid.logs.channels import Channel, at_instants, close_gaps, common_instants, even_instants, interpolation_of
@@ -124,7 +124,7 @@ def import_log(
         "mapping": {"name": mapping.name, "digest": mapping.digest},
         "rows": sum(part.read for part in parts),
         "clock": "run" if alone else "shared",
-        "units": units_of(rows.columns),
+        "units": units_of_columns(rows.columns),
         "flags": list(FLAGS),
         "repairs": _added([part.records for part in parts]),
     }
@@ -294,7 +294,7 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
         rows = rows.assign(beta_w=rows["beta_w"] + rows["psi"])
     elif relative:
         rows = true_wind(rows)
-    known = [name for name in (*required(), *optional()) if name in rows]
+    known = [name for name in (*required_columns(), *optional_columns()) if name in rows]
     commands = [str(name) for name in rows.columns if is_command(str(name))]
     outputs = [str(name) for name in rows.columns if is_output(str(name))]
     order = (
@@ -423,7 +423,7 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
             at = moment_of(stretch["t"].iloc[0])
             raise DataError(f"a single row between two breaks at {at}: nothing to estimate from; remove it", file=file)
         logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
-        smoothed = smooth(stretch["t"].to_numpy(), logged, noise)
+        smoothed = smooth_motion(stretch["t"].to_numpy(), logged, noise)
         squares += smoothed.consistency * len(stretch)
         columns = {name: smoothed.state(name) for name in lacking}
         columns |= {STANDARD_DEVIATIONS[name]: smoothed.deviation(name) for name in lacking}
@@ -488,10 +488,10 @@ def _resampled(dataset: Dataset, step: float, file: Path) -> Dataset:
     """Rows `step` [s] apart; the first row of a stretch keeps its flags, so breaks stay."""
 
     def resample() -> Iterator[pd.DataFrame]:
-        for run, rows in pieces(dataset):
+        for run, rows in stretches_of_runs(dataset):
             t = rows["t"].to_numpy()
             instants = even_instants(t[0], t[-1] + clock_slack(t), step, [t], file, "resample.step")
-            frame = pd.DataFrame({"t": instants, **sample(rows, instants)})
+            frame = pd.DataFrame({"t": instants, **sample_columns(rows, instants)})
             frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
             # a break that stays flagged while its row is held over several instants would break each of them
             bit = 1 << FLAGS.index(BREAK)

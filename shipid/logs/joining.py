@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import DATED, Dataset, units_of
+from shipid.data.dataset import FIRST_DATED_TIME, Dataset, units_of_columns
 from shipid.errors import DataError
 from shipid.logs.frames import PARALLEL, convergence
 from shipid.units import percent_text
@@ -126,7 +126,7 @@ def _clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dic
                 _check_apart(file, one)
         return "run", delays
     spans = {file: (float(one.frame["t"].min()), float(one.frame["t"].max())) for file, one in datasets.items()}
-    with_date = {file: begin > DATED for file, (begin, _) in spans.items()}
+    with_date = {file: begin > FIRST_DATED_TIME for file, (begin, _) in spans.items()}
     dated = all(with_date.values())
     if any(with_date.values()) and not dated:
         file = next(file for file, here in with_date.items() if not here)
@@ -203,7 +203,7 @@ def _metadata(
         ],
         "rows": sum(int(one.metadata.get("rows", len(one.frame))) for one in datasets.values()),
         "clock": clock,
-        "units": units_of(columns),
+        "units": units_of_columns(columns),
         "flags": flags,
         "repairs": [
             {**row, "note": f"{file.name}: {row.get('note', '')}"}

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from pydantic import Field, SerializeAsAny
 
 from shipid import document
-from shipid.data.dataset import DATED, STANDARD_DEVIATIONS, optional, required, unit_of
+from shipid.data.dataset import (
+    FIRST_DATED_TIME,
+    STANDARD_DEVIATIONS,
+    optional_columns,
+    required_columns,
+    unit_of_column,
+)
 from shipid.errors import DocumentError, suggest_name
 from shipid.logs.dates import DAY, EXCEL, LAST_DATE, NEXT_DAY, over_midnights
 from shipid.logs.formats import Format, TextFormat
@@ -315,7 +321,7 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
 
 def to_si(unit: str, name: str) -> float:
     """Return the factor from a unit of the log to the SI unit of a column."""
-    return UNITS[str(INPUTS.get(name) or unit_of(name))][unit]
+    return UNITS[str(INPUTS.get(name) or unit_of_column(name))][unit]
 
 
 def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]:
@@ -450,7 +456,7 @@ def is_dated(unit: str) -> bool:
 
 def is_date(t: float, unit: str) -> bool:
     """Whether a time [s] on a clock in this unit is a date: it counts from 1970, not from a midnight, to year 9999."""
-    return is_dated(unit) and DATED < t < LAST_DATE
+    return is_dated(unit) and FIRST_DATED_TIME < t < LAST_DATE
 
 
 def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
@@ -492,9 +498,13 @@ def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
 def _check_columns(mapping: Mapping, file: Path) -> None:
     _factor(mapping.clock.unit, "s", file, "clock.unit")
     columns = mapping.columns
-    mapped = (*required().keys() - {"t"}, *optional().keys() - set(STANDARD_DEVIATIONS.values()), *INPUTS)
+    mapped = (
+        *required_columns().keys() - {"t"},
+        *optional_columns().keys() - set(STANDARD_DEVIATIONS.values()),
+        *INPUTS,
+    )
     for name, column in columns.items():
-        unit, path = INPUTS.get(name) or unit_of(name), f"columns.{name}"
+        unit, path = INPUTS.get(name) or unit_of_column(name), f"columns.{name}"
         if unit is None or not (name in mapped or is_command(name) or is_output(name)):
             hint = f"or <component>.<signal> with a signal of {', '.join((*rows_of_role('command'), *rows_of_role('output')))}"
             raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
@@ -549,12 +559,14 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
             message = f"missing: {' and '.join(pair)} belong together"
             if pair != ("u", "v"):
                 raise DocumentError(message, file=file, path=f"columns.{missing.pop()}")
-    for name in sorted(required().keys() - {"t"} - columns.keys()):
+    for name in sorted(required_columns().keys() - {"t"} - columns.keys()):
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue
         remedy = ", or [estimate]" if name in ESTIMATED else ""
         raise DocumentError(
-            f"missing: a dataset needs {', '.join(list(required())[1:])}{remedy}", file=file, path=f"columns.{name}"
+            f"missing: a dataset needs {', '.join(list(required_columns())[1:])}{remedy}",
+            file=file,
+            path=f"columns.{name}",
         )
     if mapping.origin is not None and "latitude" not in columns:
         raise DocumentError(
@@ -583,7 +595,7 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
         if column.file is not None and column.file not in mapping.file:
             message = f"no [file.{column.file}]: {suggest_name(column.file, mapping.file)}"
             raise DocumentError(message, file=file, path=f"{path}.file")
-        if column.interpolation == "angle" and (INPUTS.get(name) or unit_of(name)) != "rad":
+        if column.interpolation == "angle" and (INPUTS.get(name) or unit_of_column(name)) != "rad":
             raise DocumentError(
                 "only a column in rad or deg can be interpolated as an angle: use linear or previous",
                 file=file,
@@ -651,7 +663,9 @@ def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
         case HeadingOffset():
             return repair.model_copy(update={"offset": repair.offset * _factor(repair.unit, "rad", file, path)})
         case Despike(unit=str(unit)):
-            factors = [_factor(unit, INPUTS.get(name) or unit_of(name) or "", file, path) for name in repair.columns]
+            factors = [
+                _factor(unit, INPUTS.get(name) or unit_of_column(name) or "", file, path) for name in repair.columns
+            ]
             return repair.model_copy(update={"threshold": repair.threshold * factors[0]})
         case Break():
             intervals = tuple((clock * start, clock * end) for start, end in repair.intervals)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from shipid.data.dataset import DATED, Dataset, pieces
+from shipid.data.dataset import FIRST_DATED_TIME, Dataset, stretches_of_runs
 from shipid.errors import DataError, suggest_name
-from shipid.measures.criteria import criteria
-from shipid.measures.recognise import kinds_of, record_of
+from shipid.measures.criteria import judge_criteria
+from shipid.measures.recognise import recognise_kinds, record_of
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import is_command, is_steering
 from shipid.simulation.standard import standard_manoeuvres
@@ -59,22 +59,24 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
             left[name] = "it has one row"
             continue
         columns = {str(column): rows[column].to_numpy() for column in rows if column != "run"}
-        if columns["t"][0] > DATED:
+        if columns["t"][0] > FIRST_DATED_TIME:
             columns["t"] = columns["t"] - columns["t"][0]
         record = record_of(columns)
-        kinds, why = kinds_of(record) if kind is None else ((kind,), "")
+        kinds, why = recognise_kinds(record) if kind is None else ((kind,), "")
         if not kinds:
             helm = any(is_command(column) and is_steering(column) for column in columns)
             left[name] = why if helm else NO_HELM
         for seen in kinds:
             result = trials[seen].measures(record)
             measures += [{"run": name, "kind": seen, **row} for row in measure_rows(result, length)]
-            judged += [{"run": name, "kind": seen, **row} for row in criterion_rows(criteria(seen, result, length))]
+            judged += [
+                {"run": name, "kind": seen, **row} for row in criterion_rows(judge_criteria(seen, result, length))
+            ]
     return Measured(pd.DataFrame(measures), pd.DataFrame(judged), left)
 
 
 def _named(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
-    parts = list(pieces(dataset))
+    parts = list(stretches_of_runs(dataset))
     count, number = Counter(name for name, _ in parts), Counter[str]()
     for name, rows in parts:
         number[name] += 1

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Array, Dataset, pieces
+from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.logs.mapping import Segment
 from shipid.physics.signals import is_shaft, is_steering
 
@@ -39,7 +39,7 @@ def manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
     unit : of the log's clock [s], in which starts and ends are given.
     """
     cuts = []
-    for _, rows in pieces(dataset):
+    for _, rows in stretches_of_runs(dataset):
         t = rows["t"].to_numpy() / unit
         cuts += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
     counts: dict[str, int] = {}

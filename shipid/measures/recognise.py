@@ -7,19 +7,19 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from shipid.errors import DataError
-from shipid.measures.record import Array, Record, helm_over, plateaus, released
+from shipid.measures.record import Array, Record, find_plateaus, first_execute, row_of_release
 from shipid.measures.turning import MIDSHIPS
-from shipid.measures.zigzag import last_over
+from shipid.measures.zigzag import last_row_of_zigzag
 from shipid.physics.signals import is_all_round, is_command, is_shaft, is_steering, is_thrust_order
 from shipid.units import DEGREE, percent_text
 
-STATES = ("t", "north", "east", "psi", "u", "v", "r")
-LEAST_HELM, LEAST_TURN = 3 * DEGREE, 90 * DEGREE
-MANY, APART = 5, 2 * DEGREE  # levels of helm that make a spiral, and how far they are apart
-MOSTLY = 0.7  # of the time that a zigzag's helm is over, to either side
-AMIDSHIPS = 0.2  # of the time of the turn that a pull-out's helm is amidships
-ASTERN = 120 * DEGREE  # of an azimuth unit, from which it pushes astern rather than aside
-STRAIGHT = 0.25  # of the greatest yaw rate, up to which a ship goes straight
+RECORD_STATES = ("t", "north", "east", "psi", "u", "v", "r")
+LEAST_HELM, LEAST_TURN_OF_CIRCLE = 3 * DEGREE, 90 * DEGREE
+SPIRAL_LEVELS, SPIRAL_LEVEL_DISTANCE = 5, 2 * DEGREE  # levels of helm that make a spiral, and how far they are apart
+ZIGZAG_HELM_TIME = 0.7  # of the time that a zigzag's helm is over, to either side
+PULL_OUT_TIME = 0.2  # of the time of the turn that a pull-out's helm is amidships
+ASTERN_ANGLE = 120 * DEGREE  # of an azimuth unit, from which it pushes astern rather than aside
+STRAIGHT_RATE = 0.25  # of the greatest yaw rate, up to which a ship goes straight
 
 
 def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = None) -> Record:
@@ -38,36 +38,36 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     ------
     DataError : a column is missing.
     """
-    missing = next((name for name in STATES if name not in columns), None)
+    missing = next((name for name in RECORD_STATES if name not in columns), None)
     if missing is not None:
         raise DataError("missing column", path=missing)
-    states = {name: np.asarray(columns[name], dtype=float) for name in STATES}
-    angles = _commands(columns, is_steering)
-    known = {name: _sense(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
+    states = {name: np.asarray(columns[name], dtype=float) for name in RECORD_STATES}
+    angles = _commands_that(columns, is_steering)
+    known = {name: _sense_of_angle(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
     moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
     least = MIDSHIPS * max(moved.values(), default=0.0)
     helms = [known[name] * angles[name] for name, size in moved.items() if size >= least]
     return Record(
         **states,
         helm=np.mean(helms, axis=0) if helms else np.zeros(len(states["t"])),
-        shaft=_shaft(_driving(columns), states["u"]),
+        shaft=_shaft_of_ship(_driving_shafts(columns), states["u"]),
     )
 
 
-def _driving(columns: Mapping[str, Array]) -> list[Array]:
+def _driving_shafts(columns: Mapping[str, Array]) -> list[Array]:
     """Shaft speed of each screw, > 0 where it drives ahead, as `record_of` says; the pitch alone where it has none."""
-    shafts = _commands(columns, is_shaft)
-    for name, pitch in _commands(columns, lambda name: is_thrust_order(name) and not is_shaft(name)).items():
+    shafts = _commands_that(columns, is_shaft)
+    for name, pitch in _commands_that(columns, lambda name: is_thrust_order(name) and not is_shaft(name)).items():
         shaft = f"{name.rpartition('.')[0]}.n"
         shafts[shaft] = shafts.get(shaft, np.ones(len(pitch))) * pitch / (np.abs(pitch).max() or 1.0)
-    for name, angle in _commands(columns, is_all_round).items():
+    for name, angle in _commands_that(columns, is_all_round).items():
         shaft, off = f"{name.rpartition('.')[0]}.n", np.abs(np.arctan2(np.sin(angle), np.cos(angle)))
-        if shaft in shafts and off.max() > ASTERN:
+        if shaft in shafts and off.max() > ASTERN_ANGLE:
             shafts[shaft] = shafts[shaft] * (1 - off / (90 * DEGREE))
     return list(shafts.values())
 
 
-def _shaft(shafts: list[Array], u: Array) -> Array | None:
+def _shaft_of_ship(shafts: list[Array], u: Array) -> Array | None:
     """Shaft speed of the ship, as `record_of` says; None where no shaft runs."""
     for below in (np.less, np.less_equal):
         stopped = [shaft for shaft in shafts if shaft[0] > 0 and below(shaft.min(), 0)]
@@ -80,18 +80,18 @@ def _shaft(shafts: list[Array], u: Array) -> Array | None:
     return np.asarray(np.mean(running, axis=0)) if running else None
 
 
-def _commands(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> dict[str, Array]:
+def _commands_that(columns: Mapping[str, Array], wanted: Callable[[str], bool]) -> dict[str, Array]:
     return {
         name: np.asarray(values, dtype=float) for name, values in columns.items() if is_command(name) and wanted(name)
     }
 
 
-def _sense(angle: Array, r: Array) -> float:
+def _sense_of_angle(angle: Array, r: Array) -> float:
     """+1 or -1, the sign with which an angle turns the ship to starboard; 0 for an angle without effect."""
     return float(np.sign(angle[:-1] @ np.diff(r)))
 
 
-def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
+def recognise_kinds(record: Record) -> tuple[tuple[str, ...], str]:
     """Kinds of manoeuvre of a run as `shipid manoeuvre` names them, and the reason as a sentence if there is none.
 
     Stop: the shaft changes from ahead to astern, by its speed, its pitch or the angle of its unit. The other kinds
@@ -100,28 +100,31 @@ def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
     or more. Pull-out, in addition: the helm is then amidships for at least a fifth of the time of the turn. Many helm
     levels are a spiral; the user has to say which kind.
     """
-    shaft, over = record.shaft, helm_over(record)
+    shaft, over = record.shaft, first_execute(record)
     if shaft is not None and shaft[0] > 0 > shaft.min():
         return ("stop",), ""
     if over.angle < LEAST_HELM:
         return (), f"the helm moves by less than {LEAST_HELM / DEGREE:g} deg, and the shafts are not reversed"
-    straight = abs(float(np.interp(over.start, record.t, record.r))) <= STRAIGHT * np.abs(record.r).max()
+    straight = abs(float(np.interp(over.start, record.t, record.r))) <= STRAIGHT_RATE * np.abs(record.r).max()
     share = over.side * record.helm / over.angle
-    last = last_over(record, over) + 1
+    last = last_row_of_zigzag(record, over) + 1
     off = np.abs(record.psi - record.psi[over.row])
     within = slice(over.row, last)
-    if straight and (share[within] <= -0.5).any() and off[within].max() < LEAST_TURN:
+    if straight and (share[within] <= -0.5).any() and off[within].max() < LEAST_TURN_OF_CIRCLE:
         both = float((np.abs(share[within]) >= 0.5).mean())
         few = f"the helm is over to either side for {percent_text(both)} of the time only"
-        return (("zigzag",), "") if both >= MOSTLY else ((), few)
-    levels = {round(float(record.helm[b]) / APART) for _, b in plateaus(record.t, record.helm, APART / 4)}
-    if len(levels) >= MANY:
+        return (("zigzag",), "") if both >= ZIGZAG_HELM_TIME else ((), few)
+    levels = {
+        round(float(record.helm[b]) / SPIRAL_LEVEL_DISTANCE)
+        for _, b in find_plateaus(record.t, record.helm, SPIRAL_LEVEL_DISTANCE / 4)
+    }
+    if len(levels) >= SPIRAL_LEVELS:
         return (), f"the helm is held at {len(levels)} levels: say whether it is a spiral or a reverse-spiral"
     if not straight:
         return (), "the ship turns already where the helm is first put over"
-    row = released(record, over)
-    if off[: row + 1][-1] < LEAST_TURN:
-        if off[within].max() >= LEAST_TURN and (share[within] <= -0.5).any():
+    row = row_of_release(record, over)
+    if off[: row + 1][-1] < LEAST_TURN_OF_CIRCLE:
+        if off[within].max() >= LEAST_TURN_OF_CIRCLE and (share[within] <= -0.5).any():
             return (), "the helm is reversed, but the heading changes by 90 deg or more: say whether it is a zigzag"
         return (), "the helm is let go before the ship has turned by 90 deg"
     turn, rest = record.t[row - 1] - record.t[over.row], np.abs(share[row:]) < MIDSHIPS
@@ -130,5 +133,5 @@ def kinds_of(record: Record) -> tuple[tuple[str, ...], str]:
         return ("turning",), ""
     moved = np.flatnonzero(~rest[amidships[0] - row :])
     end = amidships[0] + int(moved[0]) - 1 if len(moved) else len(record.t) - 1
-    long = record.t[end] - record.t[amidships[0]] >= AMIDSHIPS * turn
+    long = record.t[end] - record.t[amidships[0]] >= PULL_OUT_TIME * turn
     return (("turning", "pull-out") if long else ("turning",)), ""

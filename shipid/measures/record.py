@@ -12,20 +12,23 @@ from shipid.errors import DataError
 Array = NDArray[np.float64]
 
 NAN = float("nan")
-STILL = "the helm is never moved"
+HELM_NEVER_MOVED = "the helm is never moved"
 AT_REST = "the ship does not move at the execute"
-POINTS = 4  # samples of the interpolating polynomial
-HALVINGS = 60
-TOP = 0.2  # share of a rise that is its top
-DRIFT = 1.5  # tolerances by which a level differs from the next one at least
-ROUNDING = 1e-10  # of the largest coefficient of a fitted slope: smaller ones of higher powers are rounding
-LEFT = 0.05  # of the rise of an angle in motion: how near to the level before its start is traced back
-LOOSE = 0.1  # of that rise: how far values may scatter about a level and the line after it
+CUBIC_SAMPLES = 4  # samples of the interpolating polynomial
+CROSSING_HALVINGS = 60
+TOP_SHARE = 0.2  # share of a rise that is its top
+LEVEL_DRIFT = 1.5  # tolerances by which a level differs from the next one at least
+LEAST_SLOPE = 1e-10  # of the largest coefficient of a fitted slope: smaller ones of higher powers are rounding
+TRACED_SHARE = 0.05  # of the rise of an angle in motion: how near to the level before its start is traced back
+SCATTER_SHARE = 0.1  # of that rise: how far values may scatter about a level and the line after it
 FEWEST_LINE = 3  # rows of an angle in motion that show its rate
 FEWEST_ROWS = 16  # in which to look for where an angle leaves its level
-FULL = 0.95  # of the helm angle: the helm is all the way over
-STEADY = 0.05  # relative change over a stretch that counts as none
-CREEP, TO_COME = 0.005, 0.01  # change from quarter to quarter that is looked at, and what may follow after the end
+FULL_HELM = 0.95  # of the helm angle: the helm is all the way over
+STEADY_CHANGE = 0.05  # relative change over a stretch that counts as none
+CREEPING_CHANGE, REMAINING_CHANGE = (
+    0.005,
+    0.01,
+)  # change from quarter to quarter that is looked at, and what may follow after the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +85,13 @@ class Record:
 
     def along(self, start: float) -> tuple[Array, Array]:
         """Position (N,) [m] ahead and to starboard of that at time `start` [s], in axes of the heading at that time."""
-        psi, north, east = (value_at(self.t, values, start) for values in (self.psi, self.north, self.east))
+        psi, north, east = (cubic_value_at(self.t, values, start) for values in (self.psi, self.north, self.east))
         c, s = np.cos(psi), np.sin(psi)
         return c * (self.north - north) + s * (self.east - east), c * (self.east - east) - s * (self.north - north)
 
 
 @dataclass(frozen=True)
-class Measure:
+class MeasuredNumber:
     """A number with its SI unit; if it is NaN, `why` is a sentence with the reason."""
 
     value: float
@@ -96,46 +99,46 @@ class Measure:
     why: str = ""
 
 
-class Measures(dict[str, Measure]):
+class Measures(dict[str, MeasuredNumber]):
     """Measures by name, in the order in which they were added."""
 
     def add(self, why: str, **values: tuple[float, str]) -> None:
         """Add measures, each a value and its unit; `why` is the reason of those that are not finite."""
         for name, (value, unit) in values.items():
-            self[name] = Measure(float(value), unit) if np.isfinite(value) else Measure(NAN, unit, why)
+            self[name] = MeasuredNumber(float(value), unit) if np.isfinite(value) else MeasuredNumber(NAN, unit, why)
 
 
-def value_at(t: Array, values: Array, when: float) -> float:
+def cubic_value_at(t: Array, values: Array, when: float) -> float:
     """Value at the time `when` [s] by cubic interpolation of the two samples before and after; NaN outside the log."""
     if not t[0] <= when <= t[-1]:
         return NAN
-    first = int(np.clip(np.searchsorted(t, when) - POINTS // 2, 0, max(len(t) - POINTS, 0)))
-    near, some = t[first : first + POINTS] - when, values[first : first + POINTS]
+    first = int(np.clip(np.searchsorted(t, when) - CUBIC_SAMPLES // 2, 0, max(len(t) - CUBIC_SAMPLES, 0)))
+    near, some = t[first : first + CUBIC_SAMPLES] - when, values[first : first + CUBIC_SAMPLES]
     apart = near[:, None] - near + np.eye(len(near))
     others = np.where(np.eye(len(near), dtype=bool), 1.0, -near / apart)
     return float(some @ others.prod(axis=1))
 
 
-def crossing(t: Array, values: Array, level: float, start: float, rising: bool = True) -> float:
+def time_of_crossing(t: Array, values: Array, level: float, start: float, rising: bool = True) -> float:
     """First time [s] from `start` on at which values cross a level upwards (or downwards); NaN if they do not.
 
     It is `start` if the values are already beyond the level at `start`.
     """
     beyond = (values - level) * (1.0 if rising else -1.0)
-    here = value_at(t, beyond, start)
+    here = cubic_value_at(t, beyond, start)
     if not here < 0:
         return start if here >= 0 else NAN
     after = np.flatnonzero((t > start) & (beyond >= 0))
     if not len(after):
         return NAN
     low, high = max(float(t[after[0] - 1]), start), float(t[after[0]])
-    for _ in range(HALVINGS):
+    for _ in range(CROSSING_HALVINGS):
         middle = (low + high) / 2
-        low, high = (low, middle) if value_at(t, beyond, middle) >= 0 else (middle, high)
+        low, high = (low, middle) if cubic_value_at(t, beyond, middle) >= 0 else (middle, high)
     return high
 
 
-def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
+def maximum_between(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
     """Time [s] and value of the maximum between two times, from a fitted polynomial of degree 4.
 
     The polynomial is fitted to the samples between them, at most a fifth of the rise since `start` below the maximum,
@@ -147,7 +150,7 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
     top = int(inside[np.argmax(values[inside])]) if len(inside) else 0
     if top in (0, len(t) - 1) or len(t) < 5:
         return nothing
-    low = np.flatnonzero(values < values[top] - TOP * (values[top] - value_at(t, values, start)))
+    low = np.flatnonzero(values < values[top] - TOP_SHARE * (values[top] - cubic_value_at(t, values, start)))
     left, right = low[low < top], low[low > top]
     first = max(int(left[-1]) + 1 if len(left) else 0, int(inside[0]))
     last = min(int(right[0]) - 1 if len(right) else len(t) - 1, int(inside[-1]))
@@ -157,7 +160,7 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
     some = slice(first, last + 1)
     shape = np.polynomial.Polynomial.fit(t[some] - t[top], values[some], 4)
     slope = shape.deriv()
-    slope = slope.trim(ROUNDING * float(np.abs(slope.coef).max()))  # else far roots take the digits of the near one
+    slope = slope.trim(LEAST_SLOPE * float(np.abs(slope.coef).max()))  # else far roots take the digits of the near one
     roots = np.asarray(slope.roots(), dtype=complex)
     turns = roots.real[np.abs(roots.imag) < 1e-9] + t[top]
     turns = turns[(turns > max(t[first], start)) & (turns < min(t[last], end))]
@@ -167,7 +170,7 @@ def extreme(t: Array, values: Array, start: float, end: float) -> tuple[float, f
     return best, float(shape(best - t[top]))
 
 
-def integral(t: Array, values: Array, start: float, end: float) -> float:
+def integral_between(t: Array, values: Array, start: float, end: float) -> float:
     """Integral of values over time from `start` to `end` [s] by the trapezoid rule; NaN if either is NaN."""
     if not start <= end:
         return NAN
@@ -175,30 +178,30 @@ def integral(t: Array, values: Array, start: float, end: float) -> float:
     return float(np.trapezoid(np.interp(instants, t, values), instants))
 
 
-def mean(t: Array, values: Array, start: float, end: float) -> float:
+def mean_between(t: Array, values: Array, start: float, end: float) -> float:
     """Mean of values over the time from `start` to `end` [s]; NaN if end <= start."""
-    return integral(t, values, start, end) / (end - start) if end > start else NAN
+    return integral_between(t, values, start, end) / (end - start) if end > start else NAN
 
 
-def settled(t: Array, values: Array, start: float, end: float, scale: float) -> float:
+def settled_mean(t: Array, values: Array, start: float, end: float, scale: float) -> float:
     """Mean over the last quarter of the time; NaN where the values are still on their way.
 
     They are where it differs from the quarter before by more than 5 % of `scale`, or where the last three quarters show
     that more than 1 % of it is still to come: a slow decay changes little from one to the next, and goes on for long.
     """
     quarter = (end - start) / 4
-    early, before, last = (mean(t, values, end - (i + 1) * quarter, end - i * quarter) for i in (2, 1, 0))
-    change, steady = last - before, STEADY * abs(scale)
+    early, before, last = (mean_between(t, values, end - (i + 1) * quarter, end - i * quarter) for i in (2, 1, 0))
+    change, steady = last - before, STEADY_CHANGE * abs(scale)
     if not abs(change) <= steady:
         return NAN
     slower = before - early - change  # by how much the change falls from quarter to quarter
-    if abs(change) <= CREEP * abs(scale) or change * (before - early) <= 0:
+    if abs(change) <= CREEPING_CHANGE * abs(scale) or change * (before - early) <= 0:
         return last
     to_come = change**2 / abs(slower) if slower * change > 0 else np.inf  # of a geometric series
-    return last if to_come <= TO_COME * abs(scale) else NAN
+    return last if to_come <= REMAINING_CHANGE * abs(scale) else NAN
 
 
-def departure(t: Array, order: Array, index: int) -> float:
+def start_of_change(t: Array, order: Array, index: int) -> float:
     """Time [s] at which the change of `order` that is in progress in row `index` (at least 1) began.
 
     A step order begins at its row; a measured angle that moves gradually is traced back to the start of its motion.
@@ -210,11 +213,11 @@ def departure(t: Array, order: Array, index: int) -> float:
     begin = index - 1
     while begin > 0 and moved[begin - 1] > 0.2 * moved[index - 1]:
         begin -= 1
-    bend = _bend(t[: index + 1], sense * order[: index + 1])
+    bend = _bend_in_motion(t[: index + 1], sense * order[: index + 1])
     if bend is not None:
         bent, level = bend
         rise = sense * order[index] - level
-        if sense * order[begin] - level > LEFT * rise and moved[index - 1] < rise / 2:  # no jump
+        if sense * order[begin] - level > TRACED_SHARE * rise and moved[index - 1] < rise / 2:  # no jump
             return bent
     after = begin + 2
     if after >= len(t) or moved[begin + 1] <= 0.05 * moved[begin]:
@@ -223,7 +226,7 @@ def departure(t: Array, order: Array, index: int) -> float:
     return float(np.clip(t[begin + 1] - moved[begin] / rate, t[begin], t[begin + 1]))
 
 
-def _bend(t: Array, values: Array) -> tuple[float, float] | None:
+def _bend_in_motion(t: Array, values: Array) -> tuple[float, float] | None:
     """Time at which values, which rise at the end, leave their level, and this level; None where they do not.
 
     The last rows are divided into a level and a straight line by least squares. So many rows are taken that at least
@@ -235,7 +238,7 @@ def _bend(t: Array, values: Array) -> tuple[float, float] | None:
         found = _level_and_line(t[some], values[some])
         if found is not None and found[2] < len(t[some]) / 2:
             found = None
-        if found is not None and (count >= len(t) or abs(before - found[1]) <= TOP * (values[-1] - found[1])):
+        if found is not None and (count >= len(t) or abs(before - found[1]) <= TOP_SHARE * (values[-1] - found[1])):
             return found[:2]
         if count >= len(t):
             return None
@@ -265,14 +268,14 @@ def _level_and_line(t: Array, values: Array) -> tuple[float, float, int] | None:
     best = int(np.argmin(missed.sum(axis=0)))
     level = y[best] / left[best]
     scatter = np.sqrt(np.maximum(missed[:, best], 0.0) / (left[best], right[best]))
-    if slope[best] <= 0 or scatter.max() > LOOSE * (values[-1] - level):
+    if slope[best] <= 0 or scatter.max() > SCATTER_SHARE * (values[-1] - level):
         return None
     meets = (level - line_y[best] / right[best]) / slope[best] + line_t[best] / right[best]
     return end + float(np.clip(meets, t[0], 0.0)), float(level), int(left[best])
 
 
 @dataclass(frozen=True)
-class HelmOver:
+class FirstExecute:
     """The first execute: the helm is first put over.
 
     Parameters
@@ -288,7 +291,7 @@ class HelmOver:
     side: float
 
 
-def helm_over(record: Record) -> HelmOver:
+def first_execute(record: Record) -> FirstExecute:
     """The first execute of a record.
 
     A helm may be over in the first row already. If the ship turns there, it belongs to an earlier manoeuvre, and the
@@ -297,30 +300,33 @@ def helm_over(record: Record) -> HelmOver:
     """
     size, rate = np.abs(record.helm), np.abs(record.r)
     if not size.max() > 0:
-        return HelmOver(NAN, 0, 0.0, 1.0)
-    angle = _angle(size)
+        return FirstExecute(NAN, 0, 0.0, 1.0)
+    angle = _helm_angle(size)
     over = size >= angle / 2
-    if over[0] and rate[0] > STEADY * rate.max():
+    if over[0] and rate[0] > STEADY_CHANGE * rate.max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
         over &= np.logical_or.accumulate(~(over & same))  # the helm of an earlier manoeuvre ends at its first release
     elif over[0]:
-        angle = _angle(size[int(np.argmax(rate > STEADY * rate.max())) :])
-        full = int(np.argmax(size >= FULL * angle))
-        if full and np.interp(departure(record.t, record.helm, full), record.t, rate) <= STEADY * rate.max():
+        angle = _helm_angle(size[int(np.argmax(rate > STEADY_CHANGE * rate.max())) :])
+        full = int(np.argmax(size >= FULL_HELM * angle))
+        if (
+            full
+            and np.interp(start_of_change(record.t, record.helm, full), record.t, rate) <= STEADY_CHANGE * rate.max()
+        ):
             over[:full] = False
     if not over.any():
-        return HelmOver(NAN, 0, 0.0, 1.0)
+        return FirstExecute(NAN, 0, 0.0, 1.0)
     row = int(np.argmax(over))
-    start = departure(record.t, record.helm, row) if row else float(record.t[0])
-    return HelmOver(start, row, angle, float(np.sign(record.helm[row])))
+    start = start_of_change(record.t, record.helm, row) if row else float(record.t[0])
+    return FirstExecute(start, row, angle, float(np.sign(record.helm[row])))
 
 
-def _angle(size: Array) -> float:
+def _helm_angle(size: Array) -> float:
     """Helm angle [rad] of a manoeuvre: the median of the sizes above half of the largest."""
     return float(np.median(size[size >= size.max() / 2]))
 
 
-def released(record: Record, over: HelmOver) -> int:
+def row_of_release(record: Record, over: FirstExecute) -> int:
     """First row after the execute with less than half of the helm angle; the number of rows if there is none."""
     back = np.flatnonzero(over.side * record.helm[over.row :] < over.angle / 2)
     return over.row + int(back[0]) if over.angle and len(back) else len(record.t)
@@ -338,7 +344,7 @@ def _level_from(values: Array, last: int, tolerance: float) -> int:
     return 0
 
 
-def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]:
+def find_plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]:
     """First and last rows of the plateaus: stretches with all values within `tolerance` of their last value.
 
     Plateaus shorter than a quarter of the longest are left out, and those that drift into the next one.
@@ -354,5 +360,5 @@ def plateaus(t: Array, values: Array, tolerance: float) -> list[tuple[int, int]]
     return [
         (a, b)
         for (a, b), (c, d) in zip(level, [*level[1:], (-1, -1)], strict=True)
-        if b + 1 != c or abs(values[d] - values[b]) > DRIFT * tolerance
+        if b + 1 != c or abs(values[d] - values[b]) > LEVEL_DRIFT * tolerance
     ]

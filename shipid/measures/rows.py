@@ -9,7 +9,10 @@ from shipid.measures.criteria import Criterion
 from shipid.measures.record import Measures
 from shipid.units import DEGREE
 
-SHOWN = {"rad": ("deg", DEGREE), "rad/s": ("deg/s", DEGREE)}  # SI unit -> unit in tables, and its size in SI units
+SHOWN_UNITS = {
+    "rad": ("deg", DEGREE),
+    "rad/s": ("deg/s", DEGREE),
+}  # SI unit -> unit in tables, and its size in SI units
 
 
 def measure_rows(measures: Measures, length: float | None) -> list[dict[str, Any]]:
@@ -19,7 +22,7 @@ def measure_rows(measures: Measures, length: float | None) -> list[dict[str, Any
     """
     rows = []
     for name, measure in measures.items():
-        unit, size = SHOWN.get(measure.unit, (measure.unit, 1.0))
+        unit, size = SHOWN_UNITS.get(measure.unit, (measure.unit, 1.0))
         lengths = measure.value / length if length and measure.unit == "m" else float("nan")
         label = name.replace("_", " ")
         rows.append(
@@ -33,7 +36,7 @@ def criterion_rows(criteria: Sequence[Criterion]) -> list[dict[str, Any]]:
     words = {True: "met", False: "not met", None: "not judged"}
     rows = []
     for one in criteria:
-        unit, size = SHOWN.get(one.unit, (one.unit, 1.0))
+        unit, size = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
         numbers = {"value": one.value / size, "limit": one.limit / size}
         rows.append({"criterion": one.name, **numbers, "unit": unit, "verdict": words[one.met], "note": one.note})
     return rows

@@ -41,7 +41,7 @@ GROUP_ERRORS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StructuresContent(PageContent):
-    """Everything the page shows; the frames are those of `shipid.study.structures.Compared`."""
+    """Everything the page shows; the frames are those of `shipid.study.structures.StructureComparison`."""
 
     sentences: Sequence[str]
     table: pd.DataFrame

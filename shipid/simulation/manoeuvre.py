@@ -17,10 +17,10 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 from shipid.checked import CheckedModel
 from shipid.errors import DocumentError, suggest_name
 from shipid.measures.record import Measures, Record
-from shipid.measures.spiral import Levels, levels, rate_levels, reverse_spiral, spiral
-from shipid.measures.stopping import stop
-from shipid.measures.turning import pull_out, turning
-from shipid.measures.zigzag import zigzag
+from shipid.measures.spiral import SpiralLevels, helm_levels, rate_levels, reverse_spiral_measures, spiral_measures
+from shipid.measures.stopping import stopping_measures
+from shipid.measures.turning import pull_out_measures, turning_measures
+from shipid.measures.zigzag import zigzag_measures
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
@@ -293,9 +293,9 @@ class Trial(ExecutedManoeuvre):
         return self.measures(record)
 
     @staticmethod
-    def levels(record: Record) -> Levels:  # noqa: ARG004
+    def levels(record: Record) -> SpiralLevels:  # noqa: ARG004
         """Steady levels of a spiral; of other kinds none."""
-        return Levels(np.empty(0), np.empty(0), 0)
+        return SpiralLevels(np.empty(0), np.empty(0), 0)
 
 
 class HelmOverManoeuvre(TimedManoeuvre):
@@ -326,7 +326,7 @@ class HelmOverManoeuvre(TimedManoeuvre):
 class TurningCircle(HelmOverManoeuvre, Trial):
     """The helm is put over and held."""
 
-    measures = staticmethod(turning)
+    measures = staticmethod(turning_measures)
     first: ClassVar[tuple[str, ...]] = ("advance", "tactical diameter", "steady diameter", "steady drift")
     angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg of helm")] = 35.0
 
@@ -339,7 +339,7 @@ class TurningCircle(HelmOverManoeuvre, Trial):
 class PullOut(HelmOverManoeuvre, Trial):
     """A turn, then the helm amidships: a stable ship's yaw rate decays to zero."""
 
-    measures = staticmethod(pull_out)
+    measures = staticmethod(pull_out_measures)
     first: ClassVar[tuple[str, ...]] = ("turning rate", "residual rate")
     turn: Annotated[Positive, Field(description="s that the helm is over")]
 
@@ -362,7 +362,7 @@ class PullOut(HelmOverManoeuvre, Trial):
 class Zigzag(HelmOverManoeuvre, Trial):
     """The helm is reversed each time the heading has changed from that at the first order by the execute heading."""
 
-    measures = staticmethod(zigzag)
+    measures = staticmethod(zigzag_measures)
     angles: ClassVar[tuple[str, ...]] = ("helm", "execute heading")
     straight: ClassVar[bool] = True
     first: ClassVar[tuple[str, ...]] = ("overshoot 1", "overshoot 2", "initial turning", "period")
@@ -401,14 +401,14 @@ class Zigzag(HelmOverManoeuvre, Trial):
 
     def measured(self, record: Record) -> Measures:
         """Measures at the execute heading that was ordered; of a log it is estimated."""
-        return zigzag(record, execute_heading=self.reversal_deg * DEGREE)
+        return zigzag_measures(record, execute_heading=self.reversal_deg * DEGREE)
 
 
 class Spiral(Trial):
     """Direct (Dieudonne) spiral: one helm angle after another, each held until the turn is steady."""
 
-    measures = staticmethod(spiral)
-    levels = staticmethod(levels)
+    measures = staticmethod(spiral_measures)
+    levels = staticmethod(helm_levels)
     first: ClassVar[tuple[str, ...]] = ("neutral helm", "loop width")
     angles_deg: Annotated[tuple[Helm, ...], Field(min_length=1, description="deg, > 0 to starboard, in order")] = SPIRAL
     hold: Annotated[Positive, Field(description="s that each is held")]
@@ -442,7 +442,7 @@ class Spiral(Trial):
 class ReverseSpiral(Trial):
     """Reverse (Bech) spiral: one yaw rate after another, each held by the helm until that is steady."""
 
-    measures = staticmethod(reverse_spiral)
+    measures = staticmethod(reverse_spiral_measures)
     levels = staticmethod(rate_levels)
     angles: ClassVar[tuple[str, ...]] = ("greatest rate",)
     first: ClassVar[tuple[str, ...]] = ("neutral helm", "loop width")
@@ -494,7 +494,7 @@ class ReverseSpiral(Trial):
 class CrashStop(TimedManoeuvre, Trial):
     """Full astern, the helm amidships: a shaft turns the other way, of a controllable pitch the pitch is reversed."""
 
-    measures = staticmethod(stop)
+    measures = staticmethod(stopping_measures)
     angles: ClassVar[tuple[str, ...]] = ()
     straight: ClassVar[bool] = True
     first: ClassVar[tuple[str, ...]] = ("track reach", "head reach", "stopping time")

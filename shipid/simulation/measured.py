@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.errors import ShipidError
-from shipid.measures.criteria import criteria
+from shipid.measures.criteria import judge_criteria
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
@@ -114,7 +114,7 @@ def _measure_log(vessel: Vessel, chosen: Standard, frame: pd.DataFrame) -> Measu
     columns = {str(column): frame[column].to_numpy() for column in frame if column != "run"}
     record = record_of(_limit_angles(vessel, columns), Controls(vessel).effects[1])
     measures, length = chosen.manoeuvre.measured(record), vessel.length
-    judged = criteria(chosen.kind, measures, length, calm=True)
+    judged = judge_criteria(chosen.kind, measures, length, calm=True)
     if chosen.manoeuvre.approach == "rest":
         judged = [replace(one, met=None, note=FROM_REST) for one in judged]
     else:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Dataset, clock_slack, pieces
+from shipid.data.dataset import Dataset, clock_slack, stretches_of_runs
 from shipid.data.windows import coarse_in_words, gaps_in_words
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError
@@ -20,19 +20,19 @@ from shipid.hybrid.physics import assumed, check_columns
 from shipid.logs.dates import span_of
 from shipid.predictor import Predictor
 from shipid.report.content import Line
-from shipid.study.apply import Band, Forecast, dataset_of, instants_along, predict_instants, tables_along
+from shipid.study.apply import BandSettings, Forecast, instants_along, predict_instants, read_or_import, tables_along
 from shipid.study.store import read_predictor
 from shipid.units import join_names, length_text, level_text, percent_text, plural_word
 
 Array = np.ndarray
-TRACK = ["run", "t", "north", "east"]
-AHEAD = 5  # moments of the horizon that the summary shows
-CHANGED = "the ship, its loading or the weather is not that of the training, and bands do not hold"
-UNPLANNED = "later orders were not known as they were in calibration"
+TRACK_COLUMNS = ["run", "t", "north", "east"]
+MOMENTS_IN_SUMMARY = 5  # moments of the horizon that the summary shows
+SHIP_CHANGED = "the ship, its loading or the weather is not that of the training, and bands do not hold"
+ORDERS_UNKNOWN = "later orders were not known as they were in calibration"
 
 
 @dataclass(frozen=True, eq=False)
-class Played:
+class Replay:
     """What would have been seen at sea.
 
     instants : a row for each prediction: run, t, outside (the alarm), latency [s], and the error at the end of the
@@ -55,13 +55,13 @@ class Played:
     skipped: int
     assumed: tuple[str, ...]
     plan: bool
-    band: Band | None = None
-    track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK))
+    band: BandSettings | None = None
+    track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK_COLUMNS))
     gaps: str = ""
     coarse: str = ""
 
 
-def play(
+def play_aboard(
     file: Path,
     log: Path,
     mapping: str | None = None,
@@ -70,7 +70,7 @@ def play(
     level: float | None = None,
     kind: str | None = None,
     rate: float | None = None,
-) -> Played:
+) -> Replay:
     """Predict at every instant of a log from the rows up to then; the rows after it only judge.
 
     every : seconds between predictions; default the step of the predictor. An instant is a row. A predictor that takes
@@ -84,8 +84,8 @@ def play(
     predictor = read_predictor(file)
     if level is not None:
         predictor.check_level(level, kind)
-    band = None if level is None else Band(level, kind, rate)
-    dataset = dataset_of(log, mapping)
+    band = None if level is None else BandSettings(level, kind, rate)
+    dataset = read_or_import(log, mapping)
     vessel, step = predictor.vessel, predictor.physics.step
     names = list(map(str, dataset.frame.columns))
     if vessel is not None:
@@ -93,7 +93,7 @@ def play(
     if every is not None and not every > 0:
         raise DataError(f"{every:g}: must be above 0", path="--every")
     instants, points, skipped = [], [], 0
-    for run, piece in pieces(dataset):
+    for run, piece in stretches_of_runs(dataset):
         rows, early = _due_rows(piece["t"].to_numpy(), every or step, predictor.past * step)
         skipped += early
         if len(rows):
@@ -103,11 +103,11 @@ def play(
             instants.append(seen.assign(latency=latency))
     if not instants:
         past = predictor.past * step
-        if every is not None and any(np.ptp(piece["t"]) >= past for _, piece in pieces(dataset)):
+        if every is not None and any(np.ptp(piece["t"]) >= past for _, piece in stretches_of_runs(dataset)):
             message = f"{every:g}: no instant so many s apart has the past of {past:g} s that the predictor needs"
             raise DataError(f"{message}: give less, such as {past:g}", path="--every")
         raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
-    return Played(
+    return Replay(
         pd.concat(instants, ignore_index=True),
         pd.concat(points, ignore_index=True),
         step,
@@ -116,7 +116,7 @@ def play(
         () if vessel is None else tuple(assumed(vessel, names)),
         predictor.commands == "known",
         band,
-        dataset.frame[TRACK],
+        dataset.frame[TRACK_COLUMNS],
         gaps_in_words(dataset, step),
         coarse_in_words(dataset, step),
     )
@@ -134,7 +134,7 @@ def _due_rows(t: Array, every: float, past: float) -> tuple[list[int], int]:
 
 
 def _forecast_row_by_row(
-    predictor: Predictor, dataset: Dataset, piece: pd.DataFrame, rows: list[int], band: Band | None
+    predictor: Predictor, dataset: Dataset, piece: pd.DataFrame, rows: list[int], band: BandSettings | None
 ) -> tuple[Forecast, list[float]]:
     """Predictions at some rows of one unbroken stretch, each from the rows up to it, and the latency [s] of each."""
     forecasts, latency = [], []
@@ -155,14 +155,14 @@ def _forecast_row_by_row(
     ), latency
 
 
-def write(played: Played, file: Path) -> None:
+def write_replay_points(played: Replay, file: Path) -> None:
     """Write every point with the alarm and the latency of its instant."""
     check_table(file)
     kept = played.instants.drop(columns=["error", "reach"], errors="ignore").rename(columns={"factor": "band_factor"})
     write_table(file, played.points.merge(kept, on=["run", "t"], how="left"))
 
 
-def summed_up(played: Played) -> list[Line]:
+def replay_summary(played: Replay) -> list[Line]:
     """Summary of a replay, as lines that say what they are about."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
@@ -181,12 +181,12 @@ def summed_up(played: Played) -> list[Line]:
     lines.append(Line("detail", words))
     share = f"{outside.sum()} of {len(outside)} instants ({percent_text(outside.mean())})"
     lines.append(Line("alarm", f"alarm: at {share} outside of the training"))
-    lines += [Line("detail", text) for text in _spans(instants)]
-    for place, text in enumerate(_promise(played)):
+    lines += [Line("detail", text) for text in _longest_alarms(instants)]
+    for place, text in enumerate(_band_lines(played)):
         lines.append(Line("detail" if place else "band", text))
     table = ["error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"]
     merged = points.merge(instants[["run", "t", "outside"]], on=["run", "t"])
-    for moment in _moments(points):
+    for moment in _moments_of_summary(points):
         here = merged[(merged["ahead"] == moment) & merged["error"].notna()]
         if len(here):
             error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
@@ -196,11 +196,11 @@ def summed_up(played: Played) -> list[Line]:
     return [*lines, *(Line("detail", text) for text in table)]
 
 
-def _promise(played: Played) -> list[str]:
+def _band_lines(played: Replay) -> list[str]:
     """How often the band held whole paths, then by how much it adapted and its size ahead; none without a band."""
     if played.band is None:
         return []
-    why = f"{UNPLANNED}, or {CHANGED}" if played.plan else CHANGED
+    why = f"{ORDERS_UNKNOWN}, or {SHIP_CHANGED}" if played.plan else SHIP_CHANGED
     lines = [_band_in_words(played.instants, played.band, why)]
     if played.band.rate is not None:
         factors = played.instants["factor"]
@@ -208,7 +208,7 @@ def _promise(played: Played) -> list[str]:
         last = ", ".join(f"{run} {value:.2f}" for run, value in ends.items())
         lines.append(f"  times the calibrated one: {factors.min():.2f} to {factors.max():.2f}; at the end: {last}")
     points, none = played.points, []
-    for moment in _moments(points):
+    for moment in _moments_of_summary(points):
         here = points[points["ahead"] == moment]
         along, across = (float(np.median(here[name])) for name in ("band_along", "band_across"))
         if max(along, across) > SPEED_LIMIT * moment:
@@ -222,7 +222,7 @@ def _promise(played: Played) -> list[str]:
     return lines
 
 
-def _band_in_words(instants: pd.DataFrame, band: Band, why: str) -> str:
+def _band_in_words(instants: pd.DataFrame, band: BandSettings, why: str) -> str:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
     reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
     judged = np.isfinite(reach)
@@ -244,14 +244,14 @@ def _band_in_words(instants: pd.DataFrame, band: Band, why: str) -> str:
     return line
 
 
-def _moments(points: pd.DataFrame) -> Array:
+def _moments_of_summary(points: pd.DataFrame) -> Array:
     """Some moments of the horizon, from the first to the last."""
     ahead = np.unique(points["ahead"])
-    moments: Array = ahead[np.unique(np.linspace(0, len(ahead) - 1, AHEAD).round().astype(int))]
+    moments: Array = ahead[np.unique(np.linspace(0, len(ahead) - 1, MOMENTS_IN_SUMMARY).round().astype(int))]
     return moments
 
 
-def _spans(instants: pd.DataFrame, most: int = 5) -> list[str]:
+def _longest_alarms(instants: pd.DataFrame, most: int = 5) -> list[str]:
     """The longest times of alarm."""
     spans: list[tuple[float, str, float, float]] = []
     for run, rows in instants.groupby("run", sort=False):

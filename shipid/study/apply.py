@@ -9,8 +9,16 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, in_force, pieces, read_dataset, sample
-from shipid.data.windows import Instants, coarse_in_words, from_frame, future_of, gaps_in_words, past_of, without_rows
+from shipid.data.dataset import Dataset, clock_slack, mean_commands, read_dataset, sample_columns, stretches_of_runs
+from shipid.data.windows import (
+    Instants,
+    coarse_in_words,
+    from_frame,
+    future_of_instants,
+    gaps_in_words,
+    is_without_rows,
+    past_of_instants,
+)
 from shipid.errors import DataError, ResultError, suggest_name
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapted, adaptive, factor
@@ -23,11 +31,11 @@ from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
 
 Array = np.ndarray
-PREDICTED = ("cooperative_north", "cooperative_east")
+COOPERATIVE_COLUMNS = ("cooperative_north", "cooperative_east")
 
 
 @dataclass(frozen=True)
-class Band:
+class BandSettings:
     """Settings of a band along a log: its level, the kind of manoeuvre, and the rate at which it adapts, if any."""
 
     level: float
@@ -78,17 +86,17 @@ def predict_log(
     without rows the log has, and the longest; `attrs["coarse"]` that its rows are farther apart than the step.
     """
     check_table(out)
-    predictor = read_predictor(_known_cell(folder, cell))
+    predictor = read_predictor(_find_cell_file(folder, cell))
     if level is not None:
         predictor.check_level(level, kind)
-    dataset = dataset_of(log, mapping)
+    dataset = read_or_import(log, mapping)
     if predictor.vessel is not None:
         check_columns(predictor.vessel, dataset.frame.columns, str(log))
-    band = None if level is None else Band(level, kind, rate)
-    tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in pieces(dataset)]
+    band = None if level is None else BandSettings(level, kind, rate)
+    tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in stretches_of_runs(dataset)]
     parts = [table for table in tables if len(table)]
     if not parts:
-        raise DataError(_too_short(predictor), file=log)
+        raise DataError(_too_short_sentence(predictor), file=log)
     frame = pd.concat(parts, ignore_index=True)
     write_table(out, frame)
     step = predictor.physics.step
@@ -97,7 +105,7 @@ def predict_log(
 
 
 def table_of_stretch(
-    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, band: Band | None = None
+    predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, band: BandSettings | None = None
 ) -> pd.DataFrame:
     """The table of `predict_log` for one unbroken stretch; empty where no row has the past and the plan it needs."""
     some = _usable_rows(predictor, rows["t"].to_numpy())
@@ -105,20 +113,20 @@ def table_of_stretch(
         return pd.DataFrame()
     forecast = predict_instants(predictor, instants_along(predictor, dataset, rows, some, plan=True), band)
     points, instants = tables_along(predictor, run, rows, forecast, band)
-    points = points.drop(columns="error").rename(columns=dict(zip(("north", "east"), PREDICTED, strict=True)))
+    points = points.drop(columns="error").rename(columns=dict(zip(("north", "east"), COOPERATIVE_COLUMNS, strict=True)))
     if band is not None and band.rate is not None:
         points["band_factor"] = np.repeat(instants["factor"].to_numpy(), predictor.physics.horizon)
     return points.assign(outside=np.repeat(forecast.outside, predictor.physics.horizon))
 
 
-def dataset_of(log: Path, mapping: str | None) -> Dataset:
+def read_or_import(log: Path, mapping: str | None) -> Dataset:
     """A dataset, or a raw log with its mapping; DataError for what is neither."""
     if mapping is None:
         return read_dataset(log, remedy=", or give the log itself with --mapping")
     return import_log(read_mapping(mapping), log)
 
 
-def _too_short(predictor: Predictor) -> str:
+def _too_short_sentence(predictor: Predictor) -> str:
     step = predictor.physics.step
     length = predictor.physics.horizon * step
     past = f"the past of {predictor.past * step:g} s" if predictor.past else ""
@@ -126,7 +134,7 @@ def _too_short(predictor: Predictor) -> str:
     return f"no run is as long as {' and '.join(filter(None, (past, plan)))}"
 
 
-def _known_cell(folder: Path, cell: str) -> Path:
+def _find_cell_file(folder: Path, cell: str) -> Path:
     available = {file.stem for file in (folder / "cells").glob("*.npz")}
     if not folder.is_dir():
         raise ResultError("no such folder: give that of a run", file=folder)
@@ -156,10 +164,10 @@ def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, s
     if predictor.causal:
         seen = causal_columns(seen, predictor.causal)
     t = seen.frame["t"].to_numpy()[some]
-    columns = sample(seen.frame, t) | {"t": t}
+    columns = sample_columns(seen.frame, t) | {"t": t}
     planned = None
     if predictor.commands == "known" and plan:
-        planned = in_force(seen.frame, t + physics.step * np.arange(physics.horizon + 1)[:, None])
+        planned = mean_commands(seen.frame, t + physics.step * np.arange(physics.horizon + 1)[:, None])
     elif predictor.commands == "known":
         planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
     hidden, estimates = None, {}
@@ -169,11 +177,11 @@ def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, s
         if physics.observer is not None:
             observed = observe(predictor.vessel, seen, physics.observer).columns
             estimates = {name: values[some] for name, values in observed.items()}
-    past = past_of(seen.frame, t, predictor.past, physics.step, physics.path)
+    past = past_of_instants(seen.frame, t, predictor.past, physics.step, physics.path)
     return Instants(columns, past, planned, hidden, estimates)
 
 
-def predict_instants(predictor: Predictor, instants: Instants, band: Band | None) -> Forecast:
+def predict_instants(predictor: Predictor, instants: Instants, band: BandSettings | None) -> Forecast:
     """Paths, band and alarm at some instants."""
     alone = predictor.alone(instants)
     predicted = predictor.predict(instants, alone)
@@ -184,7 +192,7 @@ def predict_instants(predictor: Predictor, instants: Instants, band: Band | None
 
 
 def tables_along(
-    predictor: Predictor, run: str, rows: pd.DataFrame, forecast: Forecast, band: Band | None
+    predictor: Predictor, run: str, rows: pd.DataFrame, forecast: Forecast, band: BandSettings | None
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Points and instants of a forecast along one unbroken stretch, all of whose rows are `rows`.
 
@@ -194,7 +202,7 @@ def tables_along(
     """
     physics, columns = predictor.physics, forecast.columns
     steps, count = physics.horizon, len(columns["t"])
-    missed = _missed(predictor, rows, forecast)
+    missed = _errors_along(predictor, rows, forecast)
     error = np.hypot(missed[..., 0], missed[..., 1])
     points = {
         "run": np.full(steps * count, run),
@@ -210,7 +218,7 @@ def tables_along(
         if band.rate is not None:
             assert predictor.bands is not None
             ends, table = columns["t"] + steps * physics.step, predictor.bands.table(band.kind)
-            factors = along_run(reach, ends, columns["t"], band, table)
+            factors = adapt_along_run(reach, ends, columns["t"], band, table)
         instants |= {"reach": reach, "factor": factors}
         course = np.arctan2(region.ahead[..., 1], region.ahead[..., 0]) + columns["psi"]
         points["band_along"], points["band_across"] = (
@@ -220,16 +228,16 @@ def tables_along(
     return pd.DataFrame(points | {"error": error.T.ravel()}), pd.DataFrame(instants)
 
 
-def _missed(predictor: Predictor, rows: pd.DataFrame, forecast: Forecast) -> Array:
+def _errors_along(predictor: Predictor, rows: pd.DataFrame, forecast: Forecast) -> Array:
     """How far paths are from how the log goes on (T, S, 2) [m]; not a number where it holds no rows."""
     physics, t, now = predictor.physics, rows["t"].to_numpy(), forecast.columns["t"]
     later = now + physics.step * np.arange(1, physics.horizon + 1)[:, None]
-    there = (later <= t[-1] + clock_slack(t)) & ~without_rows(t, later, physics.step)
-    future = future_of(rows, now, physics.horizon, physics.step, physics.path)
+    there = (later <= t[-1] + clock_slack(t)) & ~is_without_rows(t, later, physics.step)
+    future = future_of_instants(rows, now, physics.horizon, physics.step, physics.path)
     return np.where(there[..., None], future - forecast.predicted, np.nan)
 
 
-def along_run(reach: Array, known_at: Array, now: Array, band: Band, table: Array) -> Array:
+def adapt_along_run(reach: Array, known_at: Array, now: Array, band: BandSettings, table: Array) -> Array:
     """Factors (S,) of a band that adapts along a run: at each instant, by the paths that have ended until then.
 
     Parameters

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shipid.data.windows import Windows, covered
+from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, shorten_line
 from shipid.hybrid.method import Case, Corrector, Fitted, Journal, Task, fit_all
@@ -161,7 +161,7 @@ def evaluate_cell(
     row |= {"member": foundation.member, "method": method}
     row |= accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY
     row |= {"N_D": batch.N_D, "seed": batch.seed, "runs": len(prepared.runs(batch))}
-    row |= {"minutes": covered(work.windows) / 60, "seconds": result.seconds + one.seconds + seconds}
+    row |= {"minutes": covered_time(work.windows) / 60, "seconds": result.seconds + one.seconds + seconds}
     row["trials"] = result.trials
     if result.corrector is None:
         return Cell(row | _failed("failed", shorten_line(result.sentence or one.sentence or "no training converged")))

@@ -19,7 +19,7 @@ from shipid.metrics import position_error
 from shipid.study.prepare import constant_motion, window_memory
 from shipid.vessel.load import Vessel
 
-LEAST_TURN = np.radians(5.0)  # the share of a smaller turn is mostly noise of the heading
+LEAST_TURN_OF_WINDOW = np.radians(5.0)  # the share of a smaller turn is mostly noise of the heading
 LEAST_ERROR = 1e-3  # m: no log has positions so near to the truth
 
 
@@ -82,7 +82,7 @@ def first_look(
     turned, speed = true["psi"][-1] - now, np.hypot(true["u"][-1], true["v"][-1])
     return Look(
         vessel, horizon * step, float(error.mean()), float(constant.mean()),
-        _median_share(predicted["psi"][-1] - now, turned, LEAST_TURN),
+        _median_share(predicted["psi"][-1] - now, turned, LEAST_TURN_OF_WINDOW),
         _median_share(np.hypot(predicted["u"][-1], predicted["v"][-1]), speed, 0.0),
     )  # fmt: skip
 

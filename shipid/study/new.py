@@ -20,7 +20,7 @@ from tomlkit.items import Table
 
 from shipid import document as documents
 from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
-from shipid.data.held import nothing_varies
+from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
 from shipid.hybrid.physics import assumed, check_columns
@@ -32,7 +32,7 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
-from shipid.study.survey import Survey, separation, survey, typical_runs
+from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
 from shipid.units import GRAVITY, RPM, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -40,24 +40,44 @@ from shipid.vessel.perturb import derivative_order
 from shipid.vessel.schema import SHARED, term_blocks
 
 INACCURATE = "inaccurate"
-LEAST_RUNS = 2  # the smallest amount of data of a new study: one run trains too, if it is long enough to be parted
-MOST_AMOUNTS, MOST_WINDOWS = 6, 20000
+LEAST_AMOUNT = 2  # the smallest amount of data of a new study: one run trains too, if it is long enough to be parted
+MOST_AMOUNTS, MOST_STUDY_WINDOWS = 6, 20000
 # Ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead.
 LENGTHS_AHEAD = 2.5
-WIND, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
+WIND_SPEED, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEP_PARTS = (1, 2, 4, 8)  # of the step: a small craft is stiff in yaw
-STEPS, LOGGED_STEPS, LONGEST_STEP = 15, 30, 2.0  # steps ahead at least, of constant and of recorded orders; s
-SCATTER = 0.01  # of the way: between a towing carriage, 1e-4, and GPS of some metres, 0.09 (`test_recorded_sets`)
-GROWING = 2**0.75  # times as far apart after twice the time: jitter 1, scatter that adds up sqrt(2), a wrong speed 2
-FEW_RUNS, FOLDS = 6, 3
-MANOEUVRES, TESTS, INSTANTS = 60, 10, 50  # of a simulated study
-PAST, LAGS, LEAST_PAST = 11.6, (0.1, 0.2, 0.4, 0.5, 1.0), 8  # sqrt(L / g): 20 s of a ship of 29 m; shares; steps
+STEPS_AHEAD, STEPS_AHEAD_OF_LOG, LONGEST_STEP = (
+    15,
+    30,
+    2.0,
+)  # steps ahead at least, of constant and of recorded orders; s
+LEAST_SCATTER = 0.01  # of the way: between a towing carriage, 1e-4, and GPS of some metres, 0.09 (`test_recorded_sets`)
+SYSTEMATIC_GROWTH = (
+    2**0.75
+)  # times as far apart after twice the time: jitter 1, scatter that adds up sqrt(2), a wrong speed 2
+RUNS_FOR_FOLDS, PROPOSED_FOLDS = 6, 3
+MANOEUVRES, TEST_MANOEUVRES, INSTANTS_A_MANOEUVRE = 60, 10, 50  # of a simulated study
+PAST_IN_WAVE_TIMES, LAGS_OF_MEMORY, LEAST_PAST_STEPS = (
+    11.6,
+    (0.1, 0.2, 0.4, 0.5, 1.0),
+    8,
+)  # sqrt(L / g): 20 s of a ship of 29 m; shares; steps
 HELM_DEG, STEPS_A_LENGTH = 35.0, 150  # the helm of a turning circle (MSC.137(76)); of the truth
-STEERING = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed: products with u or scaled by U
-HIGHER = "hull.*[order >= 3]"
-DRAG = ("C_d", *(f"R_{power}" for power in range(5)))  # coefficients of the hull whose names are no formula
-INERTIA = ("inertia.m", "inertia.I_z", "added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot")
+STEERING_DERIVATIVES = (
+    "N_ur",
+    "Y_ur",
+    "N_uv",
+    "N_r",
+    "Y_r",
+    "N_v",
+)  # linear in v, r at a speed: products with u or scaled by U
+HIGHER_ORDER_DAMPING = "hull.*[order >= 3]"
+DRAG_COEFFICIENTS = (
+    "C_d",
+    *(f"R_{power}" for power in range(5)),
+)  # coefficients of the hull whose names are no formula
+INERTIA_PATHS = ("inertia.m", "inertia.I_z", "added_mass.X_udot", "added_mass.Y_vdot", "added_mass.N_rdot")
 
 
 @dataclass(frozen=True)
@@ -115,9 +135,9 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
     longest = float(np.median(durations)) * SHARE_OF_RUN
     if length is None or speed <= 0:
         why = "a third of the median run: without particulars.L_pp and speed there is no L/U"
-        return _two_digits(longest), why
+        return _round_to_two_digits(longest), why
     wanted = LENGTHS_AHEAD * length / speed
-    chosen = _two_digits(min(wanted, longest))
+    chosen = _round_to_two_digits(min(wanted, longest))
     why = (
         f"{chosen:g} s, in which the ship runs {chosen * speed / length:.2g} ship lengths at {speed:.3g} m/s "
         f"(L/U = {length / speed:.3g} s): over about {LENGTHS_AHEAD:g} its dynamics decide, later the next orders"
@@ -128,7 +148,7 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
 
 def proposed_horizon(vessel: Vessel, dataset: Dataset) -> tuple[float, float]:
     """Horizon and step [s] that a new study of a vessel and its runs would have."""
-    horizon, step, _ = _horizon_and_step(vessel, survey(dataset))
+    horizon, step, _ = _horizon_and_step(vessel, survey_dataset(dataset))
     return horizon, step
 
 
@@ -146,57 +166,57 @@ def step_of(horizon: float, log_step: float) -> float:
     within it. Where rows are further apart than half of the horizon, the step is their distance, and two steps are the
     horizon.
     """
-    most = min(horizon / (LOGGED_STEPS if log_step else STEPS), LONGEST_STEP)
-    return max(min(_round_down(most), horizon / 2), log_step)
+    most = min(horizon / (STEPS_AHEAD_OF_LOG if log_step else STEPS_AHEAD), LONGEST_STEP)
+    return max(min(_round_number_below(most), horizon / 2), log_step)
 
 
-def ladder(total: int) -> list[int]:
+def amounts_of_data(total: int) -> list[int]:
     """Amounts of data from the least to all runs, by equal factors of at least two."""
-    factor = max(2.0, (total / LEAST_RUNS) ** (1 / (MOST_AMOUNTS - 1)))
-    amounts = [round(LEAST_RUNS * factor**power) for power in range(MOST_AMOUNTS)]
+    factor = max(2.0, (total / LEAST_AMOUNT) ** (1 / (MOST_AMOUNTS - 1)))
+    amounts = [round(LEAST_AMOUNT * factor**power) for power in range(MOST_AMOUNTS)]
     return [amount for amount in amounts if amount < 0.8 * total] + [total]
 
 
 def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: Path) -> Draft:
     """A study of all vessels on recorded runs; the first one is made inaccurate, too (method, section 5)."""
-    seen, first = survey(dataset), next(iter(vessels.values()))
+    seen, first = survey_dataset(dataset), next(iter(vessels.values()))
     ahead, step, why = _horizon_and_step(first, seen)
     usable = _runs_that_hold(dataset, ahead, step, 0.0)
-    if len(usable) <= LEAST_RUNS:
+    if len(usable) <= LEAST_AMOUNT:
         few = f"{len(usable)} {plural_word(len(usable), 'run')} of {ahead:g} s or more"
         remedy = "cut the log into its manoeuvres, [[segment]]s of the mapping (`shipid data segment` proposes them)"
-        raise DataError(f"{few}, a study needs {LEAST_RUNS + 1}, one of them for the test: {remedy}", file=data)
+        raise DataError(f"{few}, a study needs {LEAST_AMOUNT + 1}, one of them for the test: {remedy}", file=data)
     short = [run for run in seen.runs.index if run not in usable]
-    method = _method(first.length, step, float(seen.runs.loc[usable, "duration"].median()) - ahead)
+    method = _proposed_method(first.length, step, float(seen.runs.loc[usable, "duration"].median()) - ahead)
     held = _runs_that_hold(dataset, ahead, step, _past_of_method(method))
-    if len(held) > LEAST_RUNS:
+    if len(held) > LEAST_AMOUNT:
         usable = held
     else:
-        method = _method(first.length, step, 0.0)
+        method = _proposed_method(first.length, step, 0.0)
     seen = Survey(seen.runs.loc[usable], seen.step, seen.failed)
     tests = typical_runs(seen)
     others = [name for name in usable if name not in tests]
     true_path = _true_path(dataset, ahead, seen.speed)
-    interval = max(step, seen.step, _round_down(2.5 * float(seen.runs["duration"].sum()) / MOST_WINDOWS))
+    interval = max(step, seen.step, _round_number_below(2.5 * float(seen.runs["duration"].sum()) / MOST_STUDY_WINDOWS))
     why += f"; too short for it: {', '.join(short)}" if short else ""
     fixed = [
         Choice("question", f"How well can {first.name} be predicted {ahead:g} s ahead, with how many runs?"),
         Choice("description", _log_in_words(seen, dataset), "what the log holds"),
-        Choice("data.dataset", _relative(str(data), out), _inputs_in_words(vessels, dataset)),
+        Choice("data.dataset", _path_from_study(str(data), out), _inputs_in_words(vessels, dataset)),
         true_path,
         Choice("split.test", tests, _why_test(seen, tests)),
         Choice("prediction.ahead", float(f"{ahead:.9g}"), why),
         Choice("prediction.interval", interval, "s between instants of prediction"),
     ]
     every = Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s")
-    families = _families(vessels, dataset.runs)
-    least = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_RUNS]), method, Choice("family", families[:1])]
-    plan = _build([*fixed, every, *least], out, vessels)
-    amounts = ladder(len(partition(plan, dataset)[0].spans))
+    families = _families_of_vessels(vessels, dataset.runs)
+    least = [Choice("split.folds", 1), Choice("grid.N_D", [LEAST_AMOUNT]), method, Choice("family", families[:1])]
+    plan = _build_draft_plan([*fixed, every, *least], out, vessels)
+    amounts = amounts_of_data(len(partition(plan, dataset)[0].spans))
     fixed += [*_folds_and_grid(amounts), method]
-    warnings = _failed_checks(seen, data)
-    warnings += [*over_gaps(dataset, all_windows(plan, dataset)), *nothing_varies(dataset, usable)]
-    warnings += _already_seen(families, tests)
+    warnings = _warn_of_failed_checks(seen, data)
+    warnings += [*over_gaps(dataset, all_windows(plan, dataset)), *warn_of_constant_commands(dataset, usable)]
+    warnings += _warn_of_seen_tests(families, tests)
     try:
         choices, plan = _first_that_runs(fixed, every, families, out, vessels, dataset)
     except DivergenceError as error:
@@ -206,10 +226,10 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     how: dict[str, Any] = {"ahead": ahead, "step": plan.study.prediction.step, "path": true_path.value}
     looks = {name: first_look(vessel, dataset, others, **how) for name, vessel in vessels.items()}
     warnings += [look.sentence for look in looks.values() if look.wrong]
-    return Draft(_text(choices, warnings), tuple(choices), plan, tuple(warnings), looks)
+    return Draft(_study_text(choices, warnings), tuple(choices), plan, tuple(warnings), looks)
 
 
-def _already_seen(families: Sequence[Mapping[str, Any]], tests: Sequence[str]) -> Iterator[str]:
+def _warn_of_seen_tests(families: Sequence[Mapping[str, Any]], tests: Sequence[str]) -> Iterator[str]:
     """A warning for each family as it is whose vessel was identified from test runs."""
     for family in families:
         runs = [run for run in family.get("seen", []) if run in tests]
@@ -218,7 +238,7 @@ def _already_seen(families: Sequence[Mapping[str, Any]], tests: Sequence[str]) -
             yield f"{words}: choose other test runs, or let the study identify ([family.identify])"
 
 
-def _failed_checks(seen: Survey, data: Path) -> list[str]:
+def _warn_of_failed_checks(seen: Survey, data: Path) -> list[str]:
     """One warning that counts the failed checks of a log and shows the first; none where all passed."""
     if seen.failed.empty:
         return []
@@ -253,10 +273,10 @@ def _first_that_runs(
             *fixed,
             Choice(step.path, step.value / parts, step.why + shorter),
             Choice("prediction.integrator", "rk4", "euler, the paper's, takes a quarter of the time; steps show then"),
-            *_claims([family["name"] for family in chosen]),
+            *_claims_of_families([family["name"] for family in chosen]),
             Choice("family", chosen, "models, each improved by data; `none` is no physics, beside constant u, v, r"),
         ]
-        plan = _build(choices, out, vessels)
+        plan = _build_draft_plan(choices, out, vessels)
         try:
             _check_that_runs(plan, obtain(plan) if dataset is None else dataset)
         except DivergenceError as error:
@@ -275,8 +295,8 @@ def _check_that_runs(plan: Plan, dataset: Dataset) -> None:
             prepared.folds(batch, windows, way.method.validation)
 
 
-def _build(choices: Sequence[Choice], out: Path, vessels: Mapping[str, Vessel]) -> Plan:
-    return build_plan(tomllib.loads(_text(choices)), out, vessels)
+def _build_draft_plan(choices: Sequence[Choice], out: Path, vessels: Mapping[str, Vessel]) -> Plan:
+    return build_plan(tomllib.loads(_study_text(choices)), out, vessels)
 
 
 def _log_in_words(seen: Survey, dataset: Dataset) -> str:
@@ -300,10 +320,10 @@ def _inputs_in_words(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
 
 def _true_path(dataset: Dataset, ahead: float, speed: float) -> Choice:
     """The true path: positions, unless they scatter where the integral of the velocities does not."""
-    half, whole = (separation(dataset, lag) for lag in (ahead / 2, ahead))
+    half, whole = (separation_of_sources(dataset, lag) for lag in (ahead / 2, ahead))
     apart = f"positions and the integral of u, v, psi part by {half:.2g} m in {ahead / 2:g} s"
     apart += f", {whole:.2g} m in {ahead:g} s"
-    if whole < GROWING * half and whole > SCATTER * speed * ahead:
+    if whole < SYSTEMATIC_GROWTH * half and whole > LEAST_SCATTER * speed * ahead:
         return Choice("data.path", "velocity", f"{apart} (RMS): it grows as positions that scatter do")
     return Choice("data.path", "position", f"{apart} (RMS): positions do not scatter")
 
@@ -317,15 +337,15 @@ def _why_test(seen: Survey, tests: Sequence[str]) -> str:
 
 def _folds_and_grid(amounts: list[int]) -> Iterator[Choice]:
     total = amounts[-1]
-    if total < FEW_RUNS:
+    if total < RUNS_FOR_FOLDS:
         yield Choice("split.folds", 1, f"{total} runs train: each validates in turn")
     else:
-        yield Choice("split.folds", FOLDS, f"{total} runs: two thirds train, one third validates, in turn")
+        yield Choice("split.folds", PROPOSED_FOLDS, f"{total} runs: two thirds train, one third validates, in turn")
     yield Choice("grid.N_D", amounts, "runs for training and validation: from the fewest to all, the learning curve")
     yield Choice("grid.seeds", [0, 1, 2], "three draws of which runs come first: with fewer there is no range")
 
 
-def _claims(families: Sequence[str]) -> Iterator[Choice]:
+def _claims_of_families(families: Sequence[str]) -> Iterator[Choice]:
     """Which family each finding speaks of; none where there is nothing to compare."""
     if INACCURATE in families:
         yield Choice("claims.accurate", families[0], "asks for verdicts on the findings R1-R4 of experiment 2")
@@ -336,7 +356,7 @@ def _claims(families: Sequence[str]) -> Iterator[Choice]:
         yield Choice("claims.nominal", "nominal")
 
 
-def _families(vessels: Mapping[str, Vessel], runs: Sequence[str]) -> list[dict[str, Any]]:
+def _families_of_vessels(vessels: Mapping[str, Vessel], runs: Sequence[str]) -> list[dict[str, Any]]:
     """Every vessel as it is, with the runs that it was identified from; the first made inaccurate, too."""
     families: list[dict[str, Any]] = []
     for named, vessel in vessels.items():
@@ -364,12 +384,12 @@ def _family_name(key: str, taken: Sequence[str]) -> str:
 def _inaccurate_blocks(vessel: Vessel) -> list[dict[str, Any]]:
     """Higher-order damping removed, steering derivatives times 0.6 (method, section 5), as far as there are any."""
     hull = [path for path in vessel.parameters if path.startswith("hull.")]
-    steering = [path for path in hull if path.rpartition(".")[2] in STEERING]
+    steering = [path for path in hull if path.rpartition(".")[2] in STEERING_DERIVATIVES]
     blocks: list[dict[str, Any]] = []
     if any((derivative_order(path) or 0) >= 3 for path in hull):
-        blocks.append({"remove": [HIGHER]})
+        blocks.append({"remove": [HIGHER_ORDER_DAMPING]})
     if steering or (hull and not blocks):
-        blocks.append({"parameters": steering or _coefficients(hull), "factor": 0.6})
+        blocks.append({"parameters": steering or _hull_coefficients(hull), "factor": 0.6})
     return blocks
 
 
@@ -393,80 +413,88 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     horizon, why = horizon_of(length, 0.75 * service, [np.inf])
     step = step_of(horizon, 0.0)
     ahead = round(horizon / step) * step
-    amounts = ladder(MANOEUVRES - TESTS)
-    method = _method(length, step, np.inf)
+    amounts = amounts_of_data(MANOEUVRES - TEST_MANOEUVRES)
+    method = _proposed_method(length, step, np.inf)
     fixed = [
         Choice(
             "question",
             f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict {ahead:g} s?",
         ),
         Choice("description", f"simulated: {vessel.name} as it is makes the truth, and degraded models predict it"),
-        *_truth(named, controls, service, rpm, ahead, step, _past_of_method(method)),
-        Choice("split.test", TESTS, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
+        *_truth_choices(named, controls, service, rpm, ahead, step, _past_of_method(method)),
+        Choice("split.test", TEST_MANOEUVRES, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
         Choice("prediction.ahead", float(f"{ahead:.9g}"), why),
         Choice("prediction.interval", step, "s between instants of prediction"),
-        Choice("prediction.samples", INSTANTS, "instants a manoeuvre"),
+        Choice("prediction.samples", INSTANTS_A_MANOEUVRE, "instants a manoeuvre"),
         Choice("grid.N_D", amounts, f"from the fewest to all {amounts[-1]} that are not for the test"),
         Choice("grid.seeds", [0], "take [0, 1, 2, 3, 4] for verdicts: findings about scatter need five"),
         method,
     ]
     first = Choice("prediction.step", step, "s; the truth is stepped more finely")
     choices, plan = _first_that_runs(fixed, first, _degraded_families(named, vessel), out, vessels)
-    return Draft(_text(choices), tuple(choices), plan)
+    return Draft(_study_text(choices), tuple(choices), plan)
 
 
-def _method(length: float | None, step: float, spare: float) -> Choice:
+def _proposed_method(length: float | None, step: float, spare: float) -> Choice:
     """Compensation of the path with a memory, which validation may refuse; without one where runs are too short.
 
     spare : time [s] of the median run beyond the horizon; a third of it may be past.
     """
     plain = [{"name": "drawn", "kind": "path-drawn"}]
-    past = PAST * float(np.sqrt((length or 0.0) / GRAVITY))
-    if not length or past < LEAST_PAST * step:
+    past = PAST_IN_WAVE_TIMES * float(np.sqrt((length or 0.0) / GRAVITY))
+    if not length or past < LEAST_PAST_STEPS * step:
         return Choice("method", plain, "no memory: the step is too long for the past of a ship of this length")
     if past > spare / 3:
         why = f"a third of what the median run holds beyond the horizon is {spare / 3:.3g} s"
         return Choice("method", plain, f"no memory: of {past:.3g} s, {why}")
-    lags = [float(f"{lag:.6g}") for lag in sorted({step * max(round(share * past / step), 1) for share in LAGS})]
+    lags = [
+        float(f"{lag:.6g}") for lag in sorted({step * max(round(share * past / step), 1) for share in LAGS_OF_MEMORY})
+    ]
     memory = {"history": lags[:-2], "turned": lags[-2:], "error": [lags[-3]]}
     why = (
-        f"inputs of the last {lags[-1]:g} s ({PAST:g} sqrt(L / g)): what ship and orders did, and what the physics "
+        f"inputs of the last {lags[-1]:g} s ({PAST_IN_WAVE_TIMES:g} sqrt(L / g)): what ship and orders did, and what the physics "
         "got wrong; validation chooses how much of it is taken. The first instants of a run have no past: left out"
     )
     return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
 
 
 def _past_of_method(method: Choice) -> float:
-    """Longest past [s] that a method of `_method` reads; 0 without a memory."""
+    """Longest past [s] that a method of `_proposed_method` reads; 0 without a memory."""
     return float(max(method.value[0].get("memory", {}).get("turned", [0.0])))
 
 
-def _truth(
+def _truth_choices(
     named: str, controls: Controls, service: float, rpm: float, ahead: float, step: float, past: float
 ) -> Iterator[Choice]:
     """The manoeuvres that the vessel performs as the truth, and their weather."""
     vessel = controls.vessel
     length = vessel.length or 0.0
-    fine = min(_round_down(length / service / STEPS_A_LENGTH), step / 10)
+    fine = min(_round_number_below(length / service / STEPS_A_LENGTH), step / 10)
     waves = any(key.startswith("waves.") for _, key, _ in term_blocks(vessel.document))
     calm = "in calm water: a table [truth.waves] with H_s and T_p draws a sea for the [waves] of the vessel"
     yield Choice("truth.vessel", named, calm if waves else "")
-    yield Choice("truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TESTS} for training, {TESTS} for the test")
+    yield Choice(
+        "truth.manoeuvres", MANOEUVRES, f"{MANOEUVRES - TEST_MANOEUVRES} for training, {TEST_MANOEUVRES} for the test"
+    )
     if past:
         yield Choice("truth.run_up", past, "s before the first instant of prediction: the past of the memory")
-    yield Choice("truth.duration", float(f"{ahead + INSTANTS * step:.6g}"), f"s: {INSTANTS} instants and the horizon")
+    yield Choice(
+        "truth.duration",
+        float(f"{ahead + INSTANTS_A_MANOEUVRE * step:.6g}"),
+        f"s: {INSTANTS_A_MANOEUVRE} instants and the horizon",
+    )
     yield Choice("truth.step", fine, f"s: the ship takes {length / service:.3g} s for its length")
     yield Choice("truth.interval", step, "s between logged rows")
     if "V_w" in vessel_dynamics(vessel).environment:
-        yield wind_for(length)
+        yield wind_for_length(length)
     yield _turning_orders(controls, service, rpm)
 
 
-def wind_for(length: float) -> Choice:
+def wind_for_length(length: float) -> Choice:
     """Wind for a ship of a length [m]: WIND; below WIND_LENGTH times sqrt(L / WIND_LENGTH), by Froude's rule."""
-    speed = float(f"{WIND * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
-    why = f"m/s, from anywhere: at most {WIND:g} m/s, on a ship below {WIND_LENGTH:g} m less by Froude's rule"
+    speed = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
+    why = f"m/s, from anywhere: at most {WIND_SPEED:g} m/s, on a ship below {WIND_LENGTH:g} m less by Froude's rule"
     return Choice("truth.wind_speed", [0.0, speed], why)
 
 
@@ -504,9 +532,11 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
 def _degraded_families(named: str, vessel: Vessel) -> list[dict[str, Any]]:
     """Nominal, moderate and high: the families of experiment 1 (method, section 4), as far as the vessel has them."""
     hull = [path for path in vessel.parameters if path.startswith("hull.")]
-    drag = [path for path in hull if path.rpartition(".")[2] in DRAG]
-    damping = ["hull.*[order >= 1]", *drag] if any(derivative_order(path) for path in hull) else _coefficients(hull)
-    heavy = [path for path in INERTIA if path in vessel.parameters]
+    drag = [path for path in hull if path.rpartition(".")[2] in DRAG_COEFFICIENTS]
+    damping = (
+        ["hull.*[order >= 1]", *drag] if any(derivative_order(path) for path in hull) else _hull_coefficients(hull)
+    )
+    heavy = [path for path in INERTIA_PATHS if path in vessel.parameters]
     if not damping:
         raise ShipidError("has no [hull] numbers to degrade: declare families by hand", file=vessel.file)
     return [
@@ -534,12 +564,12 @@ def _degraded_families(named: str, vessel: Vessel) -> list[dict[str, Any]]:
     ]
 
 
-def _coefficients(paths: Sequence[str]) -> list[str]:
+def _hull_coefficients(paths: Sequence[str]) -> list[str]:
     """Paths of coefficients, without those of geometry and of the water."""
     return [path for path in paths if path.rpartition(".")[2] not in ("x_aft", "x_fwd", *SHARED)]
 
 
-def _text(choices: Sequence[Choice], warnings: Sequence[str] = ()) -> str:
+def _study_text(choices: Sequence[Choice], warnings: Sequence[str] = ()) -> str:
     """The study as TOML, each reason above its value."""
     document, tables = tomlkit.document(), dict[str, Table]()
     head = "Written by `shipid study new`. Above each value is its reason. Change what you know better."
@@ -562,19 +592,19 @@ def _text(choices: Sequence[Choice], warnings: Sequence[str] = ()) -> str:
 
 def _vessel_key(name: str, out: Path) -> str:
     """A vessel as the study names it: a bundled name as it is, a path from the study's folder."""
-    return _relative(name, out) if "/" in name or "\\" in name or name.endswith(".toml") else name
+    return _path_from_study(name, out) if "/" in name or "\\" in name or name.endswith(".toml") else name
 
 
-def _relative(name: str, out: Path) -> str:
+def _path_from_study(name: str, out: Path) -> str:
     path = Path(os.path.relpath(name, out.parent)).as_posix()
     return path if "/" in path or path.endswith((".toml", ".parquet")) else f"./{path}"
 
 
-def _two_digits(value: float) -> float:
+def _round_to_two_digits(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def _round_down(value: float) -> float:
+def _round_number_below(value: float) -> float:
     """Greatest of 1, 2, 5 and their tens, up to a value."""
     decade = 10.0 ** np.floor(np.log10(value))
     return float(f"{max(step * decade for step in (1, 2, 5) if step * decade <= value * (1 + 1e-9)):.6g}")

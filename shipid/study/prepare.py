@@ -14,21 +14,21 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
-from shipid.data.checks import copies, repeated
-from shipid.data.dataset import Dataset, clock_slack, kept_rows, outside_spans, pieces, read_dataset
-from shipid.data.held import nothing_varies
+from shipid.data.checks import copies_of_earlier_runs, copies_of_other_runs
+from shipid.data.dataset import Dataset, clock_slack, keep_rows, read_dataset, rows_outside_spans, stretches_of_runs
+from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import (
     Instants,
     PathSource,
     Windows,
     coarse_in_words,
     cut_windows,
-    gaps,
-    longest_gap,
+    gaps_of_runs,
+    longest_gap_in_words,
     nested_runs,
     part_folds,
-    reach_over,
     run_folds,
+    windows_over_spans,
 )
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
@@ -42,7 +42,7 @@ from shipid.observer import Estimates, Observer, at_windows, observe, tune_obser
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
-from shipid.study.kinds import kinds_of
+from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Batch, Plan, beside, mapping_of, past_steps
 from shipid.study.ranges import check_memory, window_numbers
 from shipid.study.schema import Study
@@ -67,7 +67,7 @@ class Prepared:
     estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
         depend on the batch.
     notes : what was assumed, redrawn or left out, in sentences.
-    kinds : run -> kind of manoeuvre, see `kinds_of`.
+    kinds : run -> kind of manoeuvre, see `kinds_of_runs`.
     """
 
     study: Study
@@ -149,7 +149,11 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
         is_test = np.isin(windows.run, _test_runs(plan.study, windows))
         test, rest = windows.select(is_test), windows.select(~is_test)
         coarse = coarse_in_words(dataset, windows.step)
-        notes = [*([coarse] if coarse else []), *nothing_varies(dataset, windows.spans), *over_gaps(dataset, windows)]
+        notes = [
+            *([coarse] if coarse else []),
+            *warn_of_constant_commands(dataset, windows.spans),
+            *over_gaps(dataset, windows),
+        ]
         if windows.shared_clock:
             touching = rest.touching(test.spans.values())
             if touching.any():
@@ -176,11 +180,11 @@ def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:
 
 def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
     """A sentence on windows that reach over times without rows, longer than a step; none where there are none."""
-    spans = gaps(dataset, windows.step)
-    over = reach_over(windows, spans)
+    spans = gaps_of_runs(dataset, windows.step)
+    over = windows_over_spans(windows, spans)
     if not over.any():
         return []
-    longest = longest_gap({run: spans[run] for run in np.unique(windows.run[over]).tolist()})
+    longest = longest_gap_in_words({run: spans[run] for run in np.unique(windows.run[over]).tolist()})
     return [
         f"{int(over.sum())} of {len(windows)} windows hold a time without rows, {longest}: path and motion are only "
         "interpolated there; set max_gap in [clock] of the mapping and import again"
@@ -198,7 +202,7 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
         path=path_source(study),
         past=past,
     )
-    lengths = [float(np.ptp(rows["t"])) for _, rows in pieces(dataset)]
+    lengths = [float(np.ptp(rows["t"])) for _, rows in stretches_of_runs(dataset)]
     words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval"
     columns = len(dataset.frame.columns)
     numbers = sum(window_numbers(prediction, past, columns, len(plan.foundations), length) for length in lengths)
@@ -227,7 +231,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
     ]
     notes += _copied(dataset, rest, test)
-    longest = max(float(np.ptp(rows["t"])) for _, rows in pieces(dataset))
+    longest = max(float(np.ptp(rows["t"])) for _, rows in stretches_of_runs(dataset))
     for foundation in plan.foundations:
         if foundation.identify is not None and foundation.identify.horizon / 2 > longest:
             message = f"{foundation.identify.horizon:g} s: no run is even half as long, the longest has {longest:g} s"
@@ -248,7 +252,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
         estimates=estimates,
-        kinds=kinds_of(dataset, test=test.spans),
+        kinds=kinds_of_runs(dataset, test=test.spans),
     )
 
 
@@ -266,11 +270,11 @@ def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
     """Sentences on runs that move as others: test runs as runs that train, and each among themselves."""
     pairs = {
         "test runs that move as runs that train do ({}): their errors say nothing of new runs: "
-        "leave out copies": copies(dataset, test.spans, rest.spans),
+        "leave out copies": copies_of_other_runs(dataset, test.spans, rest.spans),
         "test runs that move as other test runs do ({}): each counts as a manoeuvre of its own, so intervals are "
-        "too narrow: leave out copies": repeated(dataset, test.spans),
+        "too narrow: leave out copies": copies_of_earlier_runs(dataset, test.spans),
         "runs that train and move as others that train do ({}): N_D counts each, and validation and bands judge by "
-        "runs whose copies trained: leave out copies": repeated(dataset, rest.spans),
+        "runs whose copies trained: leave out copies": copies_of_earlier_runs(dataset, rest.spans),
     }
     return [
         words.format(", ".join(f"{run!r} as {other!r}" for run, other in same.items()))
@@ -402,12 +406,12 @@ def estimates_of(study: Study, foundation: Foundation, dataset: Dataset, test: W
 
 def outside_of(dataset: Dataset, test: Windows) -> NDArray[np.bool_]:
     """Rows (N,) that share no moment with the test windows; all, where every run has its clock."""
-    return outside_spans(dataset, test.spans.values() if test.shared_clock else ())
+    return rows_outside_spans(dataset, test.spans.values() if test.shared_clock else ())
 
 
 def apart(dataset: Dataset, test: Windows) -> Dataset:
     """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
-    return kept_rows(dataset, outside_of(dataset, test))
+    return keep_rows(dataset, outside_of(dataset, test))
 
 
 def chosen_observer(study: Study, foundation: Foundation, dataset: Dataset, windows: Windows) -> Observer:
@@ -516,7 +520,7 @@ def not_measured(vessel: Vessel, windows: Windows) -> list[str]:
 def window_memory(vessel: Vessel, dataset: Dataset, windows: Windows) -> dict[str, Array] | None:
     """Hidden actuator states (S,) at the start of each window, modelled from the earlier orders; None if none."""
     tracks: dict[str, list[tuple[Array, dict[str, Array]]]] = {}
-    for run, rows in pieces(dataset):
+    for run, rows in stretches_of_runs(dataset):
         states = states_along(vessel, dataset.commands, rows)
         if states is None:
             return None

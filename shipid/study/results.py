@@ -22,7 +22,7 @@ from shipid.metrics import error_by_axis, error_of_windows, position_error
 from shipid.predictor import checked_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
-from shipid.study.kinds import kinds_of
+from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Plan, families_aside, families_set_from, judged_method, model_label
 
 STRIDE = 20  # cells read between words on how far it is
@@ -100,7 +100,7 @@ class Results:
     @cached_property
     def kinds(self) -> dict[str, str]:
         """Test run -> kind of manoeuvre; the usual speeds come from the other runs."""
-        return kinds_of(self.dataset, self.test.spans, test=self.test.spans)
+        return kinds_of_runs(self.dataset, self.test.spans, test=self.test.spans)
 
     @property
     def aside(self) -> set[str]:

@@ -49,15 +49,15 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import UNUSUAL, find_contradictions
 
 Array = NDArray[np.float64]
-Report = Callable[[str], object]
-FOLDS = 3
-SIDES = ("starboard", "port")
-SHOWN = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
+SayStep = Callable[[str], object]
+STRUCTURE_FOLDS = 3
+SIDES_OF_TRIALS = ("starboard", "port")
+MEASURES_SHOWN = {"zigzag": ("overshoot 1", "overshoot 2"), "turning": ("advance", "tactical diameter")}
 """Kind of a standard manoeuvre -> measures shown, few of `COMPARED` of `identify`: each has a row a structure."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedStructure:
     """A structure fitted to all runs: vessel, solution and its statistics; `caution` where its intervals mislead."""
 
     vessel: Vessel
@@ -67,7 +67,7 @@ class Fitted:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class StructureComparison:
     """Result of a comparison of structures.
 
     vessel : the base. runs, test : of the folds, and held out of all. shared : warnings of runs that share moments with
@@ -96,7 +96,7 @@ class Compared:
     errors: pd.DataFrame
     table: pd.DataFrame
     chosen: str
-    fits: Mapping[str, Fitted]
+    fits: Mapping[str, FittedStructure]
     manoeuvres: pd.DataFrame
     spread: pd.DataFrame
     beyond: tuple[str, ...]
@@ -109,7 +109,7 @@ class Compared:
         rows = {str(row["structure"]): row for row in self.table.to_dict("records")}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
         notes = [
-            f"structure {self.chosen} has the least error of the position over {_length(self.ahead)} on runs that the "
+            f"structure {self.chosen} has the least error of the position over {_length_in_words(self.ahead)} on runs that the "
             f"fit has not seen: {rows[self.chosen]['position']:.3g} m"
         ]
         if len(self.runs) < FEWEST_RUNS:
@@ -147,11 +147,11 @@ class Compared:
         return tomlkit.dumps(documents.plain_values(document))
 
 
-def _length(ahead: float) -> str:
+def _length_in_words(ahead: float) -> str:
     return f"{ahead:g} s" if ahead else "whole runs"
 
 
-def write_chosen(compared: Compared, file: Path) -> Path:
+def write_chosen_structure(compared: StructureComparison, file: Path) -> Path:
     """Write the vessel with the chosen structure; it is read again to be sure. An existing file is kept."""
     written = write_new(compared.document(), file, "vessel")
     load_vessel(str(written.resolve()))
@@ -167,10 +167,10 @@ def compare_structures(
     held_out: Sequence[str] = (),
     *,
     ahead: float | None = None,
-    folds: int = FOLDS,
+    folds: int = STRUCTURE_FOLDS,
     level: float | None = LEVEL,
-    say: Report | None = None,
-) -> Compared:
+    say: SayStep | None = None,
+) -> StructureComparison:
     """Compare structures of the hull on the same runs.
 
     Parameters
@@ -189,16 +189,20 @@ def compare_structures(
     """
     check_level(level)
     digest = dataset.digest
-    dataset, fitted, tested, shared = comparable(dataset, settings, names, runs, held_out, ahead=ahead, folds=folds)
+    dataset, fitted, tested, shared = check_comparison(
+        dataset, settings, names, runs, held_out, ahead=ahead, folds=folds
+    )
     length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
     check_length(settings, length)
     report = say or (lambda _: None)
     parts = [fitted[number :: min(folds, len(fitted))] for number in range(min(folds, len(fitted)))]
-    errors, fits, notes, series = list[pd.DataFrame](), dict[str, Fitted](), dict[str, str](), dict[str, Any]()
+    errors, fits, notes, series = list[pd.DataFrame](), dict[str, FittedStructure](), dict[str, str](), dict[str, Any]()
     counts: dict[str, int] = {}
     for name in names:
         try:
-            frames, whole, seen = _judged(vessel, name, dataset, settings, parts, fitted, tested, length, report)
+            frames, whole, seen = _errors_and_fit(
+                vessel, name, dataset, settings, parts, fitted, tested, length, report
+            )
         except ShipidError as error:
             if isinstance(error, DataError):
                 raise
@@ -209,7 +213,7 @@ def compare_structures(
     if not fits:
         raise ShipidError("; ".join(f"{name}: {note}" for name, note in notes.items()))
     every = pd.concat(errors, ignore_index=True)
-    table = _table(names, every, counts, notes, fitted)
+    table = _structure_table(names, every, counts, notes, fitted)
     if not np.isfinite(table["position"].iloc[0]):
         raise ShipidError(
             "no structure predicts every run that was held out: give priors, more runs, or a shorter --ahead"
@@ -218,9 +222,9 @@ def compare_structures(
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]
     report("standard manoeuvres")
     reach = reach_of(vessel, dataset, fitted)
-    manoeuvres, far = _manoeuvres(fits, chosen, reach, equal, level)
+    manoeuvres, far = _manoeuvre_table(fits, chosen, reach, equal, level)
     groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
-    return Compared(
+    return StructureComparison(
         vessel=vessel,
         runs=fitted,
         test=tested,
@@ -233,14 +237,14 @@ def compare_structures(
         chosen=chosen,
         fits=fits,
         manoeuvres=manoeuvres,
-        spread=_spread(manoeuvres, equal),
+        spread=_spread_of_measures(manoeuvres, equal),
         beyond=far,
         groups=groups,
         uneven=uneven(groups),
     )
 
 
-def comparable(
+def check_comparison(
     dataset: Dataset,
     settings: Identify,
     names: Sequence[str],
@@ -248,7 +252,7 @@ def comparable(
     held_out: Sequence[str] = (),
     *,
     ahead: float | None = None,
-    folds: int = FOLDS,
+    folds: int = STRUCTURE_FOLDS,
 ) -> tuple[Dataset, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """The dataset whose runs to fit see nothing of those held out, the runs to fit, those held out, and warnings.
 
@@ -262,7 +266,7 @@ def comparable(
     dataset, fitted, shared = without_shared(dataset, fitted, tested)
     if folds < 2:
         raise ShipidError(f"{folds}: give two folds or more", path="folds")
-    if folds > max(len(fitted), FOLDS):
+    if folds > max(len(fitted), STRUCTURE_FOLDS):
         raise ShipidError(
             f"{folds} folds of {len(fitted)} runs: give as many as there are runs, or fewer", path="folds"
         )
@@ -273,7 +277,7 @@ def comparable(
     return dataset, fitted, tested, shared
 
 
-def _judged(
+def _errors_and_fit(
     vessel: Vessel,
     name: str,
     dataset: Dataset,
@@ -282,8 +286,8 @@ def _judged(
     fitted: Sequence[str],
     tested: Sequence[str],
     ahead: float,
-    report: Report,
-) -> tuple[list[pd.DataFrame], Fitted, pd.DataFrame]:
+    report: SayStep,
+) -> tuple[list[pd.DataFrame], FittedStructure, pd.DataFrame]:
     """Errors of runs by fits that have not seen them, the fit to all runs, and the free runs of the folds."""
 
     def fit(runs: Sequence[str], others: Sequence[str]) -> tuple[Vessel, Solution]:
@@ -309,7 +313,7 @@ def _judged(
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
     judged = statistics(LinearFit.of(solution))
     caution = refusal(solution, judged, residual_spacing(solution))
-    return errors, Fitted(whole, solution, judged, caution), pd.concat(series, ignore_index=True)
+    return errors, FittedStructure(whole, solution, judged, caution), pd.concat(series, ignore_index=True)
 
 
 def _with_mean(errors: pd.DataFrame) -> pd.DataFrame:
@@ -319,7 +323,7 @@ def _with_mean(errors: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([pd.DataFrame([{"run": ALL, **mean}]), known.drop(columns=["model", "samples"])])
 
 
-def _table(
+def _structure_table(
     names: Sequence[str],
     errors: pd.DataFrame,
     counts: Mapping[str, int],
@@ -364,7 +368,7 @@ def _table(
     return pd.DataFrame(rows)
 
 
-def with_gear(vessel: Vessel) -> Vessel:
+def with_actuators_on(vessel: Vessel) -> Vessel:
     """The vessel with every actuator that its document holds: one that is off for a log of measured angles, too."""
     off = {
         f"thruster.{name}.actuator.{command}.off": False
@@ -375,17 +379,19 @@ def with_gear(vessel: Vessel) -> Vessel:
     return vessel.with_values(off) if off else vessel
 
 
-TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES]
-TITLES = [f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}" for kind, angles, side in TRIALS]
+STANDARD_TRIALS = [(kind, angles, side) for kind, angles in TRIED for side in SIDES_OF_TRIALS]
+TRIAL_TITLES = [
+    f"{kind} {'/'.join(f'{angle:g}' for angle in angles)} to {side}" for kind, angles, side in STANDARD_TRIALS
+]
 
 
-def _measured(vessel: Vessel) -> dict[str, MeasuredManoeuvre]:
+def _perform_trials(vessel: Vessel) -> dict[str, MeasuredManoeuvre]:
     """Title -> every standard manoeuvre that the vessel can perform."""
-    ship, done = with_gear(vessel), dict[str, MeasuredManoeuvre]()
+    ship, done = with_actuators_on(vessel), dict[str, MeasuredManoeuvre]()
     try:
-        return dict(zip(TITLES, measure_all(ship, TRIALS, engine="repeated"), strict=True))
+        return dict(zip(TRIAL_TITLES, measure_all(ship, STANDARD_TRIALS, engine="repeated"), strict=True))
     except ShipidError as error:  # one of them: the others may be performed
-        for trial, title in zip(TRIALS, TITLES, strict=True):
+        for trial, title in zip(STANDARD_TRIALS, TRIAL_TITLES, strict=True):
             with suppress(ShipidError):
                 done[title] = measure_all(ship, [trial], engine="repeated")[0]
         if not done:
@@ -393,14 +399,14 @@ def _measured(vessel: Vessel) -> dict[str, MeasuredManoeuvre]:
         return done
 
 
-def _manoeuvres(
-    fits: Mapping[str, Fitted], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
+def _manoeuvre_table(
+    fits: Mapping[str, FittedStructure], chosen: str, reach: Reach, equal: Sequence[str], level: float | None
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
     """Measures of standard manoeuvres, with intervals for the equally good, and what the chosen one extrapolates."""
     rows, far = list[dict[str, Any]](), list[str]()
     for name, fit in fits.items():
         try:
-            done = _measured(fit.vessel)
+            done = _perform_trials(fit.vessel)
         except ShipidError as error:
             rows.append({"manoeuvre": "all", "measure": "", "structure": name, "note": error.message})
             continue
@@ -411,39 +417,39 @@ def _manoeuvres(
             frames: list[Any] = [
                 {"manoeuvre": title, "measure": measure, "value": value}
                 for title, one in done.items()
-                for measure, value in _values(one).items()
+                for measure, value in _compared_values(one).items()
             ]
         else:
             known = {fit.vessel.digest: done}
-            measures = [(title, _measure(title, known)) for title in done]
+            measures = [(title, _measures_of_trial(title, known)) for title in done]
             frames = bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level).to_dict("records")
         missing = {"measure": "", "structure": name, "note": "diverges"}
-        rows += [{"manoeuvre": title, **missing} for title in TITLES if title not in done]
+        rows += [{"manoeuvre": title, **missing} for title in TRIAL_TITLES if title not in done]
         rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]
     columns = ["manoeuvre", "measure", "unit", "structure", "value", "low", "high", "note"]
     return pd.DataFrame(rows, columns=columns), tuple(filter(None, far))
 
 
-def _values(one: MeasuredManoeuvre) -> dict[str, float]:
+def _compared_values(one: MeasuredManoeuvre) -> dict[str, float]:
     """The measures that are compared."""
     measures = {row["measure"]: float(row["value"]) for row in one.measures}
-    return {name: measures[name] for name in SHOWN[one.standard.kind] if name in measures}
+    return {name: measures[name] for name in MEASURES_SHOWN[one.standard.kind] if name in measures}
 
 
-def _measure(title: str, known: dict[str, dict[str, MeasuredManoeuvre]]) -> Measure:
+def _measures_of_trial(title: str, known: dict[str, dict[str, MeasuredManoeuvre]]) -> Measure:
     """Measures of one manoeuvre; `known` holds all manoeuvres of vessels by digest, which come from one approach."""
 
     def measure(one: Vessel) -> dict[str, float]:
         if one.digest not in known:
-            known[one.digest] = _measured(one)
+            known[one.digest] = _perform_trials(one)
         if title not in known[one.digest]:
             raise ShipidError("diverges within the interval of the numbers")
-        return _values(known[one.digest][title])
+        return _compared_values(known[one.digest][title])
 
     return measure
 
 
-def _spread(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
+def _spread_of_measures(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
     """Range of every measure over the structures that are equally good, and the greatest interval within one."""
     good = manoeuvres[manoeuvres["structure"].isin(equal) & (manoeuvres["measure"] != "")]
     good = good.assign(width=(good["high"] - good["low"]).astype(float), value=good["value"].astype(float))
@@ -454,7 +460,7 @@ def _spread(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:
     return spread
 
 
-def structures_content(compared: Compared, dataset: str | Path, command: str = "") -> StructuresContent:
+def structures_content(compared: StructureComparison, dataset: str | Path, command: str = "") -> StructuresContent:
     """Assemble the page; `command` is the command line that reproduces it."""
     return StructuresContent(
         title=f"{compared.vessel.name}: structures of the hull",

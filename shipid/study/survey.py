@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from shipid.data.checks import check_dataset, way
-from shipid.data.dataset import Dataset, pieces, pieces_by_run
+from shipid.data.checks import check_dataset, travelled_path
+from shipid.data.dataset import Dataset, stretches_by_run, stretches_of_runs
 from shipid.physics.signals import is_steering
-from shipid.study.kinds import kinds_of, longest
+from shipid.study.kinds import kinds_of_runs, longest_piece
 
-OF_A_KIND = 3  # runs of a kind from which one may be set aside: two are left that train
+LEAST_OF_A_KIND = 3  # runs of a kind from which one may be set aside: two are left that train
 
 
 @dataclass(frozen=True)
 class Survey:
     """Measures of the runs of a dataset, from which `study new` makes its choices.
 
-    runs : a row per run, by name: `duration` [s] of its longest unbroken piece, `kind` (see `kinds_of`), `speed`
+    runs : a row per run, by name: `duration` [s] of its longest unbroken piece, `kind` (see `kinds_of_runs`), `speed`
         [m/s], `rate` [rad/s] (RMS of r), `helm` [rad] (spread of the angles), `whole` (unbroken).
     step : usual time between rows [s].
     failed : rows of `check_dataset` that are not ok.
@@ -35,13 +35,13 @@ class Survey:
         return float(self.runs["speed"].median())
 
 
-def survey(dataset: Dataset) -> Survey:
+def survey_dataset(dataset: Dataset) -> Survey:
     """Look at every run of a dataset: how long, how fast, what manoeuvre, in which order."""
-    by_run, kinds, checks = pieces_by_run(dataset), kinds_of(dataset), check_dataset(dataset)
+    by_run, kinds, checks = stretches_by_run(dataset), kinds_of_runs(dataset), check_dataset(dataset)
     angles = [name for name in dataset.commands if is_steering(name)]
     runs = {}
     for run, parts in by_run.items():
-        rows = longest(parts)
+        rows = longest_piece(parts)
         runs[run] = {
             "duration": float(np.ptp(rows["t"])),
             "kind": kinds[run],
@@ -55,15 +55,15 @@ def survey(dataset: Dataset) -> Survey:
     return Survey(pd.DataFrame(list(runs.values()), index=list(runs)), step, checks[~checks["ok"].astype(bool)])
 
 
-def separation(dataset: Dataset, lag: float) -> float:
+def separation_of_sources(dataset: Dataset, lag: float) -> float:
     """RMS distance [m] by which positions and integrated velocities part within a lag [s]; 0 where no run is so long.
 
     Jitter of the positions does not grow with the lag, errors of the velocities do.
     """
     parted = []
-    for _, rows in pieces(dataset):
+    for _, rows in stretches_of_runs(dataset):
         t = rows["t"].to_numpy()
-        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - way(rows)
+        apart = rows["north"].to_numpy() + 1j * rows["east"].to_numpy() - travelled_path(rows)
         early = t <= t[-1] - lag
         parted.append(np.interp(t[early] + lag, t, apart) - apart[early])
     every = np.abs(np.concatenate(parted))
@@ -73,8 +73,8 @@ def separation(dataset: Dataset, lag: float) -> float:
 def typical_runs(seen: Survey) -> list[str]:
     """From each kind that has three runs or more, the one in the middle; one of all where that leaves too few."""
     runs = seen.runs
-    groups = [group for _, group in runs.groupby("kind", sort=False) if len(group) >= OF_A_KIND]
-    many = len(runs) > 2 * OF_A_KIND or len(groups) == 1
+    groups = [group for _, group in runs.groupby("kind", sort=False) if len(group) >= LEAST_OF_A_KIND]
+    many = len(runs) > 2 * LEAST_OF_A_KIND or len(groups) == 1
     return [_middle_run(group, set(seen.failed["run"])) for group in (groups if many else []) or [runs]]
 
 

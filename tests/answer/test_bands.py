@@ -20,7 +20,7 @@ from shipid.errors import DataError
 from shipid.hybrid.bands import LEVELS, Bands
 from shipid.predictor import NO_BAND, Predictor
 from shipid.study import store
-from shipid.study.apply import Band, along_run
+from shipid.study.apply import BandSettings, adapt_along_run
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, read_results
 from shipid.study.schema import Claims
@@ -188,18 +188,18 @@ def test_an_adaptive_band_looks_at_ended_paths_alone() -> None:
     """A miss at instant 0 whose path ends at 5 s widens the band from 5 s on, not before."""
     now, table = np.arange(12.0), -np.log1p(-LEVELS)
     reach = np.where(now == 0, 2.0, 0.5)
-    factors = along_run(reach, now + 5.0, now, Band(0.9, rate=0.05), table)
+    factors = adapt_along_run(reach, now + 5.0, now, BandSettings(0.9, rate=0.05), table)
     np.testing.assert_array_equal(factors[:5], 1.0)
     assert factors[5] > 1.0
     assert (np.diff(factors[5:]) < 0).all()
-    later = along_run(np.where(now > 6, np.nan, reach), now + 5.0, now, Band(0.9, rate=0.05), table)
+    later = adapt_along_run(np.where(now > 6, np.nan, reach), now + 5.0, now, BandSettings(0.9, rate=0.05), table)
     np.testing.assert_array_equal(later, factors)
 
 
 def test_an_adaptive_band_judges_by_the_band_that_was_given() -> None:
     """Errors of 1.3 radii all along: once the band is that wide they are hits, and it misses its share."""
     now, table = np.arange(600.0), -np.log1p(-LEVELS)
-    factors = along_run(np.full(600, 1.3), now + 5.0, now, Band(0.9, rate=0.02), table)
+    factors = adapt_along_run(np.full(600, 1.3), now + 5.0, now, BandSettings(0.9, rate=0.02), table)
     assert factors.max() < 10.0
     assert np.mean(factors[100:] < 1.3) == pytest.approx(0.1, abs=0.03)
 
@@ -214,7 +214,7 @@ def test_paths_that_begin_within_a_horizon_do_not_widen_a_band_for_one_error_eac
     table = np.sqrt(-2 * np.log1p(-LEVELS))  # radii of Rayleigh's law
     plane = lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], rng.normal(size=(2, len(now))))
     reach = 3 * np.hypot(*plane) / float(np.interp(0.9, LEVELS, table))
-    factors = along_run(reach, now + horizon, now, Band(0.9, rate=0.02), table)
+    factors = adapt_along_run(reach, now + horizon, now, BandSettings(0.9, rate=0.02), table)
     later = now > 2000
     assert np.mean(reach[later] > factors[later]) == pytest.approx(0.1, abs=0.03)
     assert np.median(factors[later]) == pytest.approx(3.0, rel=0.2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.data.causal import causal_columns, last_known
+from shipid.data.causal import causal_columns, last_known_rows
 from shipid.errors import DataError
 from tests.logs.conftest import as_dataset, turning
 
@@ -20,7 +20,7 @@ def interpolated(seed: int, count: int = 80) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_no_row_takes_a_later_one_and_none_goes_back(seed: int) -> None:
-    known = last_known(*interpolated(seed))
+    known = last_known_rows(*interpolated(seed))
     assert (known <= np.arange(len(known))).all()
     assert (np.diff(known) >= 0).all()
 
@@ -47,7 +47,7 @@ def test_a_clock_that_counts_from_1970_gives_no_later_fix_away(begin: int) -> No
     fixes = np.cumsum(rng.uniform(0.7, 2.6, 200))
     t = (0.1 * np.arange(3000)).round(1)
     t = t[(t > fixes[0]) & (t < fixes[-1])]
-    known = last_known(begin + t, np.interp(t, fixes, rng.normal(size=200).cumsum()))
+    known = last_known_rows(begin + t, np.interp(t, fixes, rng.normal(size=200).cumsum()))
     late = fixes[np.searchsorted(fixes, t[known])] > t  # the first fix after the row that is used has not come
     assert not late[known > 0].any()
     assert np.median(t - t[known]) < 2.0
@@ -84,4 +84,12 @@ def test_a_column_that_is_not_there_is_named() -> None:
 
 def test_what_holds_still_is_known_until_it_moves() -> None:
     """The row that moves lies on a line to a later fix, so the last one before it is what is known."""
-    assert last_known(np.arange(7.0), np.array([4.0, 4.0, 4.0, 4.0, 5.0, 6.0, 7.0])).tolist() == [0, 1, 2, 3, 3, 3, 3]
+    assert last_known_rows(np.arange(7.0), np.array([4.0, 4.0, 4.0, 4.0, 5.0, 6.0, 7.0])).tolist() == [
+        0,
+        1,
+        2,
+        3,
+        3,
+        3,
+        3,
+    ]

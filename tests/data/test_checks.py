@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.data import checks
-from shipid.data.checks import check_dataset, noise_of
+from shipid.data.checks import check_dataset, white_noise_of
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 120.0, 0.5)
@@ -38,7 +38,7 @@ def test_work_grows_with_the_rows_and_not_with_the_clock(step: float, monkeypatc
         sizes.append(len(instants))
         return np.zeros(len(instants), dtype=complex)
 
-    monkeypatch.setattr(checks, "_moved", counted)
+    monkeypatch.setattr(checks, "_complex_at", counted)
     check_dataset(as_dataset(turning(T).assign(t=step * np.arange(len(T)))))
     assert max(sizes, default=0) <= len(T)
 
@@ -170,7 +170,7 @@ def test_a_delay_is_measured_whatever_the_scale_and_beside_spikes(delay: float, 
     path = weaving(t)
     late = scale * (np.interp(t - delay, t, path.real) + 1j * np.interp(t - delay, t, path.imag))
     late[[100, 400, 800]] += 500.0
-    measured = checks.delay_of([(t[:700], late[:700], path[:700]), (t[700:] + 50.0, late[700:], path[700:])])
+    measured = checks.measure_delay([(t[:700], late[:700], path[:700]), (t[700:] + 50.0, late[700:], path[700:])])
     assert measured is not None
     assert measured.seconds == pytest.approx(delay, abs=0.26)
     assert measured.explained > 0.9 or delay == 0.0
@@ -184,11 +184,11 @@ def test_noise_is_no_delay_and_few_windows_say_nothing() -> None:
     for seed in range(20):
         random = np.random.default_rng(seed)
         total = 0.3 * np.cumsum(0.01 * random.normal(size=len(t)))
-        measured = checks.delay_of([(t, total + random.normal(size=len(t)) + 0j, total + 0j)])
+        measured = checks.measure_delay([(t, total + random.normal(size=len(t)) + 0j, total + 0j)])
         assert measured is not None
         assert measured.seconds == 0.0, seed
-    assert checks.delay_of([(t[:20], t[:20] + 0j, t[:20] + 0j)]) is None
-    assert checks.delay_of([]) is None
+    assert checks.measure_delay([(t[:20], t[:20] + 0j, t[:20] + 0j)]) is None
+    assert checks.measure_delay([]) is None
 
 
 @pytest.mark.slow
@@ -225,9 +225,9 @@ def test_a_run_contained_in_another_is_detected_on_another_clock() -> None:
 def test_the_noise_of_a_straight_signal_is_that_put_into_it() -> None:
     line = 3.0 + 0.2 * np.arange(4000)
     noise = np.random.default_rng(0).normal(0, 0.5, len(line))
-    assert noise_of(line + noise) == pytest.approx(0.5, rel=0.05)
-    assert noise_of(line) < 1e-9
-    assert noise_of(noise[:4]) == 0.0  # too few to say
+    assert white_noise_of(line + noise) == pytest.approx(0.5, rel=0.05)
+    assert white_noise_of(line) < 1e-9
+    assert white_noise_of(noise[:4]) == 0.0  # too few to say
 
 
 @pytest.mark.parametrize(("of_heading", "of_rate"), [(0.01, 0.0), (0.0, 0.02), (0.01, 0.02)])

@@ -13,14 +13,14 @@ import pytest
 
 from shipid.data.dataset import (
     Dataset,
-    apart_from,
     cumulative_integral,
-    in_force,
-    pieces,
-    pieces_by_run,
+    mean_commands,
     read_dataset,
-    sample,
-    unit_of,
+    sample_columns,
+    stretches_by_run,
+    stretches_of_runs,
+    unit_of_column,
+    without_shared_moments,
     write_dataset,
 )
 from shipid.errors import DataError
@@ -192,17 +192,17 @@ def test_a_table_that_changes_later_does_not_change_the_dataset() -> None:
 
 def test_pieces_start_at_breaks() -> None:
     frame = turning(T).assign(flags=np.where(np.isin(T, [0.0, 5.0, 12.0]), 1, 0))
-    starts = [(run, rows["t"].iloc[0], len(rows)) for run, rows in pieces(as_dataset(frame, turning(T)))]
+    starts = [(run, rows["t"].iloc[0], len(rows)) for run, rows in stretches_of_runs(as_dataset(frame, turning(T)))]
     assert starts == [("a", 0.0, 10), ("a", 5.0, 14), ("a", 12.0, 16), ("b", 0.0, 40)]
     other = Dataset(as_dataset(frame).frame, {"flags": ["interpolated"]})
-    assert [len(rows) for _, rows in pieces(other)] == [40], "a flag of another name"
+    assert [len(rows) for _, rows in stretches_of_runs(other)] == [40], "a flag of another name"
 
 
 def test_sample_holds_commands_and_interpolates_states() -> None:
     rows = turning(np.array([0.0, 0.1, 0.1 + 0.2, 0.6])).assign(
         u=[0.0, 1.0, 2.0, 3.0], **{"port.n": [1.0, 2.0, 3.0, 4.0]}
     )
-    values = sample(rows, np.array([[0.0, 0.3], [0.29, 0.45]]))  # 0.3 < 0.1 + 0.2 by one bit
+    values = sample_columns(rows, np.array([[0.0, 0.3], [0.29, 0.45]]))  # 0.3 < 0.1 + 0.2 by one bit
     np.testing.assert_allclose(values["u"], [[0.0, 2.0], [1.95, 2.5]])
     np.testing.assert_array_equal(values["port.n"], [[1.0, 3.0], [2.0, 3.0]])
 
@@ -211,7 +211,7 @@ def test_sample_holds_commands_and_interpolates_states() -> None:
 def test_sample_takes_no_command_from_the_future(start: float) -> None:
     rows = turning(start + T).assign(**{"port.n": np.arange(len(T), dtype=float)})
     offsets = np.array([0.0, 0.25, 0.499, 0.5, 7.1, 19.4])
-    values = sample(rows, start + offsets)["port.n"]
+    values = sample_columns(rows, start + offsets)["port.n"]
     np.testing.assert_array_equal(values, [0.0, 0.0, 0.0, 1.0, 14.0, 38.0])
 
 
@@ -219,8 +219,8 @@ def test_sample_finds_the_row_that_rounding_moved() -> None:
     """At Unix time doubles lie 2.4e-7 s apart: start + 0.1 k and start + k / 10 are two numbers for some k."""
     k = np.arange(1000)
     rows = turning(1.7e9 + k / 10).assign(**{"port.n": k.astype(float)})
-    np.testing.assert_array_equal(sample(rows, 1.7e9 + 0.3 + 0.1 * k[:900])["port.n"], k[3:903])
-    alone = sample(rows.iloc[:1], np.array([1.7e9, 1.7e9 + 5.0]))
+    np.testing.assert_array_equal(sample_columns(rows, 1.7e9 + 0.3 + 0.1 * k[:900])["port.n"], k[3:903])
+    alone = sample_columns(rows.iloc[:1], np.array([1.7e9, 1.7e9 + 5.0]))
     np.testing.assert_array_equal(alone["port.n"], [0.0, 0.0])
 
 
@@ -236,7 +236,7 @@ def test_sample_finds_the_row_that_rounding_moved() -> None:
     ],
 )
 def test_unit_of(name: str, unit: str | None) -> None:
-    assert unit_of(name) == unit
+    assert unit_of_column(name) == unit
 
 
 def test_a_name_that_is_not_utf_8_is_written_and_read(tmp_path: Path) -> None:
@@ -266,12 +266,12 @@ def test_commands_in_force_have_the_integral_of_those_that_hold(seed: int) -> No
     orders = np.repeat(rng.normal(0, 3, 20), 10)
     rows = {"t": t, "port.n": orders, "port.alpha": np.full(200, 0.1), "u": rng.normal(size=200)}
     edges = t[0] + rng.uniform(0, 10, 7) + rng.uniform(0.1, 2.0, (40, 7)).cumsum(axis=0)
-    found = in_force(rows, edges)
+    found = mean_commands(rows, edges)
     assert list(found) == ["port.n", "port.alpha"]
     np.testing.assert_array_equal(found["port.alpha"], 0.1)
     fine = (np.arange(4000) + 0.5) / 4000
     instants = edges[:-1] + fine[:, None, None] * np.diff(edges, axis=0)
-    held = sample(rows, instants)["port.n"]
+    held = sample_columns(rows, instants)["port.n"]
     np.testing.assert_allclose(found["port.n"], held.mean(axis=0), rtol=0, atol=0.01)
     same = (held == held[0]).all(axis=0)
     assert 0.2 < same.mean() < 1
@@ -281,7 +281,7 @@ def test_commands_in_force_have_the_integral_of_those_that_hold(seed: int) -> No
 def test_only_angles_are_unwrapped() -> None:
     """A position that jumps by more than half a turn, as a number, is no angle."""
     rows = turning(T).assign(north=np.where(T > 5.0, 40.0, 0.0))
-    np.testing.assert_array_equal(sample(rows, T)["north"], rows["north"])
+    np.testing.assert_array_equal(sample_columns(rows, T)["north"], rows["north"])
 
 
 def test_the_integral_of_a_straight_rate_is_exact_on_any_clock() -> None:
@@ -292,11 +292,11 @@ def test_the_integral_of_a_straight_rate_is_exact_on_any_clock() -> None:
 def test_no_other_run_keeps_a_moment_of_runs_that_are_set_apart() -> None:
     """On one clock: the run that is set apart stays whole, the other loses what it shares, and is broken there."""
     middle = turning(T[10:20])
-    log = apart_from(as_dataset(middle, turning(T)), ["a"])
-    by_run = {run: [list(rows["t"]) for rows in parts] for run, parts in pieces_by_run(log).items()}
+    log = without_shared_moments(as_dataset(middle, turning(T)), ["a"])
+    by_run = {run: [list(rows["t"]) for rows in parts] for run, parts in stretches_by_run(log).items()}
     assert by_run == {"a": [list(T[10:20])], "b": [list(T[:10]), list(T[20:])]}
     separate = as_dataset(middle, turning(T), clock="run")
-    assert apart_from(separate, ["a"]) is separate
+    assert without_shared_moments(separate, ["a"]) is separate
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system does not say the threads of a process")

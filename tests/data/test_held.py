@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.data.held import held_commands, nothing_varies
+from shipid.data.held import constant_commands, warn_of_constant_commands
 
 N = 200
 HELD = {"rudder.delta": np.full(N, 0.35), "propeller.n": np.full(N, 10.0)}
@@ -28,12 +28,12 @@ def test_commands_that_are_the_same_in_all_runs_are_named(noise: float) -> None:
     rng = np.random.default_rng(1)
     noisy = [{name: x + noise * np.abs(x) * rng.standard_normal(N) for name, x in HELD.items()} for _ in range(5)]
     dataset = log(*noisy)
-    (words,) = nothing_varies(dataset, dataset.runs)
-    assert set(held_commands(dataset, dataset.runs)) == set(HELD)
+    (words,) = warn_of_constant_commands(dataset, dataset.runs)
+    assert set(constant_commands(dataset, dataset.runs)) == set(HELD)
     assert "rudder.delta" in words
     assert "are the same in all 5 runs: what they do cannot be learnt" in words
     assert "is the same" not in words
-    assert "throughout the only run" in nothing_varies(dataset, ["run 0"])[0]
+    assert "throughout the only run" in warn_of_constant_commands(dataset, ["run 0"])[0]
 
 
 @pytest.mark.parametrize("where", ["one run", "a moment", "between runs"])
@@ -41,9 +41,9 @@ def test_a_command_that_varies_anywhere_varies(where: str) -> None:
     other = HELD["rudder.delta"].copy()
     other[slice(60, 65) if where == "a moment" else slice(100, N) if where == "one run" else slice(None)] = -0.1
     dataset = log({}, {}, {}, {"rudder.delta": other})
-    assert held_commands(dataset, dataset.runs) == ("propeller.n",)
-    assert nothing_varies(dataset, dataset.runs) == []
-    assert nothing_varies(dataset, ["run 0", "run 1"]) != []
+    assert constant_commands(dataset, dataset.runs) == ("propeller.n",)
+    assert warn_of_constant_commands(dataset, dataset.runs) == []
+    assert warn_of_constant_commands(dataset, ["run 0", "run 1"]) != []
 
 
 def one_run(rows: int, step: float = 1.0, **commands: np.ndarray) -> Dataset:
@@ -77,8 +77,8 @@ def test_a_short_kick_in_a_long_run_varies(hours: float, step: float, lasts: flo
         moved = helm.copy()
         moved[begin : begin + round(lasts / step)] = np.radians(size)
         log = one_run(rows, step, rudder_delta=moved, propeller_n=np.full(rows, 2.0))
-        assert ("rudder.delta" in held_commands(log, log.runs)) == held
-        assert bool(nothing_varies(log, log.runs)) == held
+        assert ("rudder.delta" in constant_commands(log, log.runs)) == held
+        assert bool(warn_of_constant_commands(log, log.runs)) == held
 
 
 @pytest.mark.parametrize(("angle", "share", "held"), [(0.4, 0.008, True), (0.65, 0.013, False)])
@@ -88,4 +88,4 @@ def test_noise_of_feedback_is_no_order(angle: float, share: float, held: bool) -
     for rows in (100, 100_000):
         helm = 0.1 + np.radians(angle) * rng.standard_normal(rows)
         log = one_run(rows, rudder_delta=helm, propeller_n=2.0 * (1 + share * rng.standard_normal(rows)))
-        assert held_commands(log, log.runs) == (("rudder.delta", "propeller.n") if held else ())
+        assert constant_commands(log, log.runs) == (("rudder.delta", "propeller.n") if held else ())

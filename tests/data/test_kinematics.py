@@ -5,7 +5,15 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.stats import chi2
 
-from shipid.data.kinematics import STATES, Noise, _change, _move, _start, _transition, smooth
+from shipid.data.kinematics import (
+    FILTER_STATES,
+    Noise,
+    _move_state,
+    _process_noise,
+    _start_of_filter,
+    _transition,
+    smooth_motion,
+)
 from tests.logs.conftest import turning
 
 T = np.arange(0.0, 120.0, 1.0)
@@ -21,7 +29,7 @@ def test_constant_turn_without_noise(step: float) -> None:
     t = np.arange(0.0, 120.0, step)
     motion = turning(t)
     logged = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
-    smoothed = smooth(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
+    smoothed = smooth_motion(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
     inside = slice(3, -3)
     np.testing.assert_allclose(smoothed.state("u")[inside], 4.0, atol=0.01)
     np.testing.assert_allclose(smoothed.state("v")[inside], -0.5, atol=0.01)
@@ -45,7 +53,7 @@ def random_motion(random: np.random.Generator, t: np.ndarray, given: Noise) -> n
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("logged", [("north", "east", "psi"), ("north", "east", "psi", "r"), STATES])
+@pytest.mark.parametrize("logged", [("north", "east", "psi"), ("north", "east", "psi", "r"), FILTER_STATES])
 def test_errors_are_as_large_as_it_says(logged: tuple[str, ...]) -> None:
     """NEES of (u, v, r) is chi-square (Bar-Shalom et al. 2001, 5.4.2): its mean over 120 motions lies in the band."""
     random, given = np.random.default_rng(3), noise(0.5, np.radians(0.5), 0.05, np.radians(0.1))
@@ -55,9 +63,10 @@ def test_errors_are_as_large_as_it_says(logged: tuple[str, ...]) -> None:
     for _ in range(120):
         truth = random_motion(random, t, given)
         noisy = {
-            name: truth[:, STATES.index(name)] + given.sample[name] * random.standard_normal(len(t)) for name in logged
+            name: truth[:, FILTER_STATES.index(name)] + given.sample[name] * random.standard_normal(len(t))
+            for name in logged
         }
-        smoothed = smooth(t, noisy, given)
+        smoothed = smooth_motion(t, noisy, given)
         error = (smoothed.states - truth)[20, 3:]
         nees.append(error @ np.linalg.solve(smoothed.covariances[20][3:, 3:], error))
         consistency.append(smoothed.consistency)
@@ -71,7 +80,7 @@ def test_the_transition_is_the_slope_of_the_motion(dt: float) -> None:
     """By central differences, of ships that drift and turn fast."""
     rng = np.random.default_rng(5)
     for x in rng.uniform([-50, -50, -4, -2, -2, -0.2], [50, 50, 4, 9, 2, 0.2], (5, 6)):
-        slopes = [(_move(x + 1e-5 * e, dt) - _move(x - 1e-5 * e, dt)) / 2e-5 for e in np.eye(6)]
+        slopes = [(_move_state(x + 1e-5 * e, dt) - _move_state(x - 1e-5 * e, dt)) / 2e-5 for e in np.eye(6)]
         np.testing.assert_allclose(_transition(x, dt), np.transpose(slopes), atol=1e-6)
 
 
@@ -84,7 +93,7 @@ def test_white_accelerations_move_a_ship_that_turns_as_on_the_heading_of_the_mid
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         ways = [np.vstack([left * turn, np.eye(3)]) for left in np.linspace(0, dt, 2001)]  # what an impulse moves
         added = np.trapezoid([way @ densities @ way.T for way in ways], dx=dt / 2000, axis=0)
-        np.testing.assert_allclose(_change(x, dt, given), added, rtol=1e-5, atol=1e-12)
+        np.testing.assert_allclose(_process_noise(x, dt, given), added, rtol=1e-5, atol=1e-12)
 
 
 def by_least_squares(
@@ -138,7 +147,7 @@ def test_wrong_noise_is_reported() -> None:
     motion = turning(T)
     noisy = {name: motion[name].to_numpy() + 3.0 * random.standard_normal(len(T)) for name in ("north", "east")}
     noisy["psi"] = motion["psi"].to_numpy()
-    assert smooth(T, noisy, noise(1.0, 0.01, 0.02, 1e-3)).consistency > 2.0
+    assert smooth_motion(T, noisy, noise(1.0, 0.01, 0.02, 1e-3)).consistency > 2.0
 
 
 def test_a_straight_way_begins_with_its_velocities() -> None:
@@ -146,7 +155,7 @@ def test_a_straight_way_begins_with_its_velocities() -> None:
     t, psi, u, v = np.arange(0.0, 20.0), 1.0, 3.0, 0.4
     ways = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
     logged = {"north": 5.0 + ways[0] * t, "east": -2.0 + ways[1] * t, "psi": np.full_like(t, psi)}
-    first, _ = _start(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
+    first, _ = _start_of_filter(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
     np.testing.assert_allclose(first, [5.0, -2.0, psi, u, v, 0.0], atol=1e-9)
 
 
@@ -155,7 +164,7 @@ def test_covariances_of_a_long_log_are_symmetric_and_positive() -> None:
     t = np.arange(0.0, 300.0, 0.1)
     motion = turning(t)
     logged = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
-    found = smooth(t, logged, Noise({"north": 100.0, "east": 100.0, "psi": 1e-5}, 1e-3, 1e-2)).covariances
+    found = smooth_motion(t, logged, Noise({"north": 100.0, "east": 100.0, "psi": 1e-5}, 1e-3, 1e-2)).covariances
     sizes = np.sqrt(np.einsum("nii->ni", found))
     scaled = found / (sizes[:, :, None] * sizes[:, None, :])
     np.testing.assert_allclose(scaled, scaled.transpose(0, 2, 1), atol=1e-6)

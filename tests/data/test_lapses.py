@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Array
-from shipid.data.lapses import LONGEST, lapses
+from shipid.data.lapses import LONGEST_ZERO, find_command_faults
 
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))]
 NAMES = {"rudder.delta": np.radians(1.0), "propeller.n": 1 / 60}
@@ -30,7 +30,7 @@ def column(name: str, seed: int, noise: bool) -> tuple[Array, Array, Array]:
 
 def found(name: str, t: Array, values: Array, psi: Array) -> tuple[set[str], set[int]]:
     """Kinds and rows of all lapses."""
-    some = lapses(name, t, NAMES[name] * values, psi, np.diff(t) < 3 * np.median(np.diff(t)))
+    some = find_command_faults(name, t, NAMES[name] * values, psi, np.diff(t) < 3 * np.median(np.diff(t)))
     return {one.kind for one in some}, {row for one in some for row in range(one.first, one.end)}
 
 
@@ -87,7 +87,7 @@ def test_orders_that_go_to_0_and_back_are_no_lapses(step: float, seed: int) -> N
         for noise in (0.0, 0.1):
             noisy = np.round(values + random.normal(0, noise, count), 1)
             assert found("rudder.delta", t, noisy, psi) == (set(), set()), (what, noise)
-    telegraph = held([0.0, 40.0, 80.0, -40.0], max(1, round(1.5 * LONGEST / step)))
+    telegraph = held([0.0, 40.0, 80.0, -40.0], max(1, round(1.5 * LONGEST_ZERO / step)))
     assert found("propeller.n", t, telegraph, psi) == (set(), set())
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.data.outputs import check_outputs, common_outputs, compare_outputs, predicted_outputs
+from shipid.data.outputs import check_outputs, compare_outputs, outputs_in_common, predicted_outputs
 from shipid.errors import DataError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
@@ -47,7 +47,7 @@ def test_a_vessel_predicts_what_was_simulated_on_it(name: str) -> None:
     """Beyond the first seconds, in which the log does not say where shaft and rudder were."""
     ship = load_vessel(name)
     log = log_of(ship, SHIPS[name])
-    found, names = predicted_outputs(ship, log), common_outputs(ship, log)
+    found, names = predicted_outputs(ship, log), outputs_in_common(ship, log)
     assert list(found.columns) == ["run", "t", *names]
     assert names
     assert names == list(vessel_dynamics(ship).outputs)
@@ -79,7 +79,7 @@ def test_nothing_to_compare_is_said() -> None:
     bare = Dataset(log.frame.drop(columns=["propeller.thrust", "rudder.normal_force"]), log.metadata)
     with pytest.raises(DataError, match=r"predicts propeller.thrust, rudder.normal_force; the data have none"):
         check_outputs(ship, bare)
-    assert common_outputs(load_vessel("gunnerus-28.9"), log) == []
+    assert outputs_in_common(load_vessel("gunnerus-28.9"), log) == []
 
 
 def test_hsva_measured_what_the_open_water_curve_predicts(shared_data: Path, tmp_path: Path) -> None:

@@ -13,20 +13,20 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import (
     Windows,
     coarse_in_words,
-    concatenate,
-    covered,
+    covered_time,
     cut_windows,
     fold_masks,
     from_frame,
-    gaps,
+    gaps_of_runs,
+    is_without_rows,
+    join_windows,
     nested_runs,
     part_folds,
-    reach_over,
     run_folds,
     split_folds,
     split_runs,
     to_frame,
-    without_rows,
+    windows_over_spans,
 )
 from shipid.errors import DataError
 from tests.logs.conftest import as_dataset, turning
@@ -217,13 +217,13 @@ def test_the_order_of_the_runs_in_the_table_changes_no_window() -> None:
 def test_select_and_concatenate_are_inverse() -> None:
     windows = runs_at((0, 30), (50, 80))
     mask = windows.run == "a"
-    again = concatenate([windows.select(mask), windows.select(~mask)])
+    again = join_windows([windows.select(mask), windows.select(~mask)])
     np.testing.assert_array_equal(again.future, windows.future)
     np.testing.assert_array_equal(again.run, windows.run)
     assert len(windows.select([0, 5])) == 2
     np.testing.assert_array_equal(windows.select(slice(3, 5)).planned["port.n"], windows.planned["port.n"][:, 3:5])
     with pytest.raises(DataError, match="horizons"):
-        concatenate([windows, cut_windows(as_dataset(turning(T)), horizon=5)])
+        join_windows([windows, cut_windows(as_dataset(turning(T)), horizon=5)])
 
 
 def test_touching_is_closed_and_counts_the_future() -> None:
@@ -268,11 +268,11 @@ def test_runs_with_separate_clocks_do_not_exclude_each_other() -> None:
 
 def test_covered_counts_a_moment_once_on_a_shared_clock() -> None:
     overlapping = ((0.0, 30.0), (20.0, 50.0), (70.0, 85.0))
-    assert covered(runs_at(*overlapping)) == pytest.approx(50.0 + 15.0)
-    assert covered(runs_at(*overlapping, clock="run")) == pytest.approx(30.0 + 30.0 + 15.0)
+    assert covered_time(runs_at(*overlapping)) == pytest.approx(50.0 + 15.0)
+    assert covered_time(runs_at(*overlapping, clock="run")) == pytest.approx(30.0 + 30.0 + 15.0)
     sparse = runs_at((0.0, 60.0)).select([30, 0, 25])  # out of order: 0 to 10 s, 25 to 40 s
-    assert covered(sparse) == pytest.approx(25.0)
-    assert covered(sparse.select([])) == 0.0
+    assert covered_time(sparse) == pytest.approx(25.0)
+    assert covered_time(sparse.select([])) == 0.0
 
 
 @given(st.lists(spans, min_size=1, max_size=5), st.booleans(), st.data())
@@ -287,7 +287,7 @@ def test_covered_is_the_time_that_is_touched(
         for run, t in zip(windows.run, windows.t, strict=True)
         for second in range(10)
     }
-    assert covered(windows) == pytest.approx(len(seen))
+    assert covered_time(windows) == pytest.approx(len(seen))
 
 
 @given(st.integers(2, 17), st.integers(0, 2**32))
@@ -488,7 +488,7 @@ def test_spans_and_touching_count_the_past() -> None:
     windows = cut_windows(as_dataset(turning(T)), horizon=10, past=5)
     assert windows.spans == {"a": (0.0, 60.0)}
     assert windows.t[windows.touching([(20.0, 25.0)])].tolist() == list(range(10, 31))
-    assert covered(windows.select([0])) == 15.0
+    assert covered_time(windows.select([0])) == 15.0
     for training, validation in part_folds(windows):
         seen = windows.select(validation)
         assert not windows.select(training).touching([(seen.begin.min(), seen.end.max())]).any()
@@ -566,17 +566,17 @@ def test_windows_over_a_time_without_rows_are_found() -> None:
     """A recorder that paused from 20 to 30 s; windows of 10 s that end at 20 s, or begin at 30 s, see nothing of it."""
     paused = turning(T[(T <= 20) | (T >= 30)])
     dataset = as_dataset(paused, turning(T))
-    spans = gaps(dataset, 1.0)
+    spans = gaps_of_runs(dataset, 1.0)
     assert spans == {"a": [(20.0, 30.0)]}
     windows = cut_windows(dataset, horizon=10)
-    over = reach_over(windows, spans)
+    over = windows_over_spans(windows, spans)
     np.testing.assert_array_equal(over, (windows.run == "a") & (windows.t > 10) & (windows.t < 30))
-    assert gaps(dataset, 10.0) == {}  # a step of the prediction as long
-    assert gaps(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole
+    assert gaps_of_runs(dataset, 10.0) == {}  # a step of the prediction as long
+    assert gaps_of_runs(as_dataset(turning(T[::2]), turning(T)), 0.1) == {}  # rows of another interval are no hole
 
 
 def test_instants_at_and_between_rows_are_in_no_time_without_rows() -> None:
     """Rows at 0 ... 5 and 15 ... 20 s: only what lies between 5 and 15 s does; neither end does, nor the last row."""
     t = np.append(np.arange(0.0, 6.0), np.arange(15.0, 21.0))
     instants = np.array([0.0, 0.5, 5.0, 5.1, 10.0, 14.9, 15.0, 19.5, 20.0])
-    assert without_rows(t, instants, 1.0).tolist() == [False] * 3 + [True] * 3 + [False] * 3
+    assert is_without_rows(t, instants, 1.0).tolist() == [False] * 3 + [True] * 3 + [False] * 3

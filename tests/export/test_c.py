@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 
 from shipid import observer
-from shipid.data.dataset import Dataset, sample
-from shipid.data.windows import Instants, past_of
+from shipid.data.dataset import Dataset, sample_columns
+from shipid.data.windows import Instants, past_of_instants
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.export.c import Files, Precision, c_name, comment, strings
@@ -137,9 +137,9 @@ def test_a_prediction_is_fast_small_and_allocates_nothing(tmp_path):
     dataset = log_of(physics.vessel, 60, np.random.default_rng(1), 1.0)
     estimates = observe(physics.vessel, dataset, physics.observer).columns
     t = dataset.frame["t"].to_numpy()
-    past = past_of(dataset.frame, t, 10, 1.0, "position")
+    past = past_of_instants(dataset.frame, t, 10, 1.0, "position")
     predictor = remembering(physics, Memory(error=(10.0,), observer=True),
-                            Instants(sample(dataset.frame, t), past, None, None, estimates))  # fmt: skip
+                            Instants(sample_columns(dataset.frame, t), past, None, None, estimates))  # fmt: skip
     recorder = Recorder(predictor, tmp_path)
     loaded = library(recorder.files, tmp_path / "fast", "-O1")
     recorder.follow(dataset.frame)
@@ -194,9 +194,9 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, longest, tmp_pa
     estimates = observe(vessel, dataset, physics.observer)
     late = np.flatnonzero(t > t[0] + 4.0)
     hidden = {name: values[late] for name, values in reached_in(vessel, rows).items()}
-    past = past_of(rows, t[late], 4, 1.0, physics.path)
+    past = past_of_instants(rows, t[late], 4, 1.0, physics.path)
     seen = {name: values[late] for name, values in estimates.columns.items()}
-    instants = Instants(sample(rows, t[late]), past, None, hidden, seen)
+    instants = Instants(sample_columns(rows, t[late]), past, None, hidden, seen)
     memory = Memory(history=(2.0, 3.0), turned=(4.0,), error=(3.0,), observer=True)
     bands = bands_of(np.random.default_rng(1), physics, instants, ("u",), 1.0)
     predictor = remembering(physics, memory, instants, limits={"u": (0.0, 9.0)}, bands=bands, run_up=9.0)
@@ -223,8 +223,8 @@ def test_rows_may_come_as_often_as_they_like(interval, tmp_path):
     physics = Physics(variety()["gunnerus-28.9"], 3, 1.0)
     slow = log_of(physics.vessel, 16, np.random.default_rng(1), 1.0).frame
     t = slow["t"].iloc[0] + interval * np.arange(round(13 / interval))
-    log = pd.DataFrame({**sample(slow, t), "t": t, "run": "a"})
-    instants = Instants(sample(log, t[-1:]), past_of(log, t[-1:], 10, 1.0, "position"))
+    log = pd.DataFrame({**sample_columns(slow, t), "t": t, "run": "a"})
+    instants = Instants(sample_columns(log, t[-1:]), past_of_instants(log, t[-1:], 10, 1.0, "position"))
     predictor = remembering(physics, Memory(history=(1.0, 10.0), error=(10.0,)), instants)
     found, _ = Recorder(predictor, tmp_path).follow(log)
     np.testing.assert_allclose(found[:, -1], predictor.predict(instants)[:, 0], rtol=0, atol=1e-9)
@@ -235,7 +235,7 @@ def test_a_row_just_after_an_instant_of_the_past_is_not_taken_for_it(tmp_path):
     vessel, t = variety()["actuators"], np.array([0.0, 0.4, 1.0 + 5e-5, 2.0, 3.0])
     log = log_of(vessel, 5, np.random.default_rng(1), 1.0).frame.assign(t=t, u=[1.0, 5.0, 2.0, 3.0, 3.0])
     hidden = {name: values[-1:] for name, values in reached_in(vessel, log).items()}
-    instants = Instants(sample(log, t[-1:]), past_of(log, t[-1:], 2, 1.0, "position"), None, hidden)
+    instants = Instants(sample_columns(log, t[-1:]), past_of_instants(log, t[-1:], 2, 1.0, "position"), None, hidden)
     predictor = remembering(Physics(vessel, 3, 1.0), Memory(history=(1.0, 2.0), error=(1.0,)), instants)
     found, _ = Recorder(predictor, tmp_path).follow(log)
     np.testing.assert_allclose(found[:, -1], predictor.predict(instants)[:, 0], rtol=0, atol=1e-11)
@@ -329,7 +329,7 @@ def test_the_past_begins_anew_before_the_observer_does(tmp_path):
     t, physics = frame["t"].to_numpy(), Physics(vessel, 5, 1.0, "rk4", ONE_FILTER)
     estimates = observe(vessel, Dataset(frame, {"clock": "run"}), ONE_FILTER).columns
     assert (np.diff(estimates[AGE]) > 0).all()
-    instants = Instants(sample(frame, t), past_of(frame, t, 3, 1.0, "position"), None, None, estimates)
+    instants = Instants(sample_columns(frame, t), past_of_instants(frame, t, 3, 1.0, "position"), None, None, estimates)
     predictor = remembering(physics, Memory(history=(1.0, 3.0), observer=True), instants)
     found, results = Recorder(predictor, tmp_path).follow(frame)
     young = t - t[np.where(np.arange(len(t)) < 10, 0, 10)] < 3.0
@@ -342,7 +342,7 @@ def test_a_long_way_costs_single_precision_no_digits(tmp_path):
     physics = Physics(variety()["gunnerus-28.9"], 3, 1.0, path="velocity")
     log = log_of(physics.vessel, 16, np.random.default_rng(1), 1.0).frame
     t = log["t"].to_numpy()[12:]
-    instants = Instants(sample(log, t), past_of(log, t, 10, 1.0, "velocity"))
+    instants = Instants(sample_columns(log, t), past_of_instants(log, t, 10, 1.0, "velocity"))
     predictor = remembering(physics, Memory(history=(1.0, 10.0), error=(10.0,)), instants)
     recorder = Recorder(predictor, tmp_path, Precision(single=True))
 

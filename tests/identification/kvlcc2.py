@@ -21,8 +21,8 @@ from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Measures
-from shipid.measures.turning import turning
-from shipid.measures.zigzag import zigzag
+from shipid.measures.turning import turning_measures
+from shipid.measures.zigzag import zigzag_measures
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman, Named
 from shipid.units import DEGREE
@@ -91,7 +91,7 @@ def late_helmsman(commands: tuple[str, ...]) -> Helmsman:
 
 def measured(log: Mapping[str, np.ndarray], run: str) -> Measures:
     """Measures of a zigzag about the course that was ordered, 0; the run's name says its execute heading."""
-    return zigzag(record_of(log), execute_heading=float(run.split("_")[1]) * DEGREE, course=0.0)
+    return zigzag_measures(record_of(log), execute_heading=float(run.split("_")[1]) * DEGREE, course=0.0)
 
 
 def simulated(vessel: Vessel, log: Mapping[str, np.ndarray], run: str) -> Measures:
@@ -157,7 +157,7 @@ def circle(vessel: Vessel, side: float, angle: float = 35 * DEGREE, speed: float
     over = np.where(np.arange(count) * STEP >= 1.0, side * angle, 0.0)[:, None]
     inputs = {"propeller.n": np.full(1, SHAFT), "rudder.delta": over}
     path = rollout(vessel, start, inputs, step=STEP, num_steps=count, method="rk4")
-    return turning(record_of(_columns(path, model.state)))
+    return turning_measures(record_of(_columns(path, model.state)))
 
 
 def fitted(data: Dataset, runs: Sequence[str] = FITTED) -> Solution:

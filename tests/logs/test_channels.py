@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import digest_of, import_log, read_mapping
 from tests.logs.conftest import DATES, PLAIN, as_log, stamps, turning
@@ -139,7 +139,7 @@ def test_a_hole_longer_than_max_gap_breaks_the_run(tmp_path: Path) -> None:
     motion = turning(T)
     motion.loc[motion["t"].between(40.0, 60.0), "psi"] = np.nan
     dataset = import_log(read_mapping(mapping), logged(motion, tmp_path))
-    spans = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)]
+    spans = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in stretches_of_runs(dataset)]
     assert spans == [(0.0, 39.5), (60.5, 119.5)]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset, flag_bit, pieces, read_dataset, write_dataset
+from shipid.data.dataset import Dataset, flag_bit, read_dataset, stretches_of_runs, write_dataset
 from shipid.errors import DataError, DocumentError
 from shipid.logs import frames, readers
 from shipid.logs.importing import import_log, read_mapping, runs_of
@@ -71,7 +71,7 @@ class TestGunnerus:
         for dataset, worst in ((whole, 40.0), (gunnerus, 10.0)):
             errors = [
                 np.abs(np.unwrap(rows["psi"])[6:] - np.unwrap(rows["psi"])[:-6] - 0.5 * rows["r"].rolling(6).sum()[6:])
-                for _, rows in pieces(dataset)
+                for _, rows in stretches_of_runs(dataset)
             ]
             largest = np.degrees(max(error.max() for error in errors))  # over 3 s
             assert largest > worst if dataset is whole else largest < worst
@@ -269,7 +269,7 @@ def test_short_gaps_are_filled_and_long_ones_break(plain_mapping: Write, tmp_pat
     holes = holes[~holes["t"].between(80.0, 90.0)]  # no rows at all: a break, too
     mapping = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 2.0'))
     dataset = imported(holes, mapping, tmp_path)
-    assert [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)] == [
+    assert [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in stretches_of_runs(dataset)] == [
         (0.0, 49.5),
         (60.5, 79.5),
         (90.5, 119.5),
@@ -291,11 +291,11 @@ def test_a_gap_as_long_as_max_gap_is_filled(start: float, plain_mapping: Write, 
     mapping = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.3'))
     dataset = imported(holes, mapping, tmp_path)
     assert len(dataset.frame) == len(holes)
-    assert len(list(pieces(dataset))) == 1
+    assert len(list(stretches_of_runs(dataset))) == 1
     smaller = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.29'))
-    assert len(list(pieces(imported(holes, smaller, tmp_path)))) > 40
+    assert len(list(stretches_of_runs(imported(holes, smaller, tmp_path)))) > 40
     steady = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.1'))
-    assert len(list(pieces(imported(motion.assign(t=start + motion["t"]), steady, tmp_path)))) == 1
+    assert len(list(stretches_of_runs(imported(motion.assign(t=start + motion["t"]), steady, tmp_path)))) == 1
 
 
 def test_resampling_keeps_the_motion(plain_mapping: Write, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import BREAK, Dataset, pieces, read_dataset, write_dataset
+from shipid.data.dataset import BREAK, Dataset, read_dataset, stretches_of_runs, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
 from shipid.logs.joining import PAUSE, join
@@ -47,7 +47,7 @@ def test_every_run_keeps_its_rows_its_breaks_and_its_windows(seed: int) -> None:
     for part in parts:
         again = whole.select(part.runs)
         pd.testing.assert_frame_equal(again.frame.drop(columns="flags"), part.frame.drop(columns="flags"))
-        assert [len(rows) for _, rows in pieces(again)] == [len(rows) for _, rows in pieces(part)]
+        assert [len(rows) for _, rows in stretches_of_runs(again)] == [len(rows) for _, rows in stretches_of_runs(part)]
         cut = [cut_windows(one, horizon=5, step=1.0, interval=2.0) for one in (again, part)]
         np.testing.assert_array_equal(cut[0].future, cut[1].future)
 
@@ -84,7 +84,7 @@ def test_joining_is_associative() -> None:
     a, b, c = recording(1), recording(2, ("c",), begin=500.0), recording(3, ("d", "e"), begin=900.0)
     left, right = joined(joined(a, b)[0], c)[0], joined(a, joined(b, c)[0])[0]
     pd.testing.assert_frame_equal(left.frame.drop(columns="flags"), right.frame.drop(columns="flags"))
-    assert [len(rows) for _, rows in pieces(left)] == [len(rows) for _, rows in pieces(right)]
+    assert [len(rows) for _, rows in stretches_of_runs(left)] == [len(rows) for _, rows in stretches_of_runs(right)]
 
 
 def test_runs_of_one_name_are_told_apart_by_their_files() -> None:

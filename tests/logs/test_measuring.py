@@ -9,7 +9,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.logs.measuring import NO_HELM, measure_dataset
-from shipid.measures.zigzag import zigzag
+from shipid.measures.zigzag import zigzag_measures
 from tests.measures.made_records import RECORDS, every
 
 
@@ -36,7 +36,7 @@ def test_each_run_is_measured_as_what_it_is(dataset: Dataset) -> None:
     assert kinds == {"Z": ["zigzag"], "P": ["turning", "pull-out"], "S": ["stop"], "T/1": ["turning"]}
     assert set(measured.left) == {"still", "T/2"}
     first = measured.measures.set_index(["run", "measure"]).loc[("Z", "overshoot 1")]
-    exact = zigzag(every(RECORDS["zigzag"](), 0.5))["overshoot_1"].value
+    exact = zigzag_measures(every(RECORDS["zigzag"](), 0.5))["overshoot_1"].value
     assert (first["value"], first["unit"]) == (pytest.approx(np.degrees(exact)), "deg")
     assert set(measured.criteria["run"]) == {"Z", "P", "S", "T/1"}
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import BREAK, Dataset, flag_bit, pieces
+from shipid.data.dataset import BREAK, Dataset, flag_bit, stretches_of_runs
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.repairs import FLAGS, Despike, Latency, apply_repairs, despike
@@ -123,7 +123,7 @@ def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
     repairs = '\n[[repair]]\nkind = "break"\nintervals = [[99.0, 101.0]]\nreason = "a test"\n'
     repairs += '[[repair]]\nkind = "despike"\ncolumns = ["north"]\nwindow = 6\nthreshold = 10\nreason = "a test"\n'
     dataset = import_log(read_mapping(plain_mapping(repairs)), as_log(jumped, tmp_path / "log.csv"))
-    ends = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in pieces(dataset)]
+    ends = [(rows["t"].iloc[0], rows["t"].iloc[-1]) for _, rows in stretches_of_runs(dataset)]
     assert ends == [(0.0, 99.0), (101.0, 239.5)]
     assert [record["count"] for record in dataset.metadata["repairs"]] == [1, 0]
 

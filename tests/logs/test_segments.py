@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.logs.segments import kind_of, manoeuvres
 from tests.logs.conftest import as_dataset
 
@@ -83,5 +83,5 @@ def test_times_are_in_the_unit_of_the_clock() -> None:
     [([(30, 0, 0, 2.5), TURN], "turning"), ([(20, 0, 0, 2.5), *ZIGZAG], "zigzag"), ([STRAIGHT], "transit")],
 )
 def test_the_kind_of_a_run_is_what_takes_most_of_it(parts: list[Part], kind: str) -> None:
-    ((_, rows),) = pieces(recording(*parts))
+    ((_, rows),) = stretches_of_runs(recording(*parts))
     assert kind_of(rows) == kind

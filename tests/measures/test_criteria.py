@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.measures.criteria import criteria, first_limit, second_limit
+from shipid.measures.criteria import first_overshoot_limit, judge_criteria, second_overshoot_limit
 from shipid.measures.record import AT_REST, Measures
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, every
@@ -17,8 +17,8 @@ from tests.measures.test_laws import MEASURES
 )
 def test_limits_of_the_overshoots(ratio: float, first: float, second: float) -> None:
     """5.3.3.1 and 5.3.3.2: constant below L/V = 10 s and from 30 s on, linear between."""
-    assert first_limit(ratio) / DEGREE == pytest.approx(first)
-    assert second_limit(ratio) / DEGREE == pytest.approx(second)
+    assert first_overshoot_limit(ratio) / DEGREE == pytest.approx(first)
+    assert second_overshoot_limit(ratio) / DEGREE == pytest.approx(second)
 
 
 def judged(kind: str, length: float | None, **values: float) -> dict[str, tuple[float, float, bool | None, str]]:
@@ -26,7 +26,7 @@ def judged(kind: str, length: float | None, **values: float) -> dict[str, tuple[
     changed = Measures()
     for name, one in measures.items():
         changed.add(one.why or "is missing", **{name: (values.get(name, one.value), one.unit)})
-    judgements = criteria(kind, changed, length)
+    judgements = judge_criteria(kind, changed, length)
     return {one.name.rpartition("(")[2].rstrip(")"): (one.value, one.limit, one.met, one.note) for one in judgements}
 
 
@@ -34,7 +34,7 @@ def test_a_turning_circle() -> None:
     assert judged("turning", 200.0, advance=880.0, tactical_diameter=1010.0) == {
         "5.3.1": (pytest.approx(5.05), 5.0, False, "")
     }
-    rows = criteria("turning", MEASURES["turning"](every(RECORDS["turning"](), 0.5)), 200.0)
+    rows = judge_criteria("turning", MEASURES["turning"](every(RECORDS["turning"](), 0.5)), 200.0)
     assert [(one.limit, one.met) for one in rows] == [(4.5, True), (5.0, True)]
     value, _, met, note = judged("turning", 200.0, helm=20 * DEGREE)["5.3.1"]
     assert np.isfinite(value)
@@ -57,10 +57,10 @@ def test_a_turn_that_does_not_show_a_current_says_so() -> None:
     assert note == "how far current or wind carried the ship is not known: is missing"
     record = every(RECORDS["turning"](), 0.5)
     short = record.upto(int(np.argmax(np.abs(record.psi - record.psi[0]) > 200 * DEGREE)))
-    for row in criteria("turning", MEASURES["turning"](short), 200.0):
+    for row in judge_criteria("turning", MEASURES["turning"](short), 200.0):
         assert row.met is True
         assert row.note.endswith("is not known: the heading changes by less than 360 deg")
-    assert all(row.note == "" for row in criteria("turning", MEASURES["turning"](short), 200.0, calm=True))
+    assert all(row.note == "" for row in judge_criteria("turning", MEASURES["turning"](short), 200.0, calm=True))
 
 
 def test_a_zigzag() -> None:

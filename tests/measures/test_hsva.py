@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.measures.criteria import criteria
-from shipid.measures.recognise import kinds_of, record_of
-from shipid.measures.zigzag import zigzag
+from shipid.measures.criteria import judge_criteria
+from shipid.measures.recognise import recognise_kinds, record_of
+from shipid.measures.zigzag import zigzag_measures
 from shipid.units import DEGREE
 
 # README beside the files; the tank repeats them to 0.2 to 0.5 deg
@@ -29,7 +29,7 @@ def columns_of(hsva: Dataset, name: str) -> dict[str, np.ndarray]:
 def test_overshoots_are_those_of_the_readme(hsva: Dataset, name: str) -> None:
     """About the ordered course, 0, to 0.03 deg; about the heading at the execute to 0.1 deg."""
     record = record_of(columns_of(hsva, name))
-    exact, measures = zigzag(record, course=0.0), zigzag(record)
+    exact, measures = zigzag_measures(record, course=0.0), zigzag_measures(record)
     assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
     assert measures["helm"].value == pytest.approx(int(name[:2]) * DEGREE, abs=0.05 * DEGREE)
     for number, angle in enumerate(READ_OFF[name], start=1):
@@ -41,9 +41,9 @@ def test_overshoots_are_those_of_the_readme(hsva: Dataset, name: str) -> None:
 def test_a_run_at_1_hz_says_the_same(hsva: Dataset, name: str) -> None:
     """20 Hz to 1 Hz, at full scale a row every 7 s: overshoots to 0.1 deg, their times to 0.1 s."""
     columns = columns_of(hsva, name)
-    fine = zigzag(record_of(columns), course=0.0)
+    fine = zigzag_measures(record_of(columns), course=0.0)
     for offset in (0, 7, 13):
-        coarse = zigzag(record_of({key: values[offset::20] for key, values in columns.items()}), course=0.0)
+        coarse = zigzag_measures(record_of({key: values[offset::20] for key, values in columns.items()}), course=0.0)
         for number in range(1, len(READ_OFF[name]) + 1):
             for measure, tolerance in ((f"overshoot_{number}", 0.1 * DEGREE), (f"time_to_check_{number}", 0.1)):
                 assert coarse[measure].value == pytest.approx(fine[measure].value, abs=tolerance)
@@ -52,13 +52,13 @@ def test_a_run_at_1_hz_says_the_same(hsva: Dataset, name: str) -> None:
 @pytest.mark.parametrize(("name", "heading"), [("05_01", 1), ("10_05", 5), ("15_01", 1), ("20_05", 5), ("35_05", 5)])
 def test_every_zigzag_is_recognised_with_its_execute_heading(hsva: Dataset, name: str, heading: int) -> None:
     record = record_of(columns_of(hsva, name))
-    assert kinds_of(record) == (("zigzag",), "")
-    assert zigzag(record)["execute_heading"].value == pytest.approx(heading * DEGREE)
+    assert recognise_kinds(record) == (("zigzag",), "")
+    assert zigzag_measures(record)["execute_heading"].value == pytest.approx(heading * DEGREE)
 
 
 def test_a_short_log_leaves_measures_out_with_a_sentence(hsva: Dataset) -> None:
-    measures = zigzag(record_of(columns_of(hsva, "10_10_P")))
+    measures = zigzag_measures(record_of(columns_of(hsva, "10_10_P")))
     assert np.isnan(measures["period"].value)
     assert measures["period"].why == "the log ends before the fourth execute"
-    judged = {one.name: one for one in criteria("zigzag", measures, 7.0)}
+    judged = {one.name: one for one in judge_criteria("zigzag", measures, 7.0)}
     assert judged["yaw checking: 10/10 first overshoot (5.3.3.1)"].met is True  # 9.7 against 10 at L/V = 6 s

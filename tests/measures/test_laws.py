@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.criteria import criteria
-from shipid.measures.recognise import kinds_of
+from shipid.measures.criteria import judge_criteria
+from shipid.measures.recognise import recognise_kinds
 from shipid.measures.record import AT_REST, Measures, Record
 from shipid.measures.rows import measure_rows
 from shipid.simulation.standard import standard_manoeuvres
@@ -105,14 +105,14 @@ def test_what_is_missing_says_why(kind: str) -> None:
             measures = measure(record)
             assert all(np.isfinite(m.value) == (m.why == "") for m in measures.values()), measures
             measure_rows(measures, 100.0)
-        criteria(kind, MEASURES[kind](record), 100.0)
-        kinds_of(record)
+        judge_criteria(kind, MEASURES[kind](record), 100.0)
+        recognise_kinds(record)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_kinds_are_recognised(kind: str) -> None:
     """A spiral is seen to be one; which, the user has to say."""
-    kinds, why = kinds_of(every(DENSE[kind], 0.2))
+    kinds, why = recognise_kinds(every(DENSE[kind], 0.2))
     expected = {"pull-out": ("turning", "pull-out"), "spiral": (), "reverse-spiral": ()}
     assert kinds == expected.get(kind, (kind,))
     assert ("a spiral or a reverse-spiral" in why) == ("spiral" in kind)

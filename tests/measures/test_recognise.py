@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shipid.errors import DataError
-from shipid.measures.recognise import kinds_of, record_of
+from shipid.measures.recognise import recognise_kinds, record_of
 from shipid.measures.record import Record
-from shipid.measures.stopping import stop
-from shipid.measures.zigzag import zigzag
+from shipid.measures.stopping import stopping_measures
+from shipid.measures.zigzag import zigzag_measures
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, START, clock, every, made_record, nomoto
 
@@ -55,8 +55,8 @@ def test_a_tunnel_that_runs_during_a_stop_is_no_shaft_of_it(tunnel: float, aster
     given = columns(record) | {"screw.n": shaft, "bow.n": np.full(len(record.t), tunnel)}
     seen = record_of(given)
     np.testing.assert_array_equal(seen.shaft, shaft)
-    assert stop(seen)["execute"].value == START
-    assert kinds_of(seen)[0] == (("stop",) if astern < 0 else ())
+    assert stopping_measures(seen)["execute"].value == START
+    assert recognise_kinds(seen)[0] == (("stop",) if astern < 0 else ())
 
 
 @pytest.mark.parametrize("later", [-3.0, 6.0])
@@ -65,7 +65,7 @@ def test_a_stop_begins_with_the_first_of_two_shafts(later: float) -> None:
     assert record.shaft is not None
     other = np.where(record.t >= START + later, -1.0, record.shaft[0])
     seen = record_of(columns(record) | {"port.n": record.shaft, "starboard.n": other})
-    assert stop(seen)["execute"].value == START + min(later, 0.0)
+    assert stopping_measures(seen)["execute"].value == START + min(later, 0.0)
 
 
 @pytest.mark.parametrize("counted", ["to 180 deg", "to 360 deg"])
@@ -79,8 +79,8 @@ def test_azimuth_units_turned_astern_stop_a_ship(counted: str, takes: float) -> 
     if counted == "to 360 deg":
         given |= {name: given[name] % (2 * np.pi) for name in ("port.alpha", "starboard.alpha")}
     seen = record_of(given)
-    assert kinds_of(seen) == (("stop",), "")
-    assert stop(seen)["execute"].value == pytest.approx(START, abs=0.6)
+    assert recognise_kinds(seen) == (("stop",), "")
+    assert stopping_measures(seen)["execute"].value == pytest.approx(START, abs=0.6)
 
 
 @pytest.mark.parametrize("turning", [True, False])
@@ -93,8 +93,8 @@ def test_a_controllable_pitch_stops_a_ship_whose_shaft_goes_on(turning: bool, ta
     if turning:
         given["screw.n"] = np.full(len(record.t), 2.0)
     seen = record_of(given)
-    assert kinds_of(seen) == (("stop",), "")
-    assert stop(seen)["execute"].value == pytest.approx(START, abs=0.5)
+    assert recognise_kinds(seen) == (("stop",), "")
+    assert stopping_measures(seen)["execute"].value == pytest.approx(START, abs=0.5)
     ahead = record_of(given | {"screw.pitch": np.full(len(record.t), 0.9)})
     np.testing.assert_array_equal(ahead.shaft, 2.0 if turning else 1.0)
 
@@ -111,24 +111,24 @@ def test_a_helm_left_over_from_before_is_no_execute() -> None:
     psi, r, helm = nomoto(t, [(0.0, 12 * DEGREE), (30.0, 0.0), (110.0, 10 * DEGREE), (120.0, -10 * DEGREE)])
     record = every(made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), 0.1)
     later = Record(*(getattr(record, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
-    assert zigzag(later)["execute"].value == pytest.approx(110.0)
-    assert zigzag(record)["execute"].value == pytest.approx(0.0)  # put over there: she goes straight
+    assert zigzag_measures(later)["execute"].value == pytest.approx(110.0)
+    assert zigzag_measures(record)["execute"].value == pytest.approx(0.0)  # put over there: she goes straight
 
 
 def test_what_is_no_manoeuvre_says_why() -> None:
-    assert "less than 3 deg" in kinds_of(run([(START, 2)], 60.0))[1]
-    assert "turned by 90 deg" in kinds_of(run([(START, 10), (START + 5, 0)], 60.0))[1]
+    assert "less than 3 deg" in recognise_kinds(run([(START, 2)], 60.0))[1]
+    assert "turned by 90 deg" in recognise_kinds(run([(START, 10), (START + 5, 0)], 60.0))[1]
     wide = run([(START, 20), (START + 64, -20), (START + 170, 20), (START + 270, -20)], 330.0)  # a ship slow to check
-    assert "helm is reversed, but the heading changes by 90 deg or more" in kinds_of(wide)[1]
+    assert "helm is reversed, but the heading changes by 90 deg or more" in recognise_kinds(wide)[1]
     already = run([(0.0, 20), (30.0, 1), (33.0, 20)], 60.0)
     begun = Record(*(getattr(already, name)[200:] for name in ("t", "north", "east", "psi", "u", "v", "r", "helm")))
-    assert "turns already" in kinds_of(begun)[1]
+    assert "turns already" in recognise_kinds(begun)[1]
 
 
 def test_a_helm_put_amidships_for_long_is_a_pull_out_too() -> None:
     """A fifth of the time of the turn, 38 s, until the helm is moved again or the log ends."""
-    assert kinds_of(run([(10.0, 20)], 200.0)) == (("turning",), "")
-    assert kinds_of(run([(10.0, 20), (200.0, 0)], 230.0)) == (("turning",), "")
-    assert kinds_of(run([(10.0, 20), (200.0, 0)], 250.0)) == (("turning", "pull-out"), "")
-    assert kinds_of(run([(10.0, 20), (200.0, 0), (230.0, 10)], 300.0)) == (("turning",), "")
-    assert kinds_of(run([(10.0, 20), (200.0, 0), (250.0, 10)], 300.0)) == (("turning", "pull-out"), "")
+    assert recognise_kinds(run([(10.0, 20)], 200.0)) == (("turning",), "")
+    assert recognise_kinds(run([(10.0, 20), (200.0, 0)], 230.0)) == (("turning",), "")
+    assert recognise_kinds(run([(10.0, 20), (200.0, 0)], 250.0)) == (("turning", "pull-out"), "")
+    assert recognise_kinds(run([(10.0, 20), (200.0, 0), (230.0, 10)], 300.0)) == (("turning",), "")
+    assert recognise_kinds(run([(10.0, 20), (200.0, 0), (250.0, 10)], 300.0)) == (("turning", "pull-out"), "")

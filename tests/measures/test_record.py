@@ -10,14 +10,14 @@ import pytest
 from shipid.errors import DataError
 from shipid.measures.record import (
     _level_from,
-    crossing,
-    departure,
-    extreme,
-    integral,
-    mean,
-    plateaus,
-    settled,
-    value_at,
+    cubic_value_at,
+    find_plateaus,
+    integral_between,
+    maximum_between,
+    mean_between,
+    settled_mean,
+    start_of_change,
+    time_of_crossing,
 )
 from tests.measures.made_records import every, stopped
 
@@ -27,20 +27,20 @@ T = np.cumsum(np.array([0.0, 0.7, 0.4, 0.5, 0.9, 0.3, 0.6, 0.8, 0.5, 0.4]))
 def test_a_cubic_is_met_between_uneven_samples() -> None:
     cubic = (T - 2.0) * (T - 2.5) * (T - 6.0)
     for when in (0.1, 1.0, 3.33, 5.0):
-        assert value_at(T, cubic, when) == pytest.approx((when - 2) * (when - 2.5) * (when - 6))
-    assert np.isnan(value_at(T, cubic, -0.1))
-    assert np.isnan(value_at(T, cubic, T[-1] + 0.1))
+        assert cubic_value_at(T, cubic, when) == pytest.approx((when - 2) * (when - 2.5) * (when - 6))
+    assert np.isnan(cubic_value_at(T, cubic, -0.1))
+    assert np.isnan(cubic_value_at(T, cubic, T[-1] + 0.1))
 
 
 def test_crossings_go_the_way_that_is_asked_for() -> None:
     cubic = (T - 1.0) * (T - 2.9) * (T - 4.5)
-    assert crossing(T, cubic, 0.0, 0.0) == pytest.approx(1.0)
-    assert crossing(T, cubic, 0.0, 1.5, rising=False) == pytest.approx(2.9)
-    assert crossing(T, cubic, 0.0, 3.0) == pytest.approx(4.5)
-    assert crossing(T, cubic, 0.0, 4.8) == 4.8  # beyond it by then
-    assert np.isnan(crossing(T, cubic, 1e3, 0.0))
+    assert time_of_crossing(T, cubic, 0.0, 0.0) == pytest.approx(1.0)
+    assert time_of_crossing(T, cubic, 0.0, 1.5, rising=False) == pytest.approx(2.9)
+    assert time_of_crossing(T, cubic, 0.0, 3.0) == pytest.approx(4.5)
+    assert time_of_crossing(T, cubic, 0.0, 4.8) == 4.8  # beyond it by then
+    assert np.isnan(time_of_crossing(T, cubic, 1e3, 0.0))
     dip = (T - 1.4) * (T - 1.58)  # between two samples
-    assert crossing(T, dip, 0.0, 1.45) == pytest.approx(1.58)
+    assert time_of_crossing(T, dip, 0.0, 1.45) == pytest.approx(1.58)
 
 
 def test_what_has_settled_does_not_depend_on_its_sign() -> None:
@@ -48,8 +48,10 @@ def test_what_has_settled_does_not_depend_on_its_sign() -> None:
     t = np.linspace(0.0, 40.0, 81)
     rate = 1.0 - np.exp(-t / 7.0)
     for sense in (1.0, -1.0):
-        assert settled(t, sense * rate, 0.0, 40.0, sense) == pytest.approx(sense * mean(t, rate, 30.0, 40.0))
-        assert np.isnan(settled(t, sense * rate, 0.0, 40.0, sense / 10))
+        assert settled_mean(t, sense * rate, 0.0, 40.0, sense) == pytest.approx(
+            sense * mean_between(t, rate, 30.0, 40.0)
+        )
+        assert np.isnan(settled_mean(t, sense * rate, 0.0, 40.0, sense / 10))
 
 
 @pytest.mark.parametrize("decay", [0.002, 0.005, 0.02])
@@ -57,8 +59,8 @@ def test_a_decay_that_goes_on_for_long_has_not_settled(decay: float) -> None:
     """From quarter to quarter it changes by less than 5 % of the rate: it was taken for the rate that remains."""
     t = np.linspace(0.0, 40.0, 81)
     for rate in (np.exp(-decay * t), 1 / np.sqrt(1 + 2 * 10 * decay * t)):  # to 0; near neutral dr/dt goes with r^3
-        assert np.isnan(settled(t, rate, 0.0, 40.0, 1.0))
-        assert settled(t, np.full_like(t, rate[-1]), 0.0, 40.0, 1.0) == pytest.approx(rate[-1])
+        assert np.isnan(settled_mean(t, rate, 0.0, 40.0, 1.0))
+        assert settled_mean(t, np.full_like(t, rate[-1]), 0.0, 40.0, 1.0) == pytest.approx(rate[-1])
 
 
 def test_waves_do_not_keep_a_rate_from_being_settled() -> None:
@@ -66,18 +68,18 @@ def test_waves_do_not_keep_a_rate_from_being_settled() -> None:
     t = np.linspace(0.0, 40.0, 401)
     for phase in np.linspace(0, 6, 13):
         rate = 1.0 + 0.1 * np.sin(2 * np.pi * t / 1.1 + phase)
-        assert settled(t, rate, 0.0, 40.0, 1.0) == pytest.approx(1.0, abs=0.02)
+        assert settled_mean(t, rate, 0.0, 40.0, 1.0) == pytest.approx(1.0, abs=0.02)
 
 
 def test_integrals_begin_and_end_between_samples() -> None:
-    assert integral(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3 * 3.8 + 4.1**2 - 0.3**2)
-    assert mean(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3.0 + 4.4)
+    assert integral_between(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3 * 3.8 + 4.1**2 - 0.3**2)
+    assert mean_between(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3.0 + 4.4)
 
 
 def test_extremes_lie_inside() -> None:
-    when, value = extreme(T, 3.0 - (T - 2.2) ** 2, 0.0, 5.0)
+    when, value = maximum_between(T, 3.0 - (T - 2.2) ** 2, 0.0, 5.0)
     assert (when, value) == (pytest.approx(2.2), pytest.approx(3.0))
-    assert np.isnan(extreme(T, T, 0.0, 5.0)[0])  # still rising where it ends
+    assert np.isnan(maximum_between(T, T, 0.0, 5.0)[0])  # still rising where it ends
 
 
 @pytest.mark.parametrize("cubic", [0.0, 1e-12, 1e-6, 0.02])
@@ -88,7 +90,7 @@ def test_extremes_of_drawn_records_are_exact(cubic: float) -> None:
         t = np.cumsum(rng.uniform(0.1, 0.6, 40)) * 10.0 ** rng.integers(-1, 3)
         middle, spread = t[20] + rng.uniform(-0.4, 0.4) * (t[20] - t[19]), t[30] - t[20]
         x = (t - middle) / spread
-        when, value = extreme(t, 3.0 - x**2 + cubic * x**3, t[14], t[26])
+        when, value = maximum_between(t, 3.0 - x**2 + cubic * x**3, t[14], t[26])
         assert when == pytest.approx(middle, abs=1e-7 * spread)
         assert value == pytest.approx(3.0, abs=1e-12)
 
@@ -99,7 +101,7 @@ def test_an_angle_in_motion_is_traced_back(rate: float) -> None:
     t = np.arange(200) * 0.1
     angle = np.clip(rate * (t - 3.21), 0, 35)
     half = int(np.argmax(angle >= 17.5))
-    assert departure(t, angle, half) == pytest.approx(3.21, abs=1e-6)
+    assert start_of_change(t, angle, half) == pytest.approx(3.21, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", [0])
@@ -113,20 +115,20 @@ def test_a_noisy_or_coarse_angle_is_traced_back_to_its_level(digits: str, interv
     angle = 3 + np.clip(2.5 * (t - begin), 0, 32)
     angle = angle + random.normal(0, 0.1, len(t)) if digits == "noise" else np.round(2 * angle) / 2
     half = int(np.argmax(angle >= 17.5))
-    assert departure(t, angle, half) == pytest.approx(begin, abs=0.3)
+    assert start_of_change(t, angle, half) == pytest.approx(begin, abs=0.3)
 
 
 def test_corrections_before_an_order_do_not_belong_to_it() -> None:
     """A helmsman who holds the course with 3 deg to both sides, and then orders 10 deg in one row."""
     t = np.arange(0, 100, 0.1)
     order = np.where(t >= 50, 10.0, 3.0 * np.sign(np.sin(t / 4)))
-    assert departure(t, order, 500) == t[500]
+    assert start_of_change(t, order, 500) == t[500]
 
 
 def test_plateaus_are_distinguished_from_the_way_between_them() -> None:
     t = np.arange(0, 90.0, 0.5)
     values = np.where(t < 30, 5.0, np.where(t < 60, 0.0 + 5 * np.exp(-(t - 30) / 3), -5 + 5 * np.exp(-(t - 60) / 3)))
-    levels = plateaus(t, values, 0.1)
+    levels = find_plateaus(t, values, 0.1)
     assert [round(values[b]) for _, b in levels] == [5, 0, -5]
     assert [t[b] for _, b in levels] == [30.0, 60.0, 89.5]  # a row at the jump belongs to both
 

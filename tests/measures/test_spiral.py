@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.spiral import _at_zero, levels, reverse_spiral, spiral
+from shipid.measures.spiral import _at_zero, helm_levels, reverse_spiral_measures, spiral_measures
 from shipid.units import DEGREE
 from tests.measures.made_records import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral, unstable_helm
 
 
 def test_a_stable_ship_has_no_loop() -> None:
     record = every(stable_spiral(), 0.5)
-    measures, points = spiral(record), levels(record)
+    measures, points = spiral_measures(record), helm_levels(record)
     assert measures["loop_width"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
     assert measures["loop_height"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
     assert measures["levels"].value == len(LEVELS)
@@ -27,7 +27,7 @@ def test_what_is_left_of_a_turn_is_no_loop() -> None:
     record = every(stable_spiral(), 0.5)
     back = record.t >= START + HOLD * 8
     late = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.004 * GAIN * DEGREE, 0.0)
-    measures = spiral(replace(record, r=record.r + late))
+    measures = spiral_measures(replace(record, r=record.r + late))
     assert measures["loop_width"].value == measures["loop_height"].value == 0.0
 
 
@@ -37,7 +37,7 @@ def test_levels_may_be_as_close_as_the_helm_is_quiet(share: float, noise: float)
     record = every(stable_spiral(), 0.5)
     scatter = noise * np.random.default_rng(0).standard_normal(len(record.t)) * DEGREE
     less = replace(record, helm=share * record.helm + scatter, r=share * record.r, psi=share * record.psi)
-    measures, points = spiral(less), levels(less)
+    measures, points = spiral_measures(less), helm_levels(less)
     assert measures["levels"].value == len(LEVELS)
     np.testing.assert_allclose(points.helm, share * np.array(LEVELS) * DEGREE, atol=1e-9 + 0.5 * noise * DEGREE)
     assert measures["loop_width"].value == pytest.approx(0.0, abs=(1e-3 + 0.5 * noise) * DEGREE)
@@ -48,7 +48,7 @@ def test_a_loop_as_wide_as_it_was_made() -> None:
     record = every(stable_spiral(), 0.5)
     back = record.t >= START + HOLD * 8
     jump = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.2 * DEGREE, 0.0)
-    measures = spiral(replace(record, r=record.r + jump))
+    measures = spiral_measures(replace(record, r=record.r + jump))
     assert measures["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
     assert measures["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
@@ -67,7 +67,7 @@ def test_a_straight_course_before_and_after_belongs_to_no_way(straight: float) -
         for name in ("north", "east", "psi", "u", "v", "r", "helm")
     }
     t = np.concatenate([idle, record.t + straight, record.t[-1] + 0.5 + straight + idle])
-    measures = spiral(replace(record, t=t, shaft=None, **longer))
+    measures = spiral_measures(replace(record, t=t, shaft=None, **longer))
     assert measures["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
     assert measures["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
 
@@ -76,7 +76,7 @@ def test_a_ship_that_no_helm_turns_back_has_no_height_of_a_loop() -> None:
     """Both ways lie on one branch: their rates at helm 0 are equal, which is no sign of a stable ship."""
     record = every(stable_spiral(), 0.5)
     one_side = np.where(record.t >= START, 2 * GAIN * np.abs(LEVELS).max() * DEGREE, 0.0)
-    measures = spiral(replace(record, r=record.r + one_side))
+    measures = spiral_measures(replace(record, r=record.r + one_side))
     for name in ("neutral_helm", "loop_width", "loop_height", "levels_apart"):
         assert np.isnan(measures[name].value)
         assert measures[name].why
@@ -84,7 +84,7 @@ def test_a_ship_that_no_helm_turns_back_has_no_height_of_a_loop() -> None:
 
 def test_reverse_spiral_finds_the_folds() -> None:
     """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
-    measures = reverse_spiral(every(reverse(), 0.5))
+    measures = reverse_spiral_measures(every(reverse(), 0.5))
     assert measures["levels"].value == len(RATES)
     apart = np.diff(np.sort(RATES)).max() * DEGREE  # a fold between two rates is cut off
     assert measures["levels_apart"].value == pytest.approx(apart, rel=1e-2)
@@ -96,7 +96,7 @@ def test_the_helm_for_the_next_rate_has_no_part_in_a_level() -> None:
     """The helm is over for the next rate before the ship turns at another one: levels were up to 0.7 deg off."""
     record = reverse()
     led = unstable_helm(record.r) + 20.0 * np.gradient(record.r, record.t)
-    measures = reverse_spiral(every(replace(record, helm=led), 0.5))
+    measures = reverse_spiral_measures(every(replace(record, helm=led), 0.5))
     assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=1e-3 * DEGREE)
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
 

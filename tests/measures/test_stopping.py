@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.stopping import stop
+from shipid.measures.stopping import stopping_measures
 from tests.measures.made_records import DECELERATION, SPEED, START, VEER, every, stopped
 
 
 @pytest.mark.parametrize("interval", [0.1, 1.0])
 def test_reaches_of_a_constant_deceleration(interval: float) -> None:
     """Track U^2 / 2a in U / a; head reach and deviation as the integral of U cos, sin of the heading."""
-    measures, time = stop(every(stopped(), interval)), SPEED / DECELERATION
+    measures, time = stopping_measures(every(stopped(), interval)), SPEED / DECELERATION
     s = np.linspace(0, time, 200001)
     u = SPEED - DECELERATION * s
     assert measures["execute"].value == START
@@ -29,12 +29,12 @@ def test_a_shaft_that_is_stopped_is_ordered_to_stop() -> None:
     record = every(stopped(), 0.5)
     assert record.shaft is not None
     drifting = replace(record, shaft=np.maximum(record.shaft, 0.0))
-    for name, one in stop(record).items():
-        assert stop(drifting)[name].value == pytest.approx(one.value), name
+    for name, one in stopping_measures(record).items():
+        assert stopping_measures(drifting)[name].value == pytest.approx(one.value), name
     astern = replace(record, shaft=np.full_like(record.t, -1.0))
-    assert stop(astern)["execute"].value == record.t[0]
+    assert stopping_measures(astern)["execute"].value == record.t[0]
 
 
 def test_without_a_shaft_nothing_is_known() -> None:
-    measures = stop(replace(every(stopped(), 1.0), shaft=None))
+    measures = stopping_measures(replace(every(stopped(), 1.0), shaft=None))
     assert all(one.why == "the shaft is not ordered to stop or astern" for one in measures.values())

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.criteria import criteria
-from shipid.measures.turning import pull_out, turning
+from shipid.measures.criteria import judge_criteria
+from shipid.measures.turning import pull_out_measures, turning_measures
 from shipid.units import DEGREE
 from tests.measures.made_records import (
     DRIFT,
@@ -27,7 +27,7 @@ from tests.measures.made_records import (
 
 def test_a_perfect_circle_has_exact_measures() -> None:
     """x = R (sin(psi - b) + sin b), y = R (cos b - cos(psi - b)) with R = V / r and drift b."""
-    measures, radius = turning(every(perfect_circle(), 0.1)), SPEED / RATE
+    measures, radius = turning_measures(every(perfect_circle(), 0.1)), SPEED / RATE
     exact = {
         "execute": START,
         "helm": 35 * DEGREE,
@@ -64,40 +64,40 @@ def test_a_current_shows_in_a_whole_circle_and_its_track_is_not_judged(towards: 
         u=calm.u + stream * np.cos(towards - calm.psi),
         v=calm.v + stream * np.sin(towards - calm.psi),
     )
-    measures = turning(carried)
+    measures = turning_measures(carried)
     assert measures["current_speed"].value == pytest.approx(stream, rel=0.01)
-    rows_of = criteria("turning", measures, 200.0)
+    rows_of = judge_criteria("turning", measures, 200.0)
     assert [row.met for row in rows_of] == [None, None]
     assert all(f"carried the ship at {stream:.2g} m/s" in row.note for row in rows_of)
-    assert all("carried" not in row.note for row in criteria("turning", turning(calm), 200.0))
+    assert all("carried" not in row.note for row in judge_criteria("turning", turning_measures(calm), 200.0))
 
 
 def test_an_unsteady_turn_has_no_steady_diameter() -> None:
     """Short of a full turn, or while the rate still falls by 5 % from one quarter turn to the next."""
     whole = every(perfect_circle(), 0.1)
-    short = turning(rows(whole, slice(0, round((START + 6.0 / RATE) / 0.1))))
+    short = turning_measures(rows(whole, slice(0, round((START + 6.0 / RATE) / 0.1))))
     assert np.isfinite(short["tactical_diameter"].value)
     assert short["steady_diameter"].why == "the heading changes by less than 360 deg"
     slowing = replace(whole, psi=6.0 * np.log1p(whole.psi / 6.0), helm=whole.helm)
-    assert "not steady" in turning(slowing)["steady_rate"].why
+    assert "not steady" in turning_measures(slowing)["steady_rate"].why
 
 
 def test_steady_rate_of_nomoto() -> None:
-    assert turning(every(circle(), 0.5))["steady_rate"].value == pytest.approx(GAIN * 35 * DEGREE, rel=1e-4)
+    assert turning_measures(every(circle(), 0.5))["steady_rate"].value == pytest.approx(GAIN * 35 * DEGREE, rel=1e-4)
 
 
 def test_pull_out_of_a_stable_and_of_an_unstable_ship() -> None:
     record = every(released(), 0.5)
-    measures = pull_out(record)
+    measures = pull_out_measures(record)
     assert measures["turning_rate"].value == pytest.approx(GAIN * 20 * DEGREE, rel=1e-4)
     assert measures["residual_rate"].value == pytest.approx(0.0, abs=1e-5)
     left = 0.3 * DEGREE
-    measures = pull_out(replace(record, r=record.r + left * (record.t > 110)))
+    measures = pull_out_measures(replace(record, r=record.r + left * (record.t > 110)))
     assert measures["residual_rate"].value == pytest.approx(left, rel=1e-3)
     again = replace(record, helm=record.helm - 20 * DEGREE * (record.t > 200), r=record.r + (record.t > 200))
-    same = pull_out(again)  # the helm goes over to the other side later
+    same = pull_out_measures(again)  # the helm goes over to the other side later
     assert same["residual_rate"].value == pytest.approx(0.0, abs=1e-4)
-    early = pull_out(rows(record, slice(0, 2 * 120)))
+    early = pull_out_measures(rows(record, slice(0, 2 * 120)))
     assert "still changes" in early["residual_rate"].why
 
 
@@ -110,7 +110,7 @@ def test_a_helm_that_is_let_go_gradually_is_left_amidships_until_it_moves_again(
     gradual = replace(record, helm=np.where(record.t < 110, record.helm, gear))
     again = replace(gradual, helm=np.where(record.t > 200, -20 * DEGREE, gradual.helm), r=record.r + (record.t > 200))
     for one, end in ((gradual, 250.0), (again, 200.0)):
-        measures = pull_out(one)
+        measures = pull_out_measures(one)
         rate, left = GAIN * 20 * DEGREE, np.exp(-(end - 110.0) / TIME)
         assert measures["heading_change"].value == pytest.approx(rate * TIME * (1 - left), rel=2e-3)
         assert measures["residual_rate"].value == pytest.approx(0.0, abs=1e-4)

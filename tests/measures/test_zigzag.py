@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.recognise import kinds_of
-from shipid.measures.record import HelmOver, Record
-from shipid.measures.zigzag import last_over, zigzag
+from shipid.measures.recognise import recognise_kinds
+from shipid.measures.record import FirstExecute, Record
+from shipid.measures.zigzag import last_row_of_zigzag, zigzag_measures
 from shipid.units import DEGREE
 from tests.measures.made_records import (
     FINE,
@@ -34,7 +34,7 @@ def test_overshoots_and_times_of_nomoto(helm: float, heading: float, interval: f
     legs, peaks = zigzag_legs(helm * DEGREE, heading * DEGREE, 8)
     t = clock(200.0)
     psi, r, order = nomoto(t, legs)
-    measures = zigzag(every(made_record(t, psi, r, order, np.full_like(t, 5.0), 0 * t), interval))
+    measures = zigzag_measures(every(made_record(t, psi, r, order, np.full_like(t, 5.0), 0 * t), interval))
     assert measures["execute_heading"].value == pytest.approx(heading * DEGREE)
     assert measures["execute"].value == pytest.approx(START)
     # the helm jumps, so the heading has kinks in its third derivative, which 1 Hz rounds off
@@ -52,16 +52,19 @@ def test_overshoots_count_from_the_execute_heading_not_from_the_helm() -> None:
     """Where a measured rudder follows 0.5 s after the order, the overshoot still counts from the execute heading."""
     record = every(zigzag_10(), 0.1)
     late = replace(record, helm=np.append(np.zeros(5), record.helm[:-5]))
-    measures, expected = zigzag(late, course=0.0)["overshoot_1"], zigzag(record, course=0.0)["overshoot_1"]
+    measures, expected = (
+        zigzag_measures(late, course=0.0)["overshoot_1"],
+        zigzag_measures(record, course=0.0)["overshoot_1"],
+    )
     assert measures.value == pytest.approx(expected.value, abs=1e-9)
-    assert zigzag(late)["execute_heading"].value == pytest.approx(10 * DEGREE)
+    assert zigzag_measures(late)["execute_heading"].value == pytest.approx(10 * DEGREE)
 
 
 def test_execute_heading_and_course_may_be_given() -> None:
     record = every(zigzag_10(), 0.1)
-    given = zigzag(record, execute_heading=8 * DEGREE, course=0.5 * DEGREE)
+    given = zigzag_measures(record, execute_heading=8 * DEGREE, course=0.5 * DEGREE)
     assert given["execute_heading"].value == 8 * DEGREE
-    difference = zigzag(record)["overshoot_1"].value - given["overshoot_1"].value
+    difference = zigzag_measures(record)["overshoot_1"].value - given["overshoot_1"].value
     assert difference == pytest.approx(-1.5 * DEGREE, abs=1e-3 * DEGREE)
 
 
@@ -71,10 +74,10 @@ def test_a_manoeuvre_after_a_long_pause_is_not_of_the_zigzag() -> None:
     helm = np.select([t < 10, t < 30, t < 50, t < 52, t < 70, t < 170, t < 185], [0, 10, -10, 0, 10, 0, 10], 0) * DEGREE
     still = np.zeros_like(t)
     record = Record(t, still, still, still, still, still, still, helm)
-    over = HelmOver(start=10.0, row=10, angle=10 * DEGREE, side=1.0)
-    assert last_over(record, over) == 69
+    over = FirstExecute(start=10.0, row=10, angle=10 * DEGREE, side=1.0)
+    assert last_row_of_zigzag(record, over) == 69
     soon = replace(record, t=np.interp(t, [0, 70, 170, 199], [0, 70, 80, 109]))  # amidships for 10 s only
-    assert last_over(soon, over) == 184
+    assert last_row_of_zigzag(soon, over) == 184
 
 
 @pytest.mark.parametrize(("heading", "interval"), [(7.0, 0.1), (10.0, 0.5), (12.0, 0.1)])
@@ -86,7 +89,7 @@ def test_the_execute_heading_is_seen_from_a_measured_helm(heading: float, interv
     for row in range(1, len(t)):
         helm[row] = helm[row - 1] + np.clip(order[row] - helm[row - 1], -0.02 * DEGREE, 0.02 * DEGREE)
     record = every(made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t), interval)
-    assert zigzag(record)["execute_heading"].value / DEGREE == pytest.approx(heading)
+    assert zigzag_measures(record)["execute_heading"].value / DEGREE == pytest.approx(heading)
 
 
 @pytest.mark.parametrize("held", [-7.0, -5.5, 5.5, 7.0])
@@ -105,8 +108,8 @@ def test_a_helm_that_holds_the_course_before_is_no_execute(held: float, wait: fl
     shown = np.convolve(np.append(np.zeros(round(slow / FINE)), order), np.ones(round(slow / FINE) + 1), "valid")
     shown = shown / (round(slow / FINE) + 1) + held * DEGREE
     record = every(made_record(t, psi, r, shown, np.full_like(t, 5.0), 0 * t), 0.5)
-    measures = zigzag(record)
-    assert kinds_of(record)[0] == ("zigzag",)
+    measures = zigzag_measures(record)
+    assert recognise_kinds(record)[0] == ("zigzag",)
     assert measures["execute"].value == pytest.approx(wait, abs=0.25 if slow else 1e-9)
     assert measures["helm"].value == pytest.approx(10 * DEGREE)
     assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
@@ -125,7 +128,7 @@ def test_a_pass_between_two_rows_is_said_and_no_later_one_takes_its_place(interv
     fine = made_record(t, psi, r, helm, np.full_like(t, 5.0), 0 * t)
     for first in range(0, int(interval / FINE), 25):
         record = Record(*(getattr(fine, name)[first :: int(interval / FINE)] for name in RECORDED))
-        period = zigzag(record, execute_heading=10 * DEGREE, course=0.0)["period"]
+        period = zigzag_measures(record, execute_heading=10 * DEGREE, course=0.0)["period"]
         unseen += "rows are too far apart" in period.why
         if np.isfinite(period.value):
             assert period.value == pytest.approx(cycle, abs=interval)

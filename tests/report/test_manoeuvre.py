@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.measures.criteria import criteria
+from shipid.measures.criteria import judge_criteria
 from shipid.measures.rows import criterion_rows, measure_rows
-from shipid.measures.spiral import levels
+from shipid.measures.spiral import helm_levels
 from shipid.report import manoeuvre
 from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
 from shipid.report.paths import outline_at
@@ -27,14 +27,14 @@ def content(kind: str, name: str = "a ship") -> ManoeuvreContent:
     record = every(RECORDS[kind](), 0.5)
     columns = {key: getattr(record, key) for key in ("t", "north", "east", "psi", "u", "v", "r", "helm")}
     shaft = np.zeros(len(record.t)) if record.shaft is None else record.shaft
-    measures, points = TRIALS[kind].measures(record), levels(record)
+    measures, points = TRIALS[kind].measures(record), helm_levels(record)
     return ManoeuvreContent(
         title=f"{name}: {kind}",
         name=kind,
         first=TRIALS[kind].first,
         log=pd.DataFrame({**columns, "shaft": shaft}),
         measures=pd.DataFrame(measure_rows(measures, 120.0)),
-        criteria=pd.DataFrame(criterion_rows(criteria(kind, measures, 120.0))),
+        criteria=pd.DataFrame(criterion_rows(judge_criteria(kind, measures, 120.0))),
         outline=np.array([[60.0, 0.0], [40.0, 10.0], [-60.0, 10.0], [-60.0, -10.0], [40.0, -10.0]]),
         levels=pd.DataFrame(
             {"helm": points.helm, "rate": points.rate} if kind == "spiral" else {"helm": [], "rate": []}

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.measures.recognise import kinds_of, record_of
-from shipid.measures.zigzag import zigzag
+from shipid.measures.recognise import recognise_kinds, record_of
+from shipid.measures.zigzag import zigzag_measures
 from shipid.simulation.manoeuvre import (
     KINDS,
     ConstantOrders,
@@ -93,7 +93,7 @@ def test_a_zigzag_counts_from_the_heading_at_the_first_order(side: str, beta: fl
     beyond = helm[:-1] * (psi[executes[1:]] - psi[first]) - 10
     assert (beyond >= 0).all()
     assert (beyond <= 0.1 * np.abs(r).max()).all()
-    measures = zigzag(record_of({name: log[name].to_numpy() for name in log if name != "run"}))
+    measures = zigzag_measures(record_of({name: log[name].to_numpy() for name in log if name != "run"}))
     assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
     assert 0 < measures["overshoot_1"].value < 2 * DEGREE
 
@@ -215,7 +215,7 @@ def test_a_controllable_pitch_is_reversed_in_a_crash_stop() -> None:
     reached = log["actual.propeller.pitch"].to_numpy()
     np.testing.assert_allclose(reached, np.where(before, 0.8, np.maximum(0.8 - 0.05 * (log["t"] - 3), -0.5)), atol=1e-9)
     assert np.interp(10.0, log["t"], log["u"]) > 0 > log["u"].min()
-    assert kinds_of(record_of(log))[0] == ("stop",)
+    assert recognise_kinds(record_of(log))[0] == ("stop",)
 
 
 @pytest.mark.parametrize("signal", ["multisine", "aprbs"])

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset, pieces, read_dataset, write_dataset
+from shipid.data.dataset import Dataset, read_dataset, stretches_of_runs, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
 from shipid.hybrid.alone import Unchanged
@@ -18,7 +18,7 @@ from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.predictor import Predictor, fit
 from shipid.study import aboard
-from shipid.study.aboard import Played, play, summed_up, write
+from shipid.study.aboard import Replay, play_aboard, replay_summary, write_replay_points
 from shipid.study.apply import table_of_stretch
 from shipid.units import percent_text
 from shipid.vessel.load import load_vessel
@@ -28,8 +28,8 @@ from tests.logs.conftest import as_dataset, turning
 STEP = 5.0
 
 
-def summary(played: Played) -> list[str]:
-    return [line.text for line in summed_up(played)]
+def summary(played: Replay) -> list[str]:
+    return [line.text for line in replay_summary(played)]
 
 
 def log(seed=0, rows=60):
@@ -77,7 +77,9 @@ def test_later_rows_change_nothing_that_was_seen(predictor, tmp_path):
     later = changed["t"] > 150
     changed.loc[later, ["u", "rudder.delta"]] = [3.0, 0.3]
     (tmp_path / "b").mkdir()
-    first, second = (play(predictor, saved(f, d)).points for f, d in ((whole, tmp_path), (changed, tmp_path / "b")))
+    first, second = (
+        play_aboard(predictor, saved(f, d)).points for f, d in ((whole, tmp_path), (changed, tmp_path / "b"))
+    )
     early = first["t"] <= 150
     columns = ["t", "ahead", "north", "east"]
     pd.testing.assert_frame_equal(first.loc[early, columns], second.loc[early, columns])
@@ -96,17 +98,17 @@ def test_the_alarm_stands_until_the_observer_has_run_as_long_as_in_training(pred
     whole = replace(whole, physics=replace(whole.physics, observer=Observer(waves=(0.0,), change=(1.0,))))
     cell = whole.save(tmp_path / "cell.npz")
     since = 5.0 * (np.arange(len(frame)) % 30)
-    played = play(cell, dataset, every=5.0)
+    played = play_aboard(cell, dataset, every=5.0)
     np.testing.assert_array_equal(played.instants["outside"], since[: len(played.instants)] < run_up)
     known = read_dataset(dataset)
-    tables = [table_of_stretch(Predictor.load(cell), known, run, rows) for run, rows in pieces(known)]
+    tables = [table_of_stretch(Predictor.load(cell), known, run, rows) for run, rows in stretches_of_runs(known)]
     table = pd.concat(tables).groupby("t")["outside"].first()
     np.testing.assert_array_equal(table, pd.Series(since < run_up, index=frame["t"].to_numpy())[table.index])
 
 
 def test_an_officer_sees_path_alarm_and_latency(predictor, tmp_path):
     frame = log()
-    played = play(predictor, saved(frame, tmp_path), every=10.0)
+    played = play_aboard(predictor, saved(frame, tmp_path), every=10.0)
     assert len(played.instants) == 30
     expected = frame["rudder.delta"].abs().to_numpy()[::2] > 0.1
     np.testing.assert_array_equal(played.instants["outside"], expected)
@@ -117,17 +119,17 @@ def test_an_officer_sees_path_alarm_and_latency(predictor, tmp_path):
     assert any("latency" in line for line in lines)
     assert any("orders stay as they are" in line for line in lines)
     assert any("alarm" in line for line in lines)
-    kinds = {line.text.partition(":")[0]: line.kind for line in summed_up(played)}
+    kinds = {line.text.partition(":")[0]: line.kind for line in replay_summary(played)}
     assert next(iter(kinds.values())) == "predictions"
     assert (kinds["alarm"], kinds["the plan was"], kinds["latency"]) == ("alarm", "limit", "detail")
-    write(played, tmp_path / "seen.csv")
+    write_replay_points(played, tmp_path / "seen.csv")
     assert {"ahead", "north", "outside", "latency"} <= set(pd.read_csv(tmp_path / "seen.csv").columns)
 
 
 def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tmp_path):
     _, file = banded
     frame = log()
-    played = play(file, saved(frame, tmp_path), level=0.9)
+    played = play_aboard(file, saved(frame, tmp_path), level=0.9)
     assert (played.instants["factor"] == 1).all()
     instants, points = played.instants, played.points
     turned = np.hypot(points["north"], points["east"]).notna()
@@ -148,9 +150,9 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
         assert instants["reach"][i] == pytest.approx(reach, rel=1e-9)
         held.append(reach <= 1)
     (line,) = (line for line in summary(played) if line.startswith("band of 90 %"))
-    assert [one.text for one in summed_up(played) if one.kind == "band"] == [line]
+    assert [one.text for one in replay_summary(played) if one.kind == "band"] == [line]
     assert f"held {percent_text(np.mean(held))} of the {len(held)} whole paths" in line
-    write(played, tmp_path / "seen.csv")
+    write_replay_points(played, tmp_path / "seen.csv")
     assert {"band_along", "band_across", "band_course", "band_factor"} <= set(
         pd.read_csv(tmp_path / "seen.csv").columns
     )
@@ -158,7 +160,7 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
 
 def test_a_summary_says_that_nothing_is_promised_in_alarm(banded, tmp_path):
     _, file = banded
-    played = play(file, saved(log(), tmp_path), level=0.9)
+    played = play_aboard(file, saved(log(), tmp_path), level=0.9)
     lines = summary(replace(played, instants=played.instants.assign(outside=True)))
     (line,) = (line for line in lines if line.startswith("band of 90 %"))
     assert line.endswith("whole paths that can be judged, all in alarm, where nothing is promised")
@@ -169,7 +171,7 @@ def test_a_band_wider_than_a_ship_can_go_is_none(banded, tmp_path):
     fitted, _ = banded
     still = replace(fitted.bands, spread=1e-9 * fitted.bands.spread)
     file = replace(fitted, bands=still).save(tmp_path / "still.npz")
-    played = play(file, saved(log(), tmp_path), level=0.9)
+    played = play_aboard(file, saved(log(), tmp_path), level=0.9)
     ahead = [line for line in summary(played) if " s ahead:" in line]
     (line,) = ahead
     assert "no useful band: it is wider than a ship can go" in line
@@ -189,7 +191,7 @@ def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(b
         parts = [log(seed, 20).assign(run=f"r{seed}") for seed in range(8)]
         for part in parts:
             part[["north", "east"]] *= share
-        played = play(file, saved(pd.concat(parts, ignore_index=True), tmp_path), level=0.8)
+        played = play_aboard(file, saved(pd.concat(parts, ignore_index=True), tmp_path), level=0.8)
         said.append(any("by more than chance" in line for line in summary(played)))
     assert said == [False, True]
     ways = [" ".join(summary(replace(played, plan=plan))) for plan in (False, True)]
@@ -204,7 +206,7 @@ def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
     changed.loc[later, "north"] += 5000.0
     (tmp_path / "b").mkdir()
     first, second = (
-        play(file, saved(f, d), level=0.5, rate=0.3) for f, d in ((whole, tmp_path), (changed, tmp_path / "b"))
+        play_aboard(file, saved(f, d), level=0.5, rate=0.3) for f, d in ((whole, tmp_path), (changed, tmp_path / "b"))
     )
     early = first.instants["t"] <= 150
     pd.testing.assert_series_equal(first.instants["factor"][early], second.instants["factor"][early])
@@ -221,14 +223,14 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
     _, file = banded
     target = saved(log(), tmp_path)
     with pytest.raises(DataError, match="needs 19 runs or more"):
-        play(file, target, level=0.95)
+        play_aboard(file, target, level=0.95)
     with pytest.raises(DataError, match="of the kind 'zigzag'"):
-        play(file, target, level=0.9, kind="zigzag")
+        play_aboard(file, target, level=0.9, kind="zigzag")
     with pytest.raises(DataError, match="has no band"):
-        play(predictor, target, level=0.9)
-    wider, usual = (play(file, target, every=50.0, level=0.5, kind=kind).points for kind in ("zigzag", None))
+        play_aboard(predictor, target, level=0.9)
+    wider, usual = (play_aboard(file, target, every=50.0, level=0.5, kind=kind).points for kind in ("zigzag", None))
     np.testing.assert_allclose(wider["band_along"], 2 * usual["band_along"])
-    short = play(file, saved(log().iloc[:4], tmp_path), level=0.5)
+    short = play_aboard(file, saved(log().iloc[:4], tmp_path), level=0.5)
     assert any("no whole path can be judged" in line for line in summary(short))
 
 
@@ -237,18 +239,18 @@ def test_instants_too_far_apart_are_not_said_to_be_runs_too_short(tmp_path):
     file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 3 s
     target = saved(log().assign(V_w=0.0, beta_w=0.0), tmp_path)
     with pytest.raises(DataError, match=r"^--every: 10000: no instant so many s apart has the past of 3 s .* as 3$"):
-        play(file, target, every=1e4)
-    assert len(play(file, target, every=3.0).instants)
+        play_aboard(file, target, every=1e4)
+    assert len(play_aboard(file, target, every=3.0).instants)
     with pytest.raises(DataError, match="no run is as long as the past of 3 s"):
-        play(file, saved(log().iloc[:1].assign(V_w=0.0, beta_w=0.0), tmp_path), every=1e4)
+        play_aboard(file, saved(log().iloc[:1].assign(V_w=0.0, beta_w=0.0), tmp_path), every=1e4)
 
 
 def test_alarms_are_at_the_times_that_the_log_has():
     """Dates where its clock has them, and not seconds since 1970; else seconds of its clock."""
     rows = pd.DataFrame({"run": "a", "t": [1652954400.0, 1652954405.0, 1652954410.0], "outside": [True, True, False]})
-    assert aboard._spans(rows) == ["  a: from 2022-05-19 10:00:00 to 2022-05-19 10:00:05 UTC"]
+    assert aboard._longest_alarms(rows) == ["  a: from 2022-05-19 10:00:00 to 2022-05-19 10:00:05 UTC"]
     early = rows.assign(t=[36000.0, 36005.5, 36010.0])
-    assert aboard._spans(early) == ["  a: from 36000 to 36005.5 s"]
+    assert aboard._longest_alarms(early) == ["  a: from 36000 to 36005.5 s"]
 
 
 def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
@@ -256,7 +258,7 @@ def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
     whole, file = log(), banded[1]
     gap = whole[(whole["t"] <= 100) | (whole["t"] >= 150)].reset_index(drop=True)
     (tmp_path / "gap").mkdir()
-    first, second = (play(file, saved(f, d), level=0.5) for f, d in ((whole, tmp_path), (gap, tmp_path / "gap")))
+    first, second = (play_aboard(file, saved(f, d), level=0.5) for f, d in ((whole, tmp_path), (gap, tmp_path / "gap")))
     before = second.instants["t"] <= 100
     inside = second.points["t"] + second.points["ahead"]
     inside = (inside > 100) & (inside < 150)
@@ -276,7 +278,9 @@ def test_errors_on_a_coarse_log_are_those_of_the_ship(tmp_path):
     """In a turn with rows 5 s apart and a step of 1 s errors are as with rows of 1 s, not those to a chord."""
     steady = Predictor(Physics(None, 10, 1.0), "alone", Unchanged({}), {}, {}).save(tmp_path / "cell.npz")
     many, few = (
-        play(steady, write_dataset(as_dataset(turning(np.arange(0.0, 101.0, apart), u=7.0)), tmp_path / "log.parquet"))
+        play_aboard(
+            steady, write_dataset(as_dataset(turning(np.arange(0.0, 101.0, apart), u=7.0)), tmp_path / "log.parquet")
+        )
         for apart in (1.0, 5.0)
     )
     words = "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated"
@@ -297,6 +301,8 @@ def test_a_heading_that_wraps_changes_no_prediction():
     windows = cut_windows(data, horizon=4, step=STEP, interval=5.0, past=4)
     method = PathDrawn(trials=1, units=8, terms=2, memory=Memory(turned=(20.0,)))
     fitted = fit(method, Physics(None, 4, STEP), windows)
-    tables = [table_of_stretch(fitted, one, run, rows) for one in (data, turned) for run, rows in pieces(one)]
+    tables = [
+        table_of_stretch(fitted, one, run, rows) for one in (data, turned) for run, rows in stretches_of_runs(one)
+    ]
     for name in ("cooperative_north", "cooperative_east"):
         np.testing.assert_allclose(tables[1][name], tables[0][name], atol=1e-6)

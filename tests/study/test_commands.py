@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.data.dataset import Dataset, sample, write_dataset
+from shipid.data.dataset import Dataset, sample_columns, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError
@@ -67,7 +67,7 @@ def test_orders_that_change_within_a_step_count_for_the_rest_of_it() -> None:
     for name in windows.planned:
         rows = [frame[frame["run"] == run] for run in windows.run]
         starts = windows.t + np.arange(30)[:, None]
-        values = [sample(one, starts[:, i])[name] for i, one in enumerate(rows)]
+        values = [sample_columns(one, starts[:, i])[name] for i, one in enumerate(rows)]
         held[name] = np.stack(values, axis=1)
     now, before = (
         position_error(physics.paths(one.instants(known=True)), windows.future).mean()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from shipid.answer.sentences import answer
-from shipid.data.dataset import Dataset, pieces
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
@@ -286,7 +286,7 @@ def test_a_hole_breaks_a_run(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     test = prepare(plan, dataset).test
     middle = replace(test, t=np.full(len(test), 15.0), shared_clock=True)  # five seconds ahead
-    parts = [rows["t"] for run, rows in pieces(apart(dataset, middle)) if run == "a"]
+    parts = [rows["t"] for run, rows in stretches_of_runs(apart(dataset, middle)) if run == "a"]
     assert [(part.min(), part.max()) for part in parts] == [(0.0, 14.0), (21.0, 40.0)]
 
 

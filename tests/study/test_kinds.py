@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
-from shipid.study.kinds import STOPPED, kinds_of, seen_kind
+from shipid.study.kinds import STOPPED_SHAFT, kind_by_motion, kinds_of_runs
 from shipid.study.prepare import obtain
 from tests.study.tiny import logged, tiny_plan
 
@@ -28,14 +28,14 @@ def steps(levels: list[float]) -> np.ndarray:
 
 
 def test_random_helm_is_no_zigzag() -> None:
-    assert seen_kind(rows(steps([20, -5, 12, -18, 3, -9, 15, -20])), 4.0, 2.0) == RANDOM
-    assert seen_kind(rows(steps([10, -10, 10, -10, 10, -10, 10, -10])), 4.0, 2.0) == "zigzag"
+    assert kind_by_motion(rows(steps([20, -5, 12, -18, 3, -9, 15, -20])), 4.0, 2.0) == RANDOM
+    assert kind_by_motion(rows(steps([10, -10, 10, -10, 10, -10, 10, -10])), 4.0, 2.0) == "zigzag"
 
 
 def test_a_stopped_shaft_at_speed_is_coasting_and_a_slow_ship_manoeuvres() -> None:
     helm = np.zeros(len(T))
-    assert seen_kind(rows(helm, n=0.0, u=np.linspace(4, 1, len(T))), 4.0, 2.0) == COASTING
-    assert seen_kind(rows(steps([20, -5, 12, -18]), u=0.4), 4.0, 2.0) == LOW_SPEED
+    assert kind_by_motion(rows(helm, n=0.0, u=np.linspace(4, 1, len(T))), 4.0, 2.0) == COASTING
+    assert kind_by_motion(rows(steps([20, -5, 12, -18]), u=0.4), 4.0, 2.0) == LOW_SPEED
 
 
 @pytest.mark.parametrize("usual", [0.4, 2.0, 25.0])
@@ -43,7 +43,7 @@ def test_what_is_stopped_is_judged_by_the_usual_shaft_speed(usual: float) -> Non
     helm, u = np.zeros(len(T)), np.linspace(4, 1, len(T))
     for share, coasts in ((0.8, True), (1.2, False)):
         for turns in (1, -1):
-            seen = seen_kind(rows(helm, n=turns * share * STOPPED * usual, u=u), 4.0, usual)
+            seen = kind_by_motion(rows(helm, n=turns * share * STOPPED_SHAFT * usual, u=u), 4.0, usual)
             assert (seen == COASTING) == coasts
 
 
@@ -52,7 +52,7 @@ def test_the_mapping_wins_over_the_name_and_the_name_over_the_motion() -> None:
     columns = {"psi": np.cumsum(-0.05 * helm), "r": -0.05 * helm, "u": 4.0, "port.n": 2.0, "port.alpha": helm}
     runs = {"ZZ 1": columns, "berthing 1": columns, "run 3": columns}
     log = logged(runs, T, manoeuvres={"ZZ 1": "turning"})
-    assert kinds_of(log) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
+    assert kinds_of_runs(log) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
 
 
 def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
     ]
     for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM, RANDOM], strict=True):
         plan = tiny_plan(tmp_path, {"truth.manoeuvre": [block], "truth.manoeuvres": 10})
-        assert set(kinds_of(obtain(plan)).values()) == {kind}
+        assert set(kinds_of_runs(obtain(plan)).values()) == {kind}
 
 
 def test_the_motion_of_the_test_says_nothing_of_other_runs() -> None:
@@ -75,6 +75,6 @@ def test_the_motion_of_the_test_says_nothing_of_other_runs() -> None:
     for fast in (1.0, 12.0):
         speeds = {"a": 4.0, "b": 1.0, "c": 4.0, "test": fast, "more": fast, "last": fast}
         runs = {name: {"u": u, "port.n": 2.0, "starboard.n": 2.0} for name, u in speeds.items()}
-        known = kinds_of(logged(runs, t), test={"test", "more", "last"})
+        known = kinds_of_runs(logged(runs, t), test={"test", "more", "last"})
         assert known["b"] == LOW_SPEED
         assert known["a"] == known["c"] != LOW_SPEED

@@ -20,20 +20,20 @@ from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.approach import Controls
 from shipid.study.new import (
-    LEAST_RUNS,
+    LEAST_AMOUNT,
     SHARE_OF_RUN,
     _degraded_families,
     _family_name,
     _turning_orders,
+    amounts_of_data,
     draft_study,
     horizon_of,
-    ladder,
     step_of,
-    wind_for,
+    wind_for_length,
 )
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain, prepare
-from shipid.study.survey import separation, survey
+from shipid.study.survey import separation_of_sources, survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
 from shipid.vessel.template import Particulars, first_guess
@@ -71,9 +71,9 @@ def drafted(folder: Path, dataset: Dataset, *vessels: str) -> tuple[Any, dict[st
 
 @pytest.mark.parametrize("total", [2, 3, 8, 22, 1000])
 def test_amounts_rise_from_the_least_to_all_runs(total: int) -> None:
-    amounts = ladder(total)
+    amounts = amounts_of_data(total)
     assert amounts == sorted(set(amounts))
-    assert amounts[0] == min(LEAST_RUNS, total)
+    assert amounts[0] == min(LEAST_AMOUNT, total)
     assert amounts[-1] == total
     assert len(amounts) <= 7
 
@@ -135,7 +135,9 @@ def test_what_jitters_is_not_the_true_path(tmp_path: Path) -> None:
     random = np.random.default_rng(5)
     noise = {name: dataset.frame[name] + random.normal(0, 0.5, len(dataset.frame)) for name in ("north", "east")}
     noisy = Dataset(dataset.frame.assign(**noise), dataset.metadata)
-    assert separation(noisy, 20.0) == pytest.approx(2 * 0.5, rel=0.1)  # two coordinates, two instants: sqrt(4) sigma
+    assert separation_of_sources(noisy, 20.0) == pytest.approx(
+        2 * 0.5, rel=0.1
+    )  # two coordinates, two instants: sqrt(4) sigma
     assert drafted(tmp_path, noisy)[1]["data"]["path"] == "velocity"
 
 
@@ -263,7 +265,7 @@ def test_every_coefficient_of_the_hull_is_degraded_families(name: str) -> None:
     [(300.0, 6.0), (28.9, 6.0), (4.0, 2.2)],  # 6 sqrt(L / 28.9)
 )
 def test_wind_is_that_of_a_small_ship_by_froudes_rule(length: float, wind: float) -> None:
-    assert wind_for(length).value == [0.0, wind]
+    assert wind_for_length(length).value == [0.0, wind]
 
 
 def test_a_ship_without_helm_gets_an_order_for_each_screw() -> None:
@@ -368,5 +370,5 @@ def test_recorded_sets(
     assert document["prediction"]["ahead"] == ahead
     tested = document["split"]["test"]
     assert [start for start in tests if any(name.startswith(start) for name in tested)] == tests  # and other kinds
-    runs = survey(dataset).runs["duration"]
+    runs = survey_dataset(dataset).runs["duration"]
     assert all(runs[name] < runs.max() for name in document["split"]["test"])

@@ -22,14 +22,14 @@ from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.study.structures import (
     ERRORS_OF,
-    SHOWN,
-    Compared,
-    _table,
+    MEASURES_SHOWN,
+    StructureComparison,
+    _structure_table,
     _with_mean,
     compare_structures,
     structures_content,
-    with_gear,
-    write_chosen,
+    with_actuators_on,
+    write_chosen_structure,
 )
 from shipid.vessel.load import Vessel, load_vessel
 
@@ -43,8 +43,8 @@ TRIALS = (
 
 
 def test_what_is_shown_is_among_what_identify_compares() -> None:
-    assert SHOWN.keys() == COMPARED.keys()
-    assert all(set(shown) < set(COMPARED[kind]) for kind, shown in SHOWN.items())
+    assert MEASURES_SHOWN.keys() == COMPARED.keys()
+    assert all(set(shown) < set(COMPARED[kind]) for kind, shown in MEASURES_SHOWN.items())
 
 
 def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
@@ -77,7 +77,7 @@ def data_of(structure: str) -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def comparison() -> Compared:
+def comparison() -> StructureComparison:
     return compare_structures(
         SHIP,
         data_of("abkowitz"),
@@ -91,7 +91,7 @@ def comparison() -> Compared:
 
 
 @pytest.mark.slow
-def test_the_structure_that_made_the_data_is_chosen(comparison: Compared) -> None:
+def test_the_structure_that_made_the_data_is_chosen(comparison: StructureComparison) -> None:
     assert comparison.chosen == "abkowitz"
     assert list(comparison.table["structure"]) == ["abkowitz", "modulus"]
     assert comparison.table["position"].is_monotonic_increasing
@@ -105,8 +105,8 @@ def test_the_structure_that_made_the_data_is_chosen(comparison: Compared) -> Non
 
 
 @pytest.mark.slow
-def test_the_vessel_chosen_and_the_page_are_written(comparison: Compared, tmp_path: Path) -> None:
-    again = load_vessel(str(write_chosen(comparison, tmp_path / "chosen.toml")))
+def test_the_vessel_chosen_and_the_page_are_written(comparison: StructureComparison, tmp_path: Path) -> None:
+    again = load_vessel(str(write_chosen_structure(comparison, tmp_path / "chosen.toml")))
     assert again.parameters == pytest.approx(comparison.fits[comparison.chosen].vessel.parameters)
     page = write_structures(structures_content(comparison, "log.parquet", "shipid identify"), tmp_path / "page.html")
     text = page.read_text()
@@ -120,7 +120,7 @@ def test_a_vessel_whose_estimates_contradict_others_is_written_and_read(tmp_path
     parts = {"vessel": SHIP, "chosen": "present", "fits": {"present": SimpleNamespace(vessel=vessel)}}
     made = SimpleNamespace(**parts, runs=SHIP.key, digest=SHIP.digest)
     file = tmp_path / "chosen.toml"
-    file.write_text(Compared.document(made))  # type: ignore[arg-type]
+    file.write_text(StructureComparison.document(made))  # type: ignore[arg-type]
     again = load_vessel(file)
     assert again.parameters == vessel.parameters
     assert again.document["unusual"] == ["thruster.propeller.t_P"]
@@ -128,7 +128,7 @@ def test_a_vessel_whose_estimates_contradict_others_is_written_and_read(tmp_path
 
 def test_gear_that_is_off_for_the_log_is_on_in_manoeuvres() -> None:
     assert not SHIP.units.keys() & {"thruster.rudder.actuator.delta.T"}
-    assert "thruster.rudder.actuator.delta.T" in with_gear(SHIP).units
+    assert "thruster.rudder.actuator.delta.T" in with_actuators_on(SHIP).units
 
 
 def test_what_cannot_be_compared_is_refused() -> None:
@@ -155,7 +155,7 @@ def test_a_run_held_out_decides_nothing_in_the_fit_that_predicts_it(monkeypatch:
         return replace(solution, status="ok")
 
     monkeypatch.setattr("shipid.study.structures.identify", fitted)
-    monkeypatch.setattr("shipid.study.structures._table", lambda *_: 1 / 0)  # all is fitted
+    monkeypatch.setattr("shipid.study.structures._structure_table", lambda *_: 1 / 0)  # all is fitted
     data = zigzags(SHIP)
     frame = data.frame.copy()
     frame.loc[frame["run"] == data.runs[0], ["u", "v", "r"]] *= 1.05
@@ -177,7 +177,7 @@ def table_of(position: np.ndarray) -> pd.DataFrame:
         )
         for name, one in zip(names, position, strict=True)
     ]
-    return _table(names, pd.concat(parts, ignore_index=True), dict.fromkeys(names, 1), {}, runs)
+    return _structure_table(names, pd.concat(parts, ignore_index=True), dict.fromkeys(names, 1), {}, runs)
 
 
 def test_of_many_structures_that_are_equally_good_none_is_called_worse() -> None:

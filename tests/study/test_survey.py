@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.study.survey import Survey, separation, survey, typical_runs
+from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
 from tests.logs.conftest import as_dataset, turning
 
 T = np.arange(0.0, 100.0, 0.5)
 
 
 def test_a_steady_turn_is_described_by_its_numbers() -> None:
-    summary = survey(as_dataset(turning(T), turning(T[:81])))
+    summary = survey_dataset(as_dataset(turning(T), turning(T[:81])))
     assert list(summary.runs.index) == ["a", "b"]
     assert summary.runs["duration"].tolist() == [99.5, 40.0]
     assert summary.step == 0.5
@@ -25,7 +25,7 @@ def test_a_steady_turn_is_described_by_its_numbers() -> None:
 def test_a_broken_run_is_judged_by_its_longest_piece() -> None:
     frame = turning(T)
     frame["flags"] = np.where(T == 30.0, 1, 0)
-    summary = survey(as_dataset(frame)).runs.loc["a"]
+    summary = survey_dataset(as_dataset(frame)).runs.loc["a"]
     assert not summary["whole"]
     assert summary["duration"] == 99.5 - 30.0
 
@@ -34,9 +34,9 @@ def test_jitter_does_not_grow_with_the_lag_and_a_wrong_speed_does() -> None:
     rng, frame = np.random.default_rng(2), turning(T)
     jitter = as_dataset(frame.assign(north=frame["north"] + rng.normal(0, 2.0, len(T))))
     wrong = as_dataset(frame.assign(u=1.1 * frame["u"]))
-    assert separation(jitter, 20.0) == pytest.approx(separation(jitter, 5.0), rel=0.3)
-    assert separation(wrong, 20.0) > 3 * separation(wrong, 5.0)
-    assert separation(wrong, 1000.0) == 0.0
+    assert separation_of_sources(jitter, 20.0) == pytest.approx(separation_of_sources(jitter, 5.0), rel=0.3)
+    assert separation_of_sources(wrong, 20.0) > 3 * separation_of_sources(wrong, 5.0)
+    assert separation_of_sources(wrong, 1000.0) == 0.0
 
 
 def surveyed(kinds: list[str], speeds: list[float], failed: str = "") -> Survey:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import DATED, Array
+from shipid.data.dataset import FIRST_DATED_TIME, Array
 from shipid.errors import DataError
 from shipid.logs.dates import (
     DAY,
@@ -331,7 +331,7 @@ def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
     log of the future counts from 1904. No log is of the future.
     """
     now = datetime.now(UTC).timestamp()
-    if clock["unit"] not in ("s", "ms", "us", "ns") or not DATED < first < LAST_DATE:
+    if clock["unit"] not in ("s", "ms", "us", "ns") or not FIRST_DATED_TIME < first < LAST_DATE:
         return
     begins = f"{clock['from']!r} is read as seconds since 1970, {date_of(first)}: or does it count from"
     of_gps, of_1904 = first + GPS - (LEAPS if first + GPS > LEAP else 0), first - OF_1904
@@ -340,7 +340,7 @@ def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
     if (OF_GPS & parts or of_late) and of_gps < now:
         ahead = f", less {LEAPS} s by which GPS is ahead" if of_gps > LEAP else ""
         yield f"{begins} 6 January 1980, as GPS does? Then add {GPS} s{ahead}: {date_of(of_gps)} UTC"
-    elif first > now and of_1904 > DATED:
+    elif first > now and of_1904 > FIRST_DATED_TIME:
         yield f"{begins} 1904, as LabVIEW does? Then take {OF_1904} s off: {date_of(of_1904)}"
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.checks import Delay, delay_of
-from shipid.data.dataset import DATED, Array
+from shipid.data.checks import Delay, measure_delay
+from shipid.data.dataset import FIRST_DATED_TIME, Array
 from shipid.logs.dates import LAST_DATE, date_of, rolled_over
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
@@ -361,7 +361,7 @@ def _delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | 
     """Delay of a signal (N,) behind the integral of its rate; None where none is sure."""
     holes = np.flatnonzero(np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))) + 1
     parts = [np.split(values, holes) for values in (state.t, np.asarray(seen, dtype=complex), integrated)]
-    delay = delay_of(zip(*parts, strict=True))
+    delay = measure_delay(zip(*parts, strict=True))
     return delay if delay is not None and abs(delay.seconds) > delay.limit else None
 
 
@@ -401,7 +401,7 @@ def _jumps(state: State, path: Complex, spikes: bool = True) -> None:
 
 def when(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
-    return date_of(t) if DATED < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
+    return date_of(t) if FIRST_DATED_TIME < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
 def _heading_offset(state: State) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import BREAK, Array
-from shipid.data.lapses import Lapse, Rows, lapses
+from shipid.data.lapses import CommandFault, RowMask, find_command_faults
 from shipid.logs.guess.clues import State, Suggestion
 from shipid.logs.guess.defects import FEW, when
 from shipid.logs.guess.evidence import GAP
@@ -38,7 +38,7 @@ def find_lapses(state: State, sniffed: Sniffed) -> None:
         if len(t) < 2:
             continue
         follows = np.diff(t) <= GAP * np.median(np.diff(t))
-        found = lapses(one.name, t, values, psi, follows)
+        found = find_command_faults(one.name, t, values, psi, follows)
         brief = [lapse for lapse in found if lapse.kind in ("zero", "spike")]
         repair, mended = _despike(one.name, brief, t, values, follows) if brief else (None, [])
         if mended:
@@ -52,7 +52,9 @@ def find_lapses(state: State, sniffed: Sniffed) -> None:
             _report_still(state, one, still, t, psi)
 
 
-def _report_brief(state: State, one: Suggestion, found: list[Lapse], t: Array, repair: dict[str, Any] | None) -> None:
+def _report_brief(
+    state: State, one: Suggestion, found: list[CommandFault], t: Array, repair: dict[str, Any] | None
+) -> None:
     unit, factor = read_unit(one.name)
     said = []
     for kind in ("zero", "spike"):
@@ -71,19 +73,21 @@ def _report_brief(state: State, one: Suggestion, found: list[Lapse], t: Array, r
     state.find("lapses of a command", (one.source,), SURE, sentence, repair)
 
 
-def _report_pauses(state: State, one: Suggestion, found: list[Lapse], t: Array) -> None:
+def _report_pauses(state: State, one: Suggestion, found: list[CommandFault], t: Array) -> None:
     sentence = f"{one.source!r} is 0 {_places(state, found, t)} with the same order before and after"
     _report_unsure(state, one, "lapses of a command", found, t, f"{sentence}. Was that ordered?")
 
 
-def _report_unsure(state: State, one: Suggestion, kind: str, found: list[Lapse], t: Array, sentence: str) -> None:
+def _report_unsure(
+    state: State, one: Suggestion, kind: str, found: list[CommandFault], t: Array, sentence: str
+) -> None:
     """Ask of what may be as it is in the log; the repair is there, switched off."""
     remedy = "leave these cells empty, and draft again" if state.joined else "switch the repair on"
     state.ask((one.name,), f"{sentence} If not, {remedy}")
     state.find(kind, (one.source,), UNSURE, sentence, None if state.joined else _breaks(state, found, t))
 
 
-def _places(state: State, some: list[Lapse], t: Array) -> str:
+def _places(state: State, some: list[CommandFault], t: Array) -> str:
     """Where lapses are, in words: how many rows, how many places, and the first times."""
     count = sum(lapse.end - lapse.first for lapse in some)
     words = f"in {count} row{'s' * (count > 1)} at {len(some)} place{'s' * (len(some) > 1)}"
@@ -93,7 +97,7 @@ def _places(state: State, some: list[Lapse], t: Array) -> str:
     return f"{words}, {'the first ' * (len(some) > FEW)}near {times},"
 
 
-def _report_still(state: State, one: Suggestion, found: list[Lapse], t: Array, psi: Array) -> None:
+def _report_still(state: State, one: Suggestion, found: list[CommandFault], t: Array, psi: Array) -> None:
     words = []
     for lapse in found[:FEW]:
         span = slice(lapse.first, lapse.end)
@@ -106,15 +110,15 @@ def _report_still(state: State, one: Suggestion, found: list[Lapse], t: Array, p
     _report_unsure(state, one, "frozen sensor", found, t, f"{sentence}. Was it held so?")
 
 
-def _breaks(state: State, found: list[Lapse], t: Array) -> dict[str, Any]:
+def _breaks(state: State, found: list[CommandFault], t: Array) -> dict[str, Any]:
     unit, last = to_si(state.clock_unit, "t"), len(t) - 1
     intervals = [[t[max(one.first - 1, 0)] / unit, t[min(one.end, last)] / unit] for one in found]
     return {"kind": "break", "intervals": intervals}
 
 
 def _despike(
-    name: str, found: list[Lapse], t: Array, values: Array, follows: Rows
-) -> tuple[dict[str, Any] | None, list[Lapse]]:
+    name: str, found: list[CommandFault], t: Array, values: Array, follows: RowMask
+) -> tuple[dict[str, Any] | None, list[CommandFault]]:
     """The repair that mends most lapses and changes no other row, and those that it mends; none where there is none."""
     unit, factor = read_unit(name)
     others = np.ones(len(t), dtype=bool)
