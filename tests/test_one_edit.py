@@ -327,7 +327,7 @@ def as_toy(table: pd.DataFrame, file: Path) -> Path:
 
 @pytest.fixture
 def toy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(readers.READERS, "toy", readers.Reader(readers.Format, read_toy, is_toy))
+    monkeypatch.setitem(readers.READERS, "toy", readers.LogReader(readers.Format, read_toy, is_toy))
 
 
 def toy_mapping(folder: Path) -> Path:

@@ -34,9 +34,9 @@ def data_fetch(
     name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022", autocompletion=_offer_public_logs)],
 ) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
-    from shipid.logs.catalogue import fetch
+    from shipid.logs.catalogue import fetch_log
 
-    typer.echo(str(fetch(name)))
+    typer.echo(str(fetch_log(name)))
 
 
 @app.command("import")
@@ -80,13 +80,13 @@ def data_import(
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
     from shipid.data.dataset import write_dataset
-    from shipid.logs.catalogue import fetch
+    from shipid.logs.catalogue import fetch_log
     from shipid.logs.importing import import_log
     from shipid.logs.mapping import read_mapping
 
     check_ending(out, ".parquet")
     declared = read_mapping(mapping)
-    source = log or fetch(mapping)
+    source = log or fetch_log(mapping)
     out = out or Path(f"{Path(mapping).stem}.parquet")
     check_output(out, [source, Path(mapping)], "--out")
     if source.is_dir():
@@ -160,8 +160,8 @@ def data_segment(
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
     from shipid.files import check_new, write_new
-    from shipid.logs.catalogue import fetch
-    from shipid.logs.guess.draft import moment, segment_log, segments_text
+    from shipid.logs.catalogue import fetch_log
+    from shipid.logs.guess.draft import clock_moment, segment_log, segments_text
     from shipid.logs.mapping import read_mapping
 
     declared = read_mapping(mapping)
@@ -171,11 +171,11 @@ def data_segment(
     check_new(file, "mapping")
     check_output(file, [], "--out")
     unit = declared.clock.unit
-    segments = segment_log(declared, log or fetch(mapping))
+    segments = segment_log(declared, log or fetch_log(mapping))
     write_new(segments_text(segments, unit), file)
     with open_answer(as_json) as answer:
         rows = [{"run": one.run, "start": one.start, "end": one.end} for one in segments]
-        answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: moment(time, unit)))
+        answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: clock_moment(time, unit)))
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 
 
@@ -189,14 +189,14 @@ def data_join(
 ) -> None:
     """Join datasets of one vessel, such as those of several days or recorders."""
     from shipid.data.dataset import read_dataset, write_dataset
-    from shipid.logs.joining import join
+    from shipid.logs.joining import join_datasets
 
     check_ending(out, ".parquet")
     places = [os.path.realpath(file) for file in datasets]
     twice = next((file for file, place in zip(datasets, places, strict=True) if places.count(place) > 1), None)
     if twice is not None:
         raise ShipidError("is named twice: name each dataset once", file=twice)
-    joined, notes = join({file: read_dataset(file) for file in datasets})
+    joined, notes = join_datasets({file: read_dataset(file) for file in datasets})
     file = write_dataset(joined, out)
     with open_answer(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)

@@ -46,7 +46,7 @@ _NORTH = re.compile(r"(?:°|deg)? ?(t|m|true|mag)")
 """Behind an angle: of true, or of magnetic north."""
 
 
-def parted(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
+def split_amounts(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
     """Return the numbers (N,) of texts such as 12.3 kn, as text, and their units; each other text with no unit."""
     found = texts.str.extract(rf"^(?:{_AMOUNT.pattern})$")
     units = found[1].map(lambda unit: _as_written(unit) if isinstance(unit, str) else "").astype(object)
@@ -56,7 +56,7 @@ def parted(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
 @cache
 def _as_written(text: str) -> str:
     """Return a unit as a name would have it in brackets; empty where it is none."""
-    north = north_of(text)
+    north = north_reference(text)
     if north == "T" or (north and len(text) > 1):  # m alone is metres
         return f"deg {north}"
     if text in ("N", "n"):  # of a latitude
@@ -78,7 +78,7 @@ def is_known(text: str) -> bool:
     return any(re.fullmatch(words, text.strip().lower()) for words in UNIT_WORDS.values())
 
 
-def north_of(text: str) -> str:
+def north_reference(text: str) -> str:
     """Return T or M for a text behind an angle that says true or magnetic north; empty for any other one."""
     found = _NORTH.fullmatch(text.lower())
     return found[1][0].upper() if found else ""
@@ -87,12 +87,14 @@ def north_of(text: str) -> str:
 def is_unit(text: str, unit: str) -> bool:
     """Whether a text behind a number says a unit of a mapping."""
     known = {"Nm": "N m", "kNm": "kN m"}.get(unit, unit)
-    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (unit == "deg" and north_of(text) != "")
+    return bool(re.fullmatch(UNIT_WORDS.get(known, "(?!)"), text.lower())) or (
+        unit == "deg" and north_reference(text) != ""
+    )
 
 
 def are_one(texts: Iterable[str], unit: str) -> bool:
     """Whether all texts behind the numbers of a column say the same unit, and not two kinds of north."""
-    return all(is_unit(text, unit) for text in texts) and len({*map(north_of, texts)} - {""}) < 2
+    return all(is_unit(text, unit) for text in texts) and len({*map(north_reference, texts)} - {""}) < 2
 
 
 def is_amount(cell: str) -> bool:

@@ -7,18 +7,18 @@ from pathlib import Path
 
 from shipid import document
 from shipid.errors import DataError
-from shipid.logs.importing import digest_of
+from shipid.logs.importing import log_digest
 from shipid.logs.mapping import read_mapping
 
 FOLDER_VARIABLE = "SHIPID_DATA"
 
 
-def available() -> list[str]:
-    """Return the names of the bundled mappings; `fetch` takes each of them."""
+def bundled_mappings() -> list[str]:
+    """Return the names of the bundled mappings; `fetch_log` takes each of them."""
     return list(document.bundled_documents("studies/mappings"))
 
 
-def fetch(name: str) -> Path:
+def fetch_log(name: str) -> Path:
     """Return the file of the log that a mapping describes; its checksum is verified.
 
     If the environment variable SHIPID_DATA is set, the log must be in that folder and nothing is downloaded. If it is
@@ -38,7 +38,7 @@ def fetch(name: str) -> Path:
         if not (file.is_file() if source.runs is None else file.is_dir()):
             message = f"not there: put the log there, or unset {FOLDER_VARIABLE} to download it ({source.url})"
             raise DataError(message, file=file)
-        if source.sha256 not in (None, digest_of(mapping, file)):
+        if source.sha256 not in (None, log_digest(mapping, file)):
             message = f"not the published file (sha256 differs from that of {name!r}): fetch it anew from {source.url}"
             raise DataError(message, file=file, path="source.sha256")
         return file
@@ -51,10 +51,10 @@ def fetch(name: str) -> Path:
     if source.runs is not None:
         message = f"several files, not downloaded: get them from {source.url} and set {FOLDER_VARIABLE} to their folder"
         raise DataError(message, file=name, path="source.url")
-    return _download(name, source.url, source.sha256, source.file)
+    return _download_log(name, source.url, source.sha256, source.file)
 
 
-def _download(name: str, url: str, sha256: str, file: str | None) -> Path:
+def _download_log(name: str, url: str, sha256: str, file: str | None) -> Path:
     import pooch  # takes 60 ms, which commands without a download need not wait for
 
     stem = Path(name).stem  # the name may be the path of a mapping; the file must still lie in the cache folder

@@ -11,18 +11,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, suggest_name
-from shipid.logs.amounts import is_unit, north_of, parted
+from shipid.logs.amounts import is_unit, north_reference, split_amounts
 from shipid.logs.formats import Format, SheetFormat, TableFormat, TextFormat
 from shipid.logs.mapping import (
     OF_SHIP,
     SIDES,
+    degrees_and_minutes,
     degrees_in_parts,
     degrees_in_text,
-    degrees_of,
     degrees_to_sides,
+    quaternion_size,
+    quaternion_yaw,
     rate_of_ais,
-    size_of,
-    yaw_of,
 )
 from shipid.logs.readers import in_points
 from shipid.logs.workbook import NOT_CALCULATED
@@ -32,7 +32,7 @@ OFF_ONE = 0.05  # of the size of a quaternion from 1: more is no rounding
 
 def of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
     """Degrees and minutes (N,) as degrees."""
-    degrees = degrees_of(numbers)
+    degrees = degrees_and_minutes(numbers)
     wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -73,7 +73,7 @@ def of_quaternion(
     parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
 ) -> NDArray[np.float64]:
     """Quaternions (4, N), of columns of these names, as yaw angles [rad]."""
-    size = size_of(parts)
+    size = quaternion_size(parts)
     wrong = (size > 0) & (np.abs(size - 1.0) > OFF_ONE)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -81,7 +81,7 @@ def of_quaternion(
         place = f"{said} have the size {size[row]:.4g} in {row_in_words(log, row)}"
         message = f"{place}, and a quaternion has 1: are these x, y, z, w?"
         raise DataError(message, file=file, path=path)
-    return yaw_of(parts)
+    return quaternion_yaw(parts)
 
 
 def row_in_words(log: pd.DataFrame, place: int) -> str:
@@ -89,7 +89,7 @@ def row_in_words(log: pd.DataFrame, place: int) -> str:
     return f"row {int(log.index[place]) + 1}"
 
 
-def column_of(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
+def log_column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
     """Return a column (N,) of a log by its name; raises DataError at `path` where it is missing, or there twice."""
     names = [str(name) for name in log.columns]
     if names.count(source) > 1:
@@ -103,7 +103,7 @@ def column_of(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Serie
     return log.iloc[:, names.index(source)]
 
 
-def numbers_of(
+def parse_numbers(
     log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = "", units: tuple[str, ...] = ()
 ) -> NDArray[np.float64]:
     """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
@@ -111,7 +111,7 @@ def numbers_of(
     With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5. A number
     may have one of its `units` behind it, and no other one; nor true north in some rows and magnetic north in others.
     """
-    column = column_of(log, source, file, path)
+    column = log_column(log, source, file, path)
     if pd.api.types.is_numeric_dtype(column.dtype):
         numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
         infinite = np.flatnonzero(np.isinf(numbers))
@@ -122,7 +122,7 @@ def numbers_of(
     read = form if isinstance(form, TableFormat) else TextFormat()
     text = column.fillna("").astype(str).str.strip()
     missing = text.isin(read.missing)
-    if read.decimal == "," and read.thousands is None and (grouped := _grouped(text)) is not None:
+    if read.decimal == "," and read.thousands is None and (grouped := _row_of_thousands_mark(text)) is not None:
         message = (
             f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
             "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there"
@@ -131,7 +131,7 @@ def numbers_of(
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     if units and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
-        bare, behind = parted(text)
+        bare, behind = split_amounts(text)
         own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).to_numpy(dtype=bool)
         other = np.flatnonzero(behind.ne("").to_numpy() & ~own & ~missing.to_numpy())
         if len(other) and not sides:
@@ -140,7 +140,7 @@ def numbers_of(
                 "such rows): write one unit in the whole column"
             )
             raise DataError(message, file=file, path=row_in_words(log, other[0]))
-        north = behind.where(own, "").map(north_of)
+        north = behind.where(own, "").map(north_reference)
         if {"T", "M"} <= {*north}:
             kind = {"T": "true", "M": "magnetic"}[north[north.ne("")].iloc[0]]
             other = np.flatnonzero(north.isin({"T", "M"} - {kind[0].upper()}))
@@ -175,7 +175,7 @@ def numbers_of(
     return numbers
 
 
-def _grouped(text: pd.Series[Any]) -> int | None:
+def _row_of_thousands_mark(text: pd.Series[Any]) -> int | None:
     """Return the first row whose point may mark thousands, 1.250 for 1250; None where a point of a column may not."""
     pointed = text.str.contains(".", regex=False)
     groups = text.str.fullmatch(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")

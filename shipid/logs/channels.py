@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from shipid.data.dataset import BREAK, clock_slack
 from shipid.errors import DataError
 from shipid.logs.cells import row_in_words
-from shipid.logs.dates import moment_of, rolled_over
+from shipid.logs.dates import format_moment, rollover_words
 from shipid.logs.frames import TURN, is_turn
 from shipid.logs.mapping import Column
-from shipid.logs.repairs import FLAGS, Records, interpolate_at
+from shipid.logs.repairs import FLAGS, Records, interpolate_missing
 from shipid.physics.signals import is_command
 
 Channel = tuple[NDArray[np.float64], NDArray[np.float64]]  # instants [s] and values, (N,) each
@@ -44,7 +44,7 @@ def common_instants(
     shared: NDArray[np.float64] = t[(t >= first - slack) & (t <= last + slack)]
     if len(shared) < 2:
         late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))
-        begin, end = moment_of(first), moment_of(last)
+        begin, end = format_moment(first), format_moment(last)
         message = f"columns share no time: {late!r} begins at {begin}, {early!r} ends at {end}"
         raise DataError(message, file=file, path=f"columns.{late}")
     return shared
@@ -61,8 +61,8 @@ def even_instants(
     count = max(0, int(np.floor((last - first) / step)) + 1)
     if count > MANY and count > FAR_MORE * len(samples := np.unique(np.concatenate(times))):
         row = int(np.argmax(np.diff(samples)))
-        before, after = (moment_of(samples[row + one]) for one in (0, 1))
-        after += rolled_over(samples[row + 1] - samples[row])
+        before, after = (format_moment(samples[row + one]) for one in (0, 1))
+        after += rollover_words(samples[row + 1] - samples[row])
         message = f"{step:g} s makes {count:.3g} instants of {len(samples)} rows, where after {before} comes {after}"
         remedy = (
             "was the clock set there? Remove the rows of the wrong time, or split the log; else write a longer step"
@@ -71,13 +71,13 @@ def even_instants(
     return np.asarray(first + step * np.arange(count), dtype=np.float64)
 
 
-def interpolation_of(name: str, column: Column) -> str:
+def interpolation_rule(name: str, column: Column) -> str:
     """Return the rule of interpolation: as declared, else `previous` for orders, `angle` where it wraps, `linear`."""
     usual = "short way" if name == "longitude" else "linear"
     return column.interpolation or ("previous" if is_command(name) else "angle" if column.wrap else usual)
 
 
-def at_instants(
+def resample_channel(
     t: NDArray[np.float64], times: NDArray[np.float64], values: NDArray[np.float64], how: str, max_gap: float
 ) -> NDArray[np.float64]:
     """Interpolate a channel at instants t [s]; NaN between samples more than max_gap [s] apart, unless it is held."""
@@ -115,7 +115,7 @@ def close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[p
         before = np.maximum.accumulate(np.where(missing, -np.inf, t))
         after = np.minimum.accumulate(np.where(missing, np.inf, t)[::-1])[::-1]
         short = missing & (after - before <= longest)
-        held = pd.Series(values).ffill().to_numpy() if is_command(name) else interpolate_at(t, values, missing)
+        held = pd.Series(values).ffill().to_numpy() if is_command(name) else interpolate_missing(t, values, missing)
         filled[name] = np.where(short, held, values)
         flags |= np.where(short, 1 << FLAGS.index("interpolated"), 0)
         removed |= missing & ~short

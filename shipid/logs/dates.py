@@ -73,7 +73,7 @@ def other_zone(head: str, clock: str, first: str) -> str:
     return f"{first!r} is read as UTC, and the log says {said[0]!r}"
 
 
-def seconds(dates: pd.Series[Any]) -> Array:
+def parse_dates(dates: pd.Series[Any]) -> Array:
     """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
     Read are ISO 8601, dates and durations of pandas, durations as text, and `DAYS` with `HOURS`; of those that every
@@ -101,14 +101,14 @@ def seconds(dates: pd.Series[Any]) -> Array:
         ordinal = texts.str.extract(ORDINAL)
         if len(texts) and ordinal.notna().all(axis=None):
             joined = ordinal[0] + " " + ordinal[1] + " " + ordinal[2]
-            return _since_1970(_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
+            return _since_1970(_parse_moments(joined, "%Y %j %H:%M:%S").reindex(dates.index))
         compact = texts.str.extract(COMPACT)
         if len(texts) and compact[[0, 1]].notna().all(axis=None):
             joined = compact[0] + " " + compact[1] + "." + compact[2].fillna("0")
-            return _since_1970(_moments(joined, "%Y%m%d %H%M%S.%f").reindex(dates.index))
-        written = ways_of(texts)
+            return _since_1970(_parse_moments(joined, "%Y%m%d %H%M%S.%f").reindex(dates.index))
+        written = date_formats(texts)
         if written:
-            moments = min((_moments(texts, one) for one in written), key=_unlikely)
+            moments = min((_parse_moments(texts, one) for one in written), key=_date_cost)
             return _since_1970(moments.reindex(dates.index))
         zoned = texts.str.contains(ZONE)
         dates = (texts[zoned] if zoned.any() else texts).reindex(dates.index)
@@ -124,30 +124,32 @@ def in_one_number(values: Array) -> bool:
     return all(bool(np.all((one >= low) & (one <= high))) for one, (low, high) in zip(fields, limits, strict=True))
 
 
-def ways_of(texts: pd.Series[Any]) -> list[str]:
+def date_formats(texts: pd.Series[Any]) -> list[str]:
     """Ways in which dates (N,) of text may be written, none for ISO 8601: most of a sample can be read so."""
     places = np.random.default_rng(0).integers(0, max(1, len(texts)), SAMPLES)  # a stride may meet one kind
     some = texts.iloc[np.unique(places)] if len(texts) else texts
     some = some[some.str.fullmatch(rf"(?:{DAY_OF})\s+{TIME_OF_DAY}")]
     shown = some.tolist()
-    ways = [one for one in WAYS if sum(_shape(one).fullmatch(text) is not None for text in shown) > 0.5 * len(some)]
-    return [one for one in ways if _moments(some, one).notna().mean() > 0.5] if len(some) else []
+    ways = [
+        one for one in WAYS if sum(_date_pattern(one).fullmatch(text) is not None for text in shown) > 0.5 * len(some)
+    ]
+    return [one for one in ways if _parse_moments(some, one).notna().mean() > 0.5] if len(some) else []
 
 
 @cache
-def _shape(way: str) -> re.Pattern[str]:
+def _date_pattern(way: str) -> re.Pattern[str]:
     """A regular expression of the texts that may be dates of a way of writing: it is much faster to ask first."""
     digits = {"Y": r"\d{4}", "b": "[A-Za-z]{3}", "S": r"\d\d?(?:\.\d+)?", "p": "[AaPp][Mm]"}
     letters = re.escape(way).replace("\\ ", r"\s+")
     return re.compile(re.sub("%(.)", lambda one: digits.get(one[1], r"\d\d?"), letters))
 
 
-def days_by(texts: pd.Series[Any], way: str) -> Array:
-    """Dates (N,) of one of the `ways_of` writing as seconds since 1970, NaN for others."""
-    return _since_1970(_moments(texts, way))
+def parse_dates_as(texts: pd.Series[Any], way: str) -> Array:
+    """Dates (N,) of one of the `date_formats` writing as seconds since 1970, NaN for others."""
+    return _since_1970(_parse_moments(texts, way))
 
 
-def _moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
+def _parse_moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
     """Dates of one way of writing, NaT for others; a second may have a fraction, or none."""
     moments = pd.to_datetime(texts, format=way, utc=True, errors="coerce").dt.as_unit("us")
     missing = moments.isna()
@@ -157,36 +159,36 @@ def _moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
     return moments
 
 
-def _unlikely(moments: pd.Series[Any]) -> tuple[int, float]:
+def _date_cost(moments: pd.Series[Any]) -> tuple[int, float]:
     """Rows that are no dates, then the time between the first and the last."""
     return int(moments.isna().sum()), float((moments.max() - moments.min()).total_seconds())
 
 
-def date_of(moment: float) -> str:
-    """A moment in seconds since 1970 as date and time in UTC, the reverse of `seconds`."""
+def format_date(moment: float) -> str:
+    """A moment in seconds since 1970 as date and time in UTC, the reverse of `parse_dates`."""
     return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d %H:%M:%S")
 
 
-def moment_of(t: float) -> str:
+def format_moment(t: float) -> str:
     """A time [s] of a log in words: a date where it counts from 1970, else seconds."""
-    return f"{date_of(t)} UTC" if FIRST_DATED_TIME < t < LAST_DATE else f"{t:.10g} s"
+    return f"{format_date(t)} UTC" if FIRST_DATED_TIME < t < LAST_DATE else f"{t:.10g} s"
 
 
-def rolled_over(step: float) -> str:
+def rollover_words(step: float) -> str:
     """Words for a step [s] of 1,024 weeks, to an hour, forward or back; empty for any other."""
     remedy = f"add {WEEKS * DAY:.0f} s to the older dates"
     words = f" (1,024 weeks apart: the week number of a GPS receiver rolled over, {remedy})"
     return words if abs(abs(step) - WEEKS * DAY) < HOUR else ""
 
 
-def span_of(first: float, last: float) -> str:
+def format_span(first: float, last: float) -> str:
     """Two times [s] of a log in words: dates where they count from 1970, else seconds."""
     dates = min(first, last) > FIRST_DATED_TIME and max(first, last) < LAST_DATE
-    return f"{date_of(first)} to {date_of(last)} UTC" if dates else f"{first:.10g} to {last:.10g} s"
+    return f"{format_date(first)} to {format_date(last)} UTC" if dates else f"{first:.10g} to {last:.10g} s"
 
 
-def dated(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
-    """Return dates and times of day, of two columns (N,), as one column of text for `seconds`.
+def join_date_and_time(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
+    """Return dates and times of day, of two columns (N,), as one column of text for `parse_dates`.
 
     Both may be in one number, as 20240514 or 140524 and 80000.5; or in days of Excel and their fractions.
     """
@@ -215,7 +217,7 @@ def _as_texts(cells: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Return year, month and day, or year and day of the year (N,), as text for `dated`; None where there is no such.
+    """Return year, month and day, or year and day of the year (N,), as text for `join_date_and_time`; None where there is no such.
 
     Years of two digits are of 1969 to 2068, as everywhere in Python.
     """
@@ -231,7 +233,7 @@ def date_texts(parts: list[Array]) -> pd.Series[Any]:
 
 
 def time_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Return hour, minute and, if there is a third, second (N,), as text for `seconds`; None where there is no such."""
+    """Return hour, minute and, if there is a third, second (N,), as text for `parse_dates`; None where there is no such."""
     hour, minute, *rest = parts
     second = rest[0] if rest else np.zeros(len(hour))
     known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])
@@ -288,7 +290,8 @@ def hour_twice(t: Array) -> tuple[int, str] | None:
     if row == 0 or not _hour_back(steps[row - 1]):
         return None
     last, first = (
-        date_of(one) if FIRST_DATED_TIME < one < LAST_DATE else date_of(one % DAY)[11:] for one in t[row - 1 : row + 1]
+        format_date(one) if FIRST_DATED_TIME < one < LAST_DATE else format_date(one % DAY)[11:]
+        for one in t[row - 1 : row + 1]
     )
     remedy = "write UTC, or in every row the zone that holds there; else sort or split the log"
     return row, f"time goes back by an hour, from {last} to {first}: is it local time as daylight saving ends? {remedy}"

@@ -116,7 +116,7 @@ FOREIGN = (
 """Kinds of files that a log is not, the more special first. To add one: a row here."""
 
 
-def foreign(head: bytes) -> Foreign | None:
+def foreign_format(head: bytes) -> Foreign | None:
     """Return what kind of file begins with these bytes, where it is one that no reader reads; else None."""
     start = head[:ENOUGH].removeprefix(b"\xef\xbb\xbf")
     if is_workbook(start):
@@ -127,6 +127,6 @@ def foreign(head: bytes) -> Foreign | None:
 def refuse_foreign(file: Path) -> None:
     """Raise DataError with the remedy where a file is of a kind that no reader reads."""
     with file.open("rb") as stream:
-        other = foreign(stream.read(ENOUGH))
+        other = foreign_format(stream.read(ENOUGH))
     if other is not None:
         raise DataError(other.sentence, file=file, path="format.kind")

@@ -7,13 +7,13 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from shipid.logs.repairs import Strict
+from shipid.logs.repairs import StrictPart
 from shipid.logs.workbook import SEPARATOR
 
 LOOKED_AT = 300  # lines that a guess at the format looks at
 
 
-class Format(Strict):
+class Format(StrictPart):
     """Field of every format: its kind."""
 
     kind: str = "text"

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipid.data.dataset import Array, clock_slack
 from shipid.errors import DataError
-from shipid.logs.dates import moment_of
+from shipid.logs.dates import format_moment
 from shipid.logs.mapping import Column, Mapping
-from shipid.logs.repairs import Despike, Records, despike, interpolate_at
+from shipid.logs.repairs import Despike, Records, interpolate_missing, remove_spikes
 from shipid.physics.signals import is_all_round, is_command, is_wrapped_angle, signal_row
 
 BLOCK = 200_000  # rows that are projected at once
@@ -22,7 +22,7 @@ NEAR = 3.0  # usual steps: rows further apart are no neighbours
 TURN, ABOUT = 2 * np.pi, np.pi / 4  # rad: a jump of an angle that counts from 0 again, and how far from it one may be
 
 
-def unwrapped(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
+def unwrap_angles(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFrame:
     """Unwrap angles, and turn winds "from" into "towards"; DataError for a jump of one that does not wrap."""
     turned: dict[str, NDArray[np.float64]] = {}
     for name, column in mapping.columns.items():
@@ -65,7 +65,7 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
     places = np.flatnonzero(near & is_turn(jumps))
     if len(places):
         count = "once" if len(places) == 1 else f"{len(places)} times, first"
-        sentence = f"{column.source!r} jumps by a whole turn, {count} at {moment_of(times[places[0] + 1])}"
+        sentence = f"{column.source!r} jumps by a whole turn, {count} at {format_moment(times[places[0] + 1])}"
         remedy = "write wrap = true"
         if ordered and not begins_again(values[known], name):
             remedy = f"it {_not_of_turns(values)}"
@@ -104,7 +104,9 @@ def unwrap_in_place(values: NDArray[np.float64]) -> None:
         values += np.cumsum(corrections, out=corrections)
 
 
-def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records, tuple[float, float]]:
+def project_positions(
+    rows: pd.DataFrame, mapping: Mapping, file: Path
+) -> tuple[pd.DataFrame, Records, tuple[float, float]]:
     """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it.
 
     What counts from true north is turned to the north of the plane. Also the record of that, and the origin [deg].
@@ -115,7 +117,9 @@ def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Data
     for name, values, most in (("latitude", latitude, 90.0), ("longitude", longitude, 360.0)):
         wrong = np.flatnonzero(np.abs(values) > most)
         if len(wrong):
-            reached = f"{values[wrong[0]]:.6g} deg at {moment_of(rows['t'].iloc[wrong[0]])}, one of {len(wrong)} rows"
+            reached = (
+                f"{values[wrong[0]]:.6g} deg at {format_moment(rows['t'].iloc[wrong[0]])}, one of {len(wrong)} rows"
+            )
             message = f"{reached}: is the unit right? List what stands for a missing value in [format] missing"
             raise DataError(message, file=file, path=f"columns.{name}")
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
@@ -127,13 +131,13 @@ def projected(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Data
     turn = np.empty(len(rows))
     for first in range(0, len(rows), BLOCK):  # of a large log there is no room for all steps of the projection
         part = slice(first, first + BLOCK)
-        turn[part] = convergence(latitude[part], longitude[part], *origin)
+        turn[part] = meridian_convergence(latitude[part], longitude[part], *origin)
         latitude[part], longitude[part], _ = geodetic2ned(latitude[part], longitude[part], 0.0, *origin, 0.0)
-    rows, records = turned_to_plane(rows, turn, mapping.columns)
+    rows, records = rotate_to_plane(rows, turn, mapping.columns)
     return rows.drop(columns=["latitude", "longitude"]).assign(north=latitude, east=longitude), records, origin
 
 
-def convergence(latitude: ArrayLike, longitude: ArrayLike, latitude_0: float, longitude_0: float) -> Array:
+def meridian_convergence(latitude: ArrayLike, longitude: ArrayLike, latitude_0: float, longitude_0: float) -> Array:
     """Angle [rad] of true north at positions [deg], clockwise from the north of the plane that touches at the origin.
 
     gamma = atan2(-sin(lat) sin(d), sin(lat) sin(lat_0) cos(d) + cos(lat) cos(lat_0)), d = lon - lon_0: the horizontal
@@ -144,7 +148,7 @@ def convergence(latitude: ArrayLike, longitude: ArrayLike, latitude_0: float, lo
     return np.asarray(np.arctan2(-np.sin(lat) * np.sin(d), ahead))
 
 
-def turned_to_plane(
+def rotate_to_plane(
     rows: pd.DataFrame, turn: NDArray[np.float64], columns: dict[str, Column]
 ) -> tuple[pd.DataFrame, Records]:
     """Turn psi, course, true wind and earth-fixed velocities of rows (N,) by the angles `turn` (N,) [rad].
@@ -157,8 +161,8 @@ def turned_to_plane(
     if np.any(np.abs(turn[known]) > PARALLEL):
         window = max(JUMPY, 2 * float(np.median(np.diff(t))))
         jumps = Despike(kind="despike", reason="of positions", columns=("turn",), window=window, threshold=JUMP)
-        turn = despike(rows[["t", "flags"]].assign(turn=turn), jumps).rows["turn"].to_numpy()
-        turn = interpolate_at(t, turn, ~np.isfinite(turn))
+        turn = remove_spikes(rows[["t", "flags"]].assign(turn=turn), jumps).rows["turn"].to_numpy()
+        turn = interpolate_missing(t, turn, ~np.isfinite(turn))
     if not np.any(np.abs(turn) > PARALLEL):
         return rows, []
     turned = {name: rows[name].to_numpy() + turn for name in ("psi", "course") if name in rows}

@@ -31,14 +31,31 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth_motion
 from shipid.errors import DataError, is_utf_8, suggest_name
-from shipid.logs.cells import column_of, numbers_of, of_ais, of_minutes, of_parts, of_quaternion
-from shipid.logs.channels import Channel, at_instants, close_gaps, common_instants, even_instants, interpolation_of
-from shipid.logs.dates import ZONE_REMEDY, moment_of, other_zone, span_of
+from shipid.logs.cells import log_column, of_ais, of_minutes, of_parts, of_quaternion, parse_numbers
+from shipid.logs.channels import (
+    Channel,
+    close_gaps,
+    common_instants,
+    even_instants,
+    interpolation_rule,
+    resample_channel,
+)
+from shipid.logs.dates import ZONE_REMEDY, format_moment, format_span, other_zone
 from shipid.logs.formats import TextFormat
-from shipid.logs.frames import check_wraps, in_body, projected, true_wind, unwrapped
-from shipid.logs.instants import instants_of, times_of, without_repeats
-from shipid.logs.mapping import Mapping, Origin, Parts, Segment, Source, names_of, read_mapping, sides_of, to_si
-from shipid.logs.readers import Progress, read_table, require_file
+from shipid.logs.frames import check_wraps, in_body, project_positions, true_wind, unwrap_angles
+from shipid.logs.instants import read_clock, read_time_column, without_repeats
+from shipid.logs.mapping import (
+    LogSource,
+    Mapping,
+    PlaneOrigin,
+    RunParts,
+    Segment,
+    read_mapping,
+    side_letters,
+    source_columns,
+    to_si,
+)
+from shipid.logs.readers import Progress, read_log_table, require_file
 from shipid.logs.repairs import (
     FLAGS,
     REPAIRS,
@@ -47,13 +64,13 @@ from shipid.logs.repairs import (
     Latency,
     Records,
     Repair,
-    Scale,
+    ScaleRepair,
     WrapInterpolation,
     apply_repairs,
 )
 from shipid.physics.signals import is_command, is_output
 
-__all__ = ["digest_of", "import_log", "read_mapping", "runs_of", "sha256_of"]
+__all__ = ["file_digest", "import_log", "log_digest", "read_mapping", "run_files"]
 
 logger = logging.getLogger(__name__)
 Begins = list[tuple[float, str]]
@@ -100,7 +117,7 @@ def import_log(
     for kind in off:
         if kind not in REPAIRS:
             raise DataError(f"no repair of this kind: {suggest_name(kind, REPAIRS)}", path=kind)
-    digest = digest_of(mapping, source)
+    digest = log_digest(mapping, source)
     if mapping.source.sha256 not in (None, digest):
         raise DataError(
             "not the file this mapping was written for (sha256 differs): fetch that file, or copy the mapping, "
@@ -108,13 +125,13 @@ def import_log(
             file=source,
             path="source.sha256",
         )
-    logs = runs_of(mapping.source, source)
+    logs = run_files(mapping.source, source)
     each: list[tuple[str, Imported]] = []
-    for run, log, table in _tables(mapping, logs, progress):
-        each.append((run, _imported(mapping, log, table, off)))
+    for run, log, table in _run_tables(mapping, logs, progress):
+        each.append((run, _import_table(mapping, log, table, off)))
         if mapping.origin is None and (first := each[0][1].origin) is not None:  # that of all runs
             mapping = mapping.model_copy(
-                update={"origin": Origin.model_construct(latitude=first[0], longitude=first[1])}
+                update={"origin": PlaneOrigin.model_construct(latitude=first[0], longitude=first[1])}
             )
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
     rows = parts[0].rows
@@ -126,25 +143,27 @@ def import_log(
         "clock": "run" if alone else "shared",
         "units": units_of_columns(rows.columns),
         "flags": list(FLAGS),
-        "repairs": _added([part.records for part in parts]),
+        "repairs": _add_records([part.records for part in parts]),
     }
     if parts[0].origin is not None:
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
     kinds = {segment.run: segment.manoeuvre for segment in mapping.segment if segment.manoeuvre is not None}
     if mapping.parts is not None:
-        frame = pd.concat(_distinct(piece for run, part in each for piece in _parted(part, run)), ignore_index=True)
+        frame = pd.concat(
+            _distinct_runs(piece for run, part in each for piece in _split_runs(part, run)), ignore_index=True
+        )
     elif mapping.source.runs is None:
-        segments = mapping.segment or (_whole(rows, mapping, source),)
-        frame = _cut(rows, segments, to_si(mapping.clock.unit, "t"), source)
+        segments = mapping.segment or (_whole_segment(rows, mapping, source),)
+        frame = _cut_into_runs(rows, segments, to_si(mapping.clock.unit, "t"), source)
     else:
-        frame = pd.concat([_named(part.rows, run) for run, part in each], ignore_index=True)
+        frame = pd.concat([_name_run(part.rows, run) for run, part in each], ignore_index=True)
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     dataset = Dataset(frame, metadata)
-    return _resampled(dataset, mapping.resample.step, source) if mapping.resample else dataset
+    return _resample_log(dataset, mapping.resample.step, source) if mapping.resample else dataset
 
 
-def runs_of(source: Source, log: Path) -> dict[str, Path]:
+def run_files(source: LogSource, log: Path) -> dict[str, Path]:
     """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         if log.is_dir():
@@ -161,10 +180,10 @@ def runs_of(source: Source, log: Path) -> dict[str, Path]:
     foreign = [file for file in files if not is_utf_8(str(file.relative_to(log)))]
     if foreign:
         raise DataError("its name is not UTF-8, and names the run: rename it", file=foreign[0])
-    return {run_of(file, log, source.runs): file for file in files}
+    return {run_name(file, log, source.runs): file for file in files}
 
 
-def run_of(file: Path, folder: Path, pattern: str) -> str:
+def run_name(file: Path, folder: Path, pattern: str) -> str:
     """Return the name of the run in a file: the text that a single star matches, else its path without ending."""
     if pattern.count("*") == 1 and "/" not in pattern:
         before, _, after = pattern.partition("*")
@@ -172,15 +191,15 @@ def run_of(file: Path, folder: Path, pattern: str) -> str:
     return file.relative_to(folder).with_suffix("").as_posix()
 
 
-def digest_of(mapping: Mapping, log: Path) -> str:
+def log_digest(mapping: Mapping, log: Path) -> str:
     """Return the SHA-256 of the log in hex; for several files, the SHA-256 of their SHA-256s joined."""
-    files = [*runs_of(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
-    digests = [sha256_of(file) for file in files]
+    files = [*run_files(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
+    digests = [file_digest(file) for file in files]
     several = mapping.source.runs is not None or mapping.file
     return hashlib.sha256("".join(digests).encode()).hexdigest() if several else digests[0]
 
 
-def sha256_of(file: Path) -> str:
+def file_digest(file: Path) -> str:
     """Return the SHA-256 of a file in hex; raises DataError if it cannot be read."""
     require_file(file)
     try:
@@ -190,20 +209,20 @@ def sha256_of(file: Path) -> str:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
 
 
-def _tables(
+def _run_tables(
     mapping: Mapping, logs: PlainMapping[str, Path], progress: Progress | None
 ) -> Iterator[tuple[str, Path, pd.DataFrame]]:
     """Yield name, file and rows of each log; those of each run separately where the clock begins again with a run."""
-    here = {name for column in mapping.columns.values() if not column.file for name in names_of(column.source)}
+    here = {name for column in mapping.columns.values() if not column.file for name in source_columns(column.source)}
     here |= {*mapping.clock.sources}
     here |= {mapping.parts.source} if mapping.parts is not None and mapping.parts.source is not None else set()
     whole_rows = mapping.clock.repeated == "drop" and mapping.clock.every is not None  # compared in all columns
     for run, file in logs.items():
-        log = read_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
+        log = read_log_table(file, mapping.format, mapping.clock.sources[0], () if whole_rows else here, progress)
         if file == next(iter(logs.values())):  # once for all of them
             _warn_of_zone(log, mapping, file)
         first = 0
-        for end in [*_restarts(log, mapping, file), len(log)]:
+        for end in [*_clock_restart_rows(log, mapping, file), len(log)]:
             part = log.iloc[first:end] if first or end < len(log) else log
             part.attrs = {} if first else log.attrs
             yield run, file, part
@@ -218,16 +237,19 @@ def _warn_of_zone(table: pd.DataFrame, mapping: Mapping, file: Path) -> None:
     if isinstance(form, TextFormat):
         with file.open(encoding=form.encoding, errors="replace") as stream:
             head = "".join(islice(stream, form.skip_rows))
-    first = str(column_of(table, clock, file, "clock.from").iloc[0]).strip()
+    first = str(log_column(table, clock, file, "clock.from").iloc[0]).strip()
     if said := other_zone(head, clock, first):
         logger.warning("%s: clock.from: %s: if it is the time there, %s", file.name, said, ZONE_REMEDY)
 
 
-def _restarts(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:
+def _clock_restart_rows(log: pd.DataFrame, mapping: Mapping, file: Path) -> list[int]:
     """Rows of a log at which a run begins with another clock; none where time goes back within a run, too."""
     if mapping.parts is None or mapping.parts.source is None or mapping.file:
         return []
-    t, texts = times_of(log, mapping.clock, mapping.format, file, "clock"), _texts(log, mapping.parts.source, file)
+    t, texts = (
+        read_time_column(log, mapping.clock, mapping.format, file, "clock"),
+        _run_texts(log, mapping.parts.source, file),
+    )
     changed = np.append(False, texts[1:] != texts[:-1])
     back = np.append(False, np.diff(t) < 0)
     return np.flatnonzero(changed).tolist() if back.any() and not (back & ~changed).any() else []
@@ -238,7 +260,7 @@ def _comes_first(repair: Repair, fixed: bool, read: set[str]) -> bool:
 
     fixed : whether there are such. read : names of the columns that the log has.
     """
-    if not isinstance(repair, Despike | Scale):
+    if not isinstance(repair, Despike | ScaleRepair):
         return False
     mended = {*repair.columns}
     turns = fixed and isinstance(repair, Despike) and "psi" in mended and not {"u", "v"} & mended and mended <= read
@@ -254,32 +276,32 @@ def _check_breaks(mapping: Mapping, t: Array, off: tuple[str, ...], file: Path) 
     for index, repair in enumerate(mapping.repair if alone else ()):
         for start, end in repair.intervals if isinstance(repair, Break) and repair.enabled else ():
             if end < t[0] or start > t[-1]:
-                message = f"{span_of(start, end)} is not in the log, which has {span_of(t[0], t[-1])}"
+                message = f"{format_span(start, end)} is not in the log, which has {format_span(t[0], t[-1])}"
                 raise DataError(message, file=file, path=f"repair.{index}.intervals")
 
 
-def _texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
+def _run_texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
     """The column that says the run, as texts (N,); whole numbers without a point."""
-    column = column_of(log, source, file, "parts.from").ffill().bfill()
+    column = log_column(log, source, file, "parts.from").ffill().bfill()
     if pd.api.types.is_float_dtype(column.dtype) and (column == column.round()).all():
         column = column.astype("int64")
     return np.asarray(column.astype(str).str.strip().to_numpy(dtype=object))
 
 
-def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> Imported:
-    rows, first, read, begins = _columns(mapping, file, log)
+def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> Imported:
+    rows, first, read, begins = _mapped_columns(mapping, file, log)
     _check_breaks(mapping, rows["t"].to_numpy(), off, file)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
     fixed = "speed" in mapping.columns or ("u" in mapping.columns and mapping.columns["u"].frame == "earth")
     early = [repair for repair in mapping.repair if _comes_first(repair, fixed, {*mapping.columns})]
     others = [repair for repair in mapping.repair if repair not in [*wrapping, *early]]
     rows, records = apply_repairs(rows, wrapping, off, file)
-    rows = unwrapped(rows, mapping, file)
+    rows = unwrap_angles(rows, mapping, file)
     rows, mended = apply_repairs(rows, early, off, file)
     records += mended
     origin = None
     if "latitude" in rows:
-        rows, turned, origin = projected(rows, mapping, file)
+        rows, turned, origin = project_positions(rows, mapping, file)
         records += turned
     rows, gaps = close_gaps(rows, mapping.clock.max_gap, file)
     rows = in_body(rows, mapping.columns)
@@ -288,7 +310,7 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
         for repair in others
     ]
     rows, more = apply_repairs(rows, others, off, file)
-    rows, estimated = _estimated(rows, mapping, file) if mapping.estimate is not None else (rows, [])
+    rows, estimated = _estimate_velocities(rows, mapping, file) if mapping.estimate is not None else (rows, [])
     relative = mapping.columns["beta_w"].relative if "beta_w" in mapping.columns else False
     if relative == "angle":
         rows = rows.assign(beta_w=rows["beta_w"] + rows["psi"])
@@ -305,7 +327,7 @@ def _imported(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, .
     return Imported(rows[order].reset_index(drop=True), first + records + gaps + more + estimated, read, origin, begins)
 
 
-def _added(parts: list[Records]) -> Records:
+def _add_records(parts: list[Records]) -> Records:
     """Return the records of all files; counts of one kind and column are added up."""
     if len(parts) == 1:
         return parts[0]
@@ -321,45 +343,47 @@ def _added(parts: list[Records]) -> Records:
     return list(total.values())
 
 
-def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFrame, Records, int, Begins]:
+def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFrame, Records, int, Begins]:
     """Columns `t`, those of the mapping in SI units, NaN where a value is missing, and `flags` = 0; begins of runs."""
-    records = _passed_over(log)
+    records = _skipped_line_records(log)
     if mapping.clock.repeated == "drop":
         log, more = without_repeats(log, mapping.clock, mapping.format, file)
         records += more
-    t = instants_of(log, mapping.clock, mapping.format, file, "clock")
-    begins = _begins(log, t, mapping.parts, file) if mapping.parts is not None else []
+    t = read_clock(log, mapping.clock, mapping.format, file, "clock")
+    begins = _run_begins(log, t, mapping.parts, file) if mapping.parts is not None else []
     files = {"": (log, t, mapping.format, file)}
     for name, entry in mapping.file.items():
         other = file.parent / entry.path
-        table = read_table(other, entry.format, entry.clock.sources[0])
-        times = instants_of(table, entry.clock, entry.format, other, f"file.{name}.clock")
+        table = read_log_table(other, entry.format, entry.clock.sources[0])
+        times = read_clock(table, entry.clock, entry.format, other, f"file.{name}.clock")
         files[name] = (table, times, entry.format, other)
-        records += _passed_over(table)
+        records += _skipped_line_records(table)
     channels: dict[str, Channel] = {}
     for name, column in mapping.columns.items():
         table, _, _, other = files[column.file or ""]
-        for source in names_of(column.source):
-            column_of(table, source, other, f"columns.{name}.from")
-    uses = Counter((one.file or "", source) for one in mapping.columns.values() for source in names_of(one.source))
+        for source in source_columns(column.source):
+            log_column(table, source, other, f"columns.{name}.from")
+    uses = Counter(
+        (one.file or "", source) for one in mapping.columns.values() for source in source_columns(one.source)
+    )
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
-        sides = sides_of(name) if column.unit == "deg" and isinstance(column.source, str) else ""
+        sides = side_letters(name) if column.unit == "deg" and isinstance(column.source, str) else ""
         place, units = f"columns.{name}.from", (column.unit, *(["%"] if "factor" in column.model_fields_set else []))
-        parts = [numbers_of(table, one, form, other, place, sides, units) for one in names_of(column.source)]
+        parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
         numbers = parts[0]
         if column.unit == "ddmm":
             numbers = of_minutes(numbers, table, other, f"columns.{name}.unit")
         if column.unit == "ais":
             numbers = of_ais(numbers, table, other, f"columns.{name}.unit")
         if column.unit == "quaternion":
-            numbers = of_quaternion(parts, names_of(column.source), table, other, f"columns.{name}.from")
+            numbers = of_quaternion(parts, source_columns(column.source), table, other, f"columns.{name}.from")
         elif len(parts) > 1:
-            numbers = of_parts(parts, names_of(column.source), table, other, f"columns.{name}.from")
+            numbers = of_parts(parts, source_columns(column.source), table, other, f"columns.{name}.from")
         size = to_si(column.unit, name)
         factor = column.sign * column.factor * size
         values = numbers * factor if factor != 1.0 else numbers
-        for source in names_of(column.source):
+        for source in source_columns(column.source):
             uses[column.file or "", source] -= 1
             if not uses[column.file or "", source]:
                 table.pop(source)  # of a large log there is room for one copy only
@@ -371,10 +395,10 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
         for name, (times, values) in channels.items():  # afterwards the jump is not seen: it is between two instants
             if mapping.columns[name].interpolation != "angle":
                 check_wraps(times, values, name, mapping.columns[name], gap, file)
-        how = {name: interpolation_of(name, column) for name, column in mapping.columns.items()}
+        how = {name: interpolation_rule(name, column) for name, column in mapping.columns.items()}
         held = {name for name in channels if how[name] == "previous"}
         t = common_instants(channels, held, t, mapping.clock.step, file)
-        columns = {name: at_instants(t, *channels[name], how[name], gap) for name in channels}
+        columns = {name: resample_channel(t, *channels[name], how[name], gap) for name in channels}
         notes = [(name, f"{how[name]}, latency {column.latency:g} s") for name, column in mapping.columns.items()]
         records += [{"kind": "resampled", "column": name, "count": len(t), "note": note} for name, note in notes]
     else:
@@ -384,7 +408,7 @@ def _columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd.DataFr
     return rows, records, read, begins
 
 
-def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path) -> Begins:
+def _run_begins(log: pd.DataFrame, t: NDArray[np.float64], parts: RunParts, file: Path) -> Begins:
     """Return where runs begin in the rows of a log at t (N,) [s]: after a pause, or where the column changes.
 
     Runs are named after the value of the column, else after their number.
@@ -392,12 +416,12 @@ def _begins(log: pd.DataFrame, t: NDArray[np.float64], parts: Parts, file: Path)
     new = np.append(True, np.diff(t) > (np.inf if parts.pause is None else parts.pause))
     if parts.source is None:
         return [(float(t[row]), str(number)) for number, row in enumerate(np.flatnonzero(new), 1)]
-    texts = _texts(log, parts.source, file)
+    texts = _run_texts(log, parts.source, file)
     new |= np.append(True, texts[1:] != texts[:-1])
     return [(float(t[row]), str(texts[row])) for row in np.flatnonzero(new)]
 
 
-def _passed_over(table: pd.DataFrame) -> Records:
+def _skipped_line_records(table: pd.DataFrame) -> Records:
     count = int(table.attrs.get("unreadable", 0))
     note = "no NMEA 0183 sentence, or its checksum fails"
     records: Records = [{"kind": "unreadable", "column": "", "count": count, "note": note}] if count else []
@@ -408,7 +432,7 @@ def _passed_over(table: pd.DataFrame) -> Records:
     return [*records, {"kind": "ragged", "column": "", "count": len(ragged), "note": note}] if ragged else records
 
 
-def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records]:
+def _estimate_velocities(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.DataFrame, Records]:
     """Fill in u, v, r that the log lacks, stretch by stretch, and their standard deviations."""
     assert mapping.estimate is not None
     given = mapping.estimate
@@ -420,7 +444,7 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
     parts, squares = [], 0.0
     for _, stretch in rows.groupby(np.cumsum(broken), sort=False):
         if len(stretch) < 2:
-            at = moment_of(stretch["t"].iloc[0])
+            at = format_moment(stretch["t"].iloc[0])
             raise DataError(f"a single row between two breaks at {at}: nothing to estimate from; remove it", file=file)
         logged = {name: stretch[name].to_numpy() for name in ("north", "east", "psi", "u", "v", "r") if name in rows}
         smoothed = smooth_motion(stretch["t"].to_numpy(), logged, noise)
@@ -433,12 +457,12 @@ def _estimated(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tuple[pd.Dat
     return pd.concat(parts, ignore_index=True), records
 
 
-def _whole(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
+def _whole_segment(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
     unit = to_si(mapping.clock.unit, "t")
     return Segment(run=file.stem, start=rows["t"].iloc[0] / unit, end=rows["t"].iloc[-1] / unit)
 
 
-def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
+def _cut_into_runs(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
     """Put the runs one after another; rows that belong to two runs are repeated."""
     t = rows["t"].to_numpy()
     slack, step = clock_slack(t), float(np.median(np.diff(t)))
@@ -447,14 +471,14 @@ def _cut(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Pat
         start, end = segment.start * unit, segment.end * unit
         inside = (t >= start - slack) & (t <= end + slack)
         if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
-            message = f"run {segment.run!r}, {span_of(start, end)}, is not in the log, which has {span_of(t[0], t[-1])}"
+            message = f"run {segment.run!r}, {format_span(start, end)}, is not in the log, which has {format_span(t[0], t[-1])}"
             raise DataError(message, file=file, path=f"segment.{index}")
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
-        runs.append(_named(part, segment.run))
+        runs.append(_name_run(part, segment.run))
     return runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
 
 
-def _parted(log: Imported, name: str) -> Iterator[pd.DataFrame]:
+def _split_runs(log: Imported, name: str) -> Iterator[pd.DataFrame]:
     """Yield the runs of a log, each after its name in it; a run of a single row is no run."""
     t = log.rows["t"].to_numpy()
     starts = np.array([start for start, _ in log.begins])
@@ -462,10 +486,10 @@ def _parted(log: Imported, name: str) -> Iterator[pd.DataFrame]:
     for index, (_, run) in enumerate(log.begins):
         rows = log.rows.loc[number == index]
         if len(rows) > 1:
-            yield _named(rows.reset_index(drop=True), f"{name} {run}")
+            yield _name_run(rows.reset_index(drop=True), f"{name} {run}")
 
 
-def _distinct(runs: Iterable[pd.DataFrame]) -> Iterator[pd.DataFrame]:
+def _distinct_runs(runs: Iterable[pd.DataFrame]) -> Iterator[pd.DataFrame]:
     """Yield runs with a number after a name that was there already."""
     taken: set[str] = set()
     for rows in runs:
@@ -478,13 +502,13 @@ def _distinct(runs: Iterable[pd.DataFrame]) -> Iterator[pd.DataFrame]:
         yield rows if called == name else rows.assign(run=pd.Series(called, index=rows.index, dtype="str"))
 
 
-def _named(rows: pd.DataFrame, run: str) -> pd.DataFrame:
+def _name_run(rows: pd.DataFrame, run: str) -> pd.DataFrame:
     named = rows.copy(deep=False)
     named.insert(0, "run", pd.Series(run, index=rows.index, dtype="str"))
     return named
 
 
-def _resampled(dataset: Dataset, step: float, file: Path) -> Dataset:
+def _resample_log(dataset: Dataset, step: float, file: Path) -> Dataset:
     """Rows `step` [s] apart; the first row of a stretch keeps its flags, so breaks stay."""
 
     def resample() -> Iterator[pd.DataFrame]:

@@ -12,48 +12,54 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.cells import column_of, numbers_of, row_in_words
-from shipid.logs.dates import date_texts, dated, hour_twice, moment_of, rolled_over, seconds, time_texts
+from shipid.logs.cells import log_column, parse_numbers, row_in_words
+from shipid.logs.dates import (
+    date_texts,
+    format_moment,
+    hour_twice,
+    join_date_and_time,
+    parse_dates,
+    rollover_words,
+    time_texts,
+)
 from shipid.logs.formats import Format
-from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, names_of
+from shipid.logs.mapping import Clock, FileClock, Named, clock_seconds, is_dated, source_columns
 from shipid.logs.repairs import Records
 
 
-def instants_of(
-    log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str
-) -> NDArray[np.float64]:
+def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
     """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
-    t = times_of(log, clock, form, file, path)
+    t = read_time_column(log, clock, form, file, path)
     twice = hour_twice(t) if np.isfinite(t).all() and (is_dated(clock.unit) or clock.unit == "hhmmss") else None
     if twice is not None:
         raise DataError(twice[1], file=file, path=row_in_words(log, twice[0]))
     if isinstance(clock, Clock) and clock.every is not None and np.isfinite(t).all():
-        return evenly(t, clock.every, log, file)
+        return even_instants(t, clock.every, log, file)
     wrong = np.flatnonzero(~(np.diff(t) > 0)) if np.isfinite(t).all() else np.flatnonzero(~np.isfinite(t)) - 1
     if len(wrong):
         row = int(wrong[0]) + 1
         if not np.isfinite(t[row]):
-            what = _unread(log, clock, row, file, path)
+            what = _bad_time(log, clock, row, file, path)
         elif t[row] == t[row - 1]:
-            what = (
-                f"the time {moment_of(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
-            )
+            what = f"the time {format_moment(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
         else:
-            back = f"from {moment_of(t[row - 1])} to {moment_of(t[row])}{rolled_over(t[row] - t[row - 1])}"
+            back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}{rollover_words(t[row] - t[row - 1])}"
             what = f"time goes back {back}: sort or split the log"
         raise DataError(what, file=file, path=row_in_words(log, row))
     return t
 
 
-def times_of(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
+def read_time_column(
+    log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str
+) -> NDArray[np.float64]:
     """The column of time [s] as it is written, not a number where it is missing."""
     if clock.unit == "date":
         times = _as_text(log, clock.source, time_texts, form, file, f"{path}.from")
         if clock.date is None:
-            return seconds(times)
-        return seconds(dated(_as_text(log, clock.date, date_texts, form, file, f"{path}.date"), times))
+            return parse_dates(times)
+        return parse_dates(join_date_and_time(_as_text(log, clock.date, date_texts, form, file, f"{path}.date"), times))
     assert isinstance(clock.source, str)
-    return clock_seconds(numbers_of(log, clock.source, form, file, f"{path}.from"), clock.unit)
+    return clock_seconds(parse_numbers(log, clock.source, form, file, f"{path}.from"), clock.unit)
 
 
 def _as_text(
@@ -66,15 +72,15 @@ def _as_text(
 ) -> pd.Series[Any]:
     """The column of dates or times, or those of its parts as one."""
     if isinstance(source, str):
-        return column_of(log, source, file, path)
-    return write([numbers_of(log, name, form, file, path) for name in source]).set_axis(log.index)
+        return log_column(log, source, file, path)
+    return write([parse_numbers(log, name, form, file, path) for name in source]).set_axis(log.index)
 
 
-def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, path: str) -> str:
+def _bad_time(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, path: str) -> str:
     """Say what is wrong with the time of a row: nothing is there, or a text that is no date."""
-    times, days = names_of(clock.source), names_of(clock.date) if clock.date is not None else ()
+    times, days = source_columns(clock.source), source_columns(clock.date) if clock.date is not None else ()
     places = [*((name, f"{path}.date") for name in days), *((name, f"{path}.from") for name in times)]
-    cells = [column_of(log, name, file, place).iloc[row] for name, place in places]
+    cells = [log_column(log, name, file, place).iloc[row] for name, place in places]
     if any(pd.isna(cell) or not str(cell).strip() for cell in cells):
         return "no time here: remove the row"
     text = " ".join(str(cell).strip() for cell in cells)
@@ -83,7 +89,7 @@ def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, p
         return f"{text!r} is no date or time of day, as {said} have to say: correct it, or list them in their order"
     if clock.unit != "date":
         return f"{text} is no time of day, hours, minutes and seconds as in 123005.5: correct it, or write another unit"
-    if np.isfinite(seconds(pd.Series([text]))[0]):
+    if np.isfinite(parse_dates(pd.Series([text]))[0]):
         return f"{text!r} has no time zone, while other rows have one: write it in every row, or in none"
     return (
         f"{text!r} is no date or time of day that can be read: write dates as 2024-05-14 08:00:00; "
@@ -94,15 +100,15 @@ def _unread(log: pd.DataFrame, clock: Clock | FileClock, row: int, file: Path, p
 def without_repeats(log: pd.DataFrame, clock: Clock, form: Format, file: Path) -> tuple[pd.DataFrame, Records]:
     """The log without rows that repeat the time of the row before (with `every`: the whole row), and their number."""
     if clock.every is None:
-        again = np.diff(times_of(log, clock, form, file, "clock"), prepend=-np.inf) == 0
+        again = np.diff(read_time_column(log, clock, form, file, "clock"), prepend=-np.inf) == 0
     else:
-        again = repeated_rows(log)
+        again = rows_repeated(log)
     note = "rows that repeat the row before" if clock.every is not None else "rows with the time of the row before"
     records: Records = [{"kind": "repeated", "column": "", "count": int(again.sum()), "note": note}]
     return (log.loc[~again], records) if again.any() else (log, [])
 
 
-def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
+def rows_repeated(table: pd.DataFrame) -> NDArray[np.bool_]:
     """Whether each row (N,) has the values of the row before in all columns."""
     same = np.ones(len(table), dtype=bool)
     same[:1] = False
@@ -114,14 +120,14 @@ def repeated_rows(table: pd.DataFrame) -> NDArray[np.bool_]:
     return same
 
 
-def evenly(t: NDArray[np.float64], every: float, log: pd.DataFrame, file: Path) -> NDArray[np.float64]:
+def even_instants(t: NDArray[np.float64], every: float, log: pd.DataFrame, file: Path) -> NDArray[np.float64]:
     """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s] of a log.
 
     The rows run on from the first. Where the column pauses, or where rows were lost, whole steps are left out. Raises
     DataError where the column leaves the instants by more than it is rounded.
     """
     even, _ = even_clock(t, every)
-    rounding = rounding_of(t)
+    rounding = clock_rounding(t)
     off = np.abs(even - t)
     wrong = (off > rounding + every) | (np.diff(even, prepend=-np.inf) <= 0)
     if np.any(wrong):
@@ -133,7 +139,7 @@ def evenly(t: NDArray[np.float64], every: float, log: pd.DataFrame, file: Path) 
 
 def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64], int]:
     """Return instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
-    rounding = rounding_of(t)
+    rounding = clock_rounding(t)
     pauses = np.flatnonzero(np.diff(t) > 2.0 * rounding[1:] + 3.0 * every) + 1
     even = np.empty(len(t))
     for first, last in zip([0, *pauses], [*pauses, len(t)], strict=True):
@@ -169,7 +175,7 @@ def _with_losses(t: NDArray[np.float64], every: float, rounding: NDArray[np.floa
     return np.asarray(offset + every * steps)
 
 
-def rounding_of(t: NDArray[np.float64]) -> NDArray[np.float64]:
+def clock_rounding(t: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far a rounded column of time may be from the truth in each row [s]: its step to the next other value.
 
     Of numbers written with a few digits the step grows with the number; the largest so far is taken.

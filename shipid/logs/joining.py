@@ -12,7 +12,7 @@ import pandas as pd
 
 from shipid.data.dataset import FIRST_DATED_TIME, Dataset, units_of_columns
 from shipid.errors import DataError
-from shipid.logs.frames import PARALLEL, convergence
+from shipid.logs.frames import PARALLEL, meridian_convergence
 from shipid.units import percent_text
 
 FARTHEST = 1e5  # m between origins
@@ -20,7 +20,7 @@ COPIED = 0.3  # share of the rows of a run from which on it is a copy: manoeuvre
 PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from no common moment
 
 
-def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
+def join_datasets(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     """Return one dataset with all runs, and notes on what was changed.
 
     Positions have the origin of the first dataset, and directions the north of its plane. Columns that not all have are
@@ -40,14 +40,14 @@ def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
     _check_alike(datasets)
     _check_copies(datasets)
     notes: list[str] = []
-    columns = _columns(datasets, notes)
-    names = _names(datasets, notes)
-    clock, delays = _clock(datasets, notes)
+    columns = _common_columns(datasets, notes)
+    names = _joined_names(datasets, notes)
+    clock, delays = _common_clock(datasets, notes)
     flags = list(dict.fromkeys(name for one in datasets.values() for name in one.metadata.get("flags", [])))
     frames = []
     for file, one in datasets.items():
-        north, east, turn = _moved(datasets, file)
-        frame = one.frame[columns].assign(run=one.frame["run"].map(names[file]), flags=_flags(one, flags))
+        north, east, turn = _origin_offset(datasets, file)
+        frame = one.frame[columns].assign(run=one.frame["run"].map(names[file]), flags=_joined_flags(one, flags))
         place = (frame["north"] + 1j * frame["east"]).to_numpy() * np.exp(1j * turn)
         turned = {name: frame[name] + turn for name in ("psi", "beta_w") if name in frame}
         frame = frame.assign(north=place.real + north, east=place.imag + east, t=frame["t"] + delays[file], **turned)
@@ -57,7 +57,7 @@ def join(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
             moved = f"positions moved by {north:.1f} m north, {east:.1f} m east{angle}"
             notes.append(f"{file.name}: {moved}, to the first origin")
     frame = pd.concat(frames, ignore_index=True)
-    return Dataset(frame, _metadata(datasets, names, flags, clock, list(frame.columns))), notes
+    return Dataset(frame, _joined_metadata(datasets, names, flags, clock, list(frame.columns))), notes
 
 
 def _check_alike(datasets: Mapping[Path, Dataset]) -> None:
@@ -88,7 +88,7 @@ def _check_copies(datasets: Mapping[Path, Dataset]) -> None:
                 raise DataError(f"{copied}: a copy would train on what it tests; leave one of them out", file=file)
 
 
-def _columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:
+def _common_columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:
     """Columns that all have, in the order of the first."""
     everywhere = set.intersection(*({str(name) for name in one.frame.columns} for one in datasets.values()))
     if not {"V_w", "beta_w"} <= everywhere:
@@ -101,7 +101,7 @@ def _columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:
     return [str(name) for name in first if name in everywhere]
 
 
-def _names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Path, dict[str, str]]:
+def _joined_names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Path, dict[str, str]]:
     """File -> run -> its name in the whole."""
     runs = [run for one in datasets.values() for run in one.runs]
     if len(set(runs)) == len(runs):
@@ -117,13 +117,13 @@ def _names(datasets: Mapping[Path, Dataset], notes: list[str]) -> dict[Path, dic
     return {file: {run: f"{stem} {run}" for run in one.runs} for stem, (file, one) in named}
 
 
-def _clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dict[Path, float]]:
+def _common_clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dict[Path, float]]:
     """Clock of the whole, and what is added to the times of each file [s]."""
     delays = dict.fromkeys(datasets, 0.0)
     if any(one.metadata.get("clock", "shared") == "run" for one in datasets.values()):
         for file, one in datasets.items():
             if one.metadata.get("clock", "shared") != "run":
-                _check_apart(file, one)
+                _check_no_overlap(file, one)
         return "run", delays
     spans = {file: (float(one.frame["t"].min()), float(one.frame["t"].max())) for file, one in datasets.items()}
     with_date = {file: begin > FIRST_DATED_TIME for file, (begin, _) in spans.items()}
@@ -141,7 +141,7 @@ def _clock(datasets: Mapping[Path, Dataset], notes: list[str]) -> tuple[str, dic
     return "shared", delays
 
 
-def _check_apart(file: Path, one: Dataset) -> None:
+def _check_no_overlap(file: Path, one: Dataset) -> None:
     """Raise DataError where two runs of one recording share moments, which clocks of runs do not say."""
     spans = one.frame.groupby("run", sort=False)["t"].agg(["min", "max"]).sort_values("min")
     over = np.flatnonzero(spans["max"].cummax().to_numpy()[:-1] >= spans["min"].to_numpy()[1:])
@@ -151,7 +151,7 @@ def _check_apart(file: Path, one: Dataset) -> None:
         raise DataError(f"{sentence}: cut the segments of this mapping apart, and import again", file=file)
 
 
-def _moved(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float, float]:
+def _origin_offset(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float, float]:
     """North and east [m] of the origin of a dataset, seen from that of the first, and the angle of its north [rad]."""
     (first, wanted), *_ = datasets.items()
     here, there = (one.metadata.get("origin") for one in (datasets[file], wanted))
@@ -168,10 +168,10 @@ def _moved(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float, 
     if np.hypot(north, east) > FARTHEST:
         away = f"{np.hypot(north, east) / 1e3:.0f} km from that of {first.name}"
         raise DataError(f"its origin is {away}: a plane holds {FARTHEST / 1e3:.0f} km", file=file, path="origin")
-    return float(north), float(east), float(convergence(*places))
+    return float(north), float(east), float(meridian_convergence(*places))
 
 
-def _flags(one: Dataset, flags: list[str]) -> np.ndarray:
+def _joined_flags(one: Dataset, flags: list[str]) -> np.ndarray:
     """Flags of the rows with the bits of the whole."""
     before = one.frame["flags"].to_numpy()
     result = np.zeros_like(before)
@@ -180,7 +180,7 @@ def _flags(one: Dataset, flags: list[str]) -> np.ndarray:
     return result
 
 
-def _metadata(
+def _joined_metadata(
     datasets: Mapping[Path, Dataset],
     names: Mapping[Path, Mapping[str, str]],
     flags: list[str],

@@ -20,7 +20,7 @@ WORDS = {
 """Kind -> regular expression of the words in a run's name that say it; the first kind that fits counts."""
 
 
-def declared_kind(name: str) -> str | None:
+def kind_in_name(name: str) -> str | None:
     """Kind that the name of a run says in words, as in `ZZ_10_10` or `berthing 3`; None if none."""
     text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).replace("_", " ").lower()
     text = re.sub(r"(?<=[a-z])(?=\d)|(?<=\d)(?=[a-z])", " ", text)

@@ -33,7 +33,7 @@ from shipid.logs.repairs import (
     HeadingOffset,
     LeverArm,
     Repair,
-    Strict,
+    StrictPart,
     WrapInterpolation,
 )
 from shipid.physics.signals import is_command, is_output, rows_of_role, signal_row
@@ -116,12 +116,12 @@ Four = Annotated[tuple[str, ...], Field(min_length=4, max_length=4)]
 """The columns x, y, z, w of a quaternion."""
 
 
-def names_of(source: Named | Four) -> tuple[str, ...]:
+def source_columns(source: Named | Four) -> tuple[str, ...]:
     """Return the names of the columns of the log that say a value."""
     return (source,) if isinstance(source, str) else tuple(source)
 
 
-class Source(Strict):
+class LogSource(StrictPart):
     """Where the log is published, and the exact bytes that the mapping was written for.
 
     With `runs`, a pattern such as `Z_*.dat` or `**/*.csv`, the log is a folder. Every file of that name is one run with
@@ -140,7 +140,7 @@ class Source(Strict):
     licence: str | None = None
 
 
-class TimeColumn(Strict):
+class TimeColumn(StrictPart):
     """The column of time of a file, or two or three of hour, minute and second; beside times of day the date.
 
     `date` is a column of dates, or two or three of year, month and day, or of year and day of the year. The unit is
@@ -154,7 +154,7 @@ class TimeColumn(Strict):
     @property
     def sources(self) -> tuple[str, ...]:
         """Names of all columns of the log that say the time."""
-        return (*names_of(self.source), *(names_of(self.date) if self.date is not None else ()))
+        return (*source_columns(self.source), *(source_columns(self.date) if self.date is not None else ()))
 
 
 class Clock(TimeColumn):
@@ -174,7 +174,7 @@ class FileClock(TimeColumn):
     """The column of time of a further file."""
 
 
-class File(Strict):
+class File(StrictPart):
     """A further file of the log, with its format and clock; `path` is relative to the folder of the log."""
 
     path: str
@@ -182,14 +182,14 @@ class File(Strict):
     clock: FileClock
 
 
-class Origin(Strict):
+class PlaneOrigin(StrictPart):
     """Where north and east are zero [deg]."""
 
     latitude: float = Field(ge=-90, le=90)
     longitude: float = Field(ge=-180, le=360)
 
 
-class Column(Strict):
+class Column(StrictPart):
     """One column of the dataset: value = sign * factor * (source column) + offset, in `unit`, then turned as declared.
 
     The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds; that of a heading
@@ -211,7 +211,7 @@ class Column(Strict):
     interpolation: Literal["linear", "previous", "angle"] | None = None
 
 
-class Estimate(Strict):
+class VelocityEstimate(StrictPart):
     """How u, v, r that the log lacks are estimated: standard deviations of what is logged, and how fast they change.
 
     `position` [m], `heading_deg`, `velocity` [m/s] and `rate_deg` [deg/s] are errors of one sample; `acceleration`
@@ -226,7 +226,7 @@ class Estimate(Strict):
     angular_acceleration_deg: float = Field(gt=0)
 
 
-class Segment(Strict):
+class Segment(StrictPart):
     """One run: its unique name, start and end on the log's clock, and what it is."""
 
     run: str = Field(min_length=1)
@@ -235,34 +235,34 @@ class Segment(Strict):
     manoeuvre: Manoeuvre | None = None
 
 
-class Parts(Strict):
+class RunParts(StrictPart):
     """Where a new run begins in a file of several: a column that changes its value, or a pause of the clock [s]."""
 
     source: str | None = Field(default=None, alias="from")
     pause: float | None = Field(default=None, gt=0)
 
 
-class Resample(Strict):
+class Resample(StrictPart):
     """Instants `step` [s] apart from the start of every unbroken stretch."""
 
     step: float = Field(gt=0)
 
 
-class Mapping(Strict):
+class Mapping(StrictPart):
     """A whole mapping; `repair` holds parameters in SI units."""
 
     name: str
     vessel: str | None = None
-    source: Source = Source()
+    source: LogSource = LogSource()
     format: SerializeAsAny[Format] = TextFormat()
     clock: Clock
     file: dict[str, File] = Field(default_factory=dict)
-    origin: Origin | None = None
+    origin: PlaneOrigin | None = None
     columns: dict[str, Column]
-    estimate: Estimate | None = None
+    estimate: VelocityEstimate | None = None
     repair: tuple[SerializeAsAny[Repair], ...] = ()
     segment: tuple[Segment, ...] = ()
-    parts: Parts | None = None
+    parts: RunParts | None = None
     resample: Resample | None = None
     digest: str
 
@@ -283,21 +283,21 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
     if "digest" in raw:
         raise DocumentError("the digest is computed, not written: remove it", file=file, path="digest")
     parts: dict[str, Any] = {
-        "repair": list(_repairs(raw.get("repair", []), file)),
+        "repair": list(_parse_repairs(raw.get("repair", []), file)),
         "digest": document.digest_document(raw),
     }
-    parts |= _formats(raw, file)
+    parts |= _parse_formats(raw, file)
     if isinstance(raw.get("columns"), dict):
         parts["columns"] = {
             key: document.parse_model(Column, entry, file, prefix=f"columns.{key}")
             for key, entry in raw["columns"].items()
         }
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
-    _check_columns(mapping, file)
+    _check_mapped_columns(mapping, file)
     _check_missing(mapping, file)
     _check_instants(mapping, file)
     _check_segments(mapping, file)
-    clock = _factor(mapping.clock.unit, "s", file, "clock.unit")
+    clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
     for index, repair in enumerate(mapping.repair):
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
@@ -345,7 +345,7 @@ def since_midnight(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return since
 
 
-def degrees_of(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def degrees_and_minutes(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Numbers (N,) such as 6326.4, 63 degrees and 26.4 minutes, in degrees; NaN where there are 60 minutes or more."""
     size = np.abs(values)
     degrees = size // 100 + np.where(size % 100 < 60, size % 100, np.nan) / 60.0
@@ -372,7 +372,7 @@ def degrees_in_parts(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.asarray(np.where(np.any(np.signbit(parts), axis=0), -degrees, degrees), dtype=np.float64)
 
 
-def yaw_of(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def quaternion_yaw(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Yaw [rad] of quaternions x, y, z, w (4, N), counted about z from x to y; NaN where all four are 0.
 
     It is the first turn of the three by yaw, pitch and roll.
@@ -382,7 +382,7 @@ def yaw_of(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.asarray(np.where(np.any(np.array(parts) != 0.0, axis=0), yaw, np.nan), dtype=np.float64)
 
 
-def size_of(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def quaternion_size(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Size (N,) of quaternions (4, N): 1, but for rounding."""
     return np.asarray(np.sqrt(np.sum(np.square(parts), axis=0)), dtype=np.float64)
 
@@ -411,7 +411,11 @@ def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     degrees = degrees_in_parts([values[0], *(np.nan_to_num(one) for one in values[1:])])
     packed = int(digits[alone].max()) if alone.any() else 0
     if packed > 3:
-        minutes = degrees_of(values[0]) if packed < 6 else degrees_of(values[0] // 100.0) + values[0] % 100.0 / 3600.0
+        minutes = (
+            degrees_and_minutes(values[0])
+            if packed < 6
+            else degrees_and_minutes(values[0] // 100.0) + values[0] % 100.0 / 3600.0
+        )
         degrees = np.where(alone, minutes if packed < 8 else np.nan, degrees)
     one_letter = letter.isin([*sides]) if letter.ne("").any() else letter.eq("")
     whole = np.isnan(values[1]) | (values[0] % 1 == 0) & (np.isnan(values[2]) | (values[1] % 1 == 0))
@@ -427,7 +431,7 @@ def is_position(text: str) -> bool:
     return angle is not None and angle[4] is not None and angle[1] + angle[6] != ""
 
 
-def sides_of(name: str) -> str:
+def side_letters(name: str) -> str:
     """Letters of the sides that an angle may have in a text, by its column of the dataset; empty where it has none."""
     row = signal_row(name)
     sided = name == "phi" or (row is not None and row.angle and is_command(name))
@@ -459,22 +463,22 @@ def is_date(t: float, unit: str) -> bool:
     return is_dated(unit) and FIRST_DATED_TIME < t < LAST_DATE
 
 
-def _formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
+def _parse_formats(raw: dict[str, Any], file: Path) -> dict[str, Any]:
     """[format] and [file.<name>] as models, so that an unknown key is named with the keys of that kind of format."""
     parts: dict[str, Any] = {}
     if isinstance(raw.get("format"), dict):
-        parts["format"] = _format(raw["format"], file, "format")
+        parts["format"] = _parse_format(raw["format"], file, "format")
     if isinstance(raw.get("file"), dict):
         parts["file"] = {}
         for key, entry in raw["file"].items():
             inner = {} if not isinstance(entry, dict) else entry
-            form = _format(inner.get("format", {}), file, f"file.{key}.format")
+            form = _parse_format(inner.get("format", {}), file, f"file.{key}.format")
             read = {**inner, "format": form} if isinstance(entry, dict) else entry
             parts["file"][key] = document.parse_model(File, read, file, prefix=f"file.{key}")
     return parts
 
 
-def _format(raw: Any, file: Path, path: str) -> Format:
+def _parse_format(raw: Any, file: Path, path: str) -> Format:
     kind = str(raw.get("kind", "text")) if isinstance(raw, dict) else "text"
     if kind not in READERS:
         raise DocumentError(f"unknown kind {kind!r}: {suggest_name(kind, READERS)}", file=file, path=f"{path}.kind")
@@ -482,7 +486,7 @@ def _format(raw: Any, file: Path, path: str) -> Format:
     return form
 
 
-def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
+def _parse_repairs(raw: Any, file: Path) -> Iterator[Repair]:
     """Every [[repair]] as the model of its kind, so that an unknown key is named with the keys of that kind."""
     if not isinstance(raw, list) or not all(isinstance(entry, dict) for entry in raw):
         raise DocumentError("must be a list of tables: write [[repair]]", file=file, path="repair")
@@ -495,8 +499,8 @@ def _repairs(raw: Any, file: Path) -> Iterator[Repair]:
         yield document.parse_model(REPAIRS[kind][0], entry, file, prefix=f"repair.{index}")
 
 
-def _check_columns(mapping: Mapping, file: Path) -> None:
-    _factor(mapping.clock.unit, "s", file, "clock.unit")
+def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
+    _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     columns = mapping.columns
     mapped = (
         *required_columns().keys() - {"t"},
@@ -508,7 +512,7 @@ def _check_columns(mapping: Mapping, file: Path) -> None:
         if unit is None or not (name in mapped or is_command(name) or is_output(name)):
             hint = f"or <component>.<signal> with a signal of {', '.join((*rows_of_role('command'), *rows_of_role('output')))}"
             raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
-        _factor(column.unit, unit, file, f"{path}.unit")
+        _unit_factor(column.unit, unit, file, f"{path}.unit")
         if column.unit == "ddmm" and name not in ("latitude", "longitude"):
             message = "only latitude and longitude are in degrees and minutes: write deg or rad"
             raise DocumentError(message, file=file, path=f"{path}.unit")
@@ -605,7 +609,7 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             message = "nothing is interpolated at other instants: set [clock] step, a latency or a file"
             raise DocumentError(message, file=file, path=f"{path}.interpolation")
     for name, entry in mapping.file.items():
-        _factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
+        _unit_factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
     clocks: dict[str, Clock | FileClock] = {"clock": mapping.clock}
     clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
     for path, clock in clocks.items():
@@ -659,12 +663,15 @@ def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
     """Give the repair with its parameters in SI units."""
     match repair:
         case WrapInterpolation():
-            return repair.model_copy(update={"threshold": repair.threshold * _factor(repair.unit, "rad", file, path)})
+            return repair.model_copy(
+                update={"threshold": repair.threshold * _unit_factor(repair.unit, "rad", file, path)}
+            )
         case HeadingOffset():
-            return repair.model_copy(update={"offset": repair.offset * _factor(repair.unit, "rad", file, path)})
+            return repair.model_copy(update={"offset": repair.offset * _unit_factor(repair.unit, "rad", file, path)})
         case Despike(unit=str(unit)):
             factors = [
-                _factor(unit, INPUTS.get(name) or unit_of_column(name) or "", file, path) for name in repair.columns
+                _unit_factor(unit, INPUTS.get(name) or unit_of_column(name) or "", file, path)
+                for name in repair.columns
             ]
             return repair.model_copy(update={"threshold": repair.threshold * factors[0]})
         case Break():
@@ -673,7 +680,7 @@ def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:
     return repair
 
 
-def _factor(unit: str, si: str, file: Path, path: str) -> float:
+def _unit_factor(unit: str, si: str, file: Path, path: str) -> float:
     if unit not in UNITS[si]:
         share = ""
         if unit in ("%", "percent", "pct") and "rev/s" in UNITS[si]:

@@ -32,7 +32,7 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
         variables = loadmat(file, simplify_cells=True)
-        vectors, further = dict(_vectors(variables)), list(_no_vectors(variables))
+        vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))
     except NotImplementedError:
         message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
         raise DataError(message, file=file, path="format.kind") from None
@@ -46,7 +46,7 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
         first = next(iter(other), None)
         which = f"; {first!r} is {other[first]}" if first is not None else ""
         raise DataError(f"no variable of this MATLAB file is a vector of numbers{which}", file=file)
-    measure = clock if clock in vectors else _measure(vectors)
+    measure = clock if clock in vectors else _longest_measure(vectors)
     length = len(vectors[measure])
     for name, values in vectors.items():
         if len(values) != length:
@@ -59,16 +59,16 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
     return table
 
 
-def _measure(vectors: dict[str, np.ndarray[Any, Any]]) -> str:
+def _longest_measure(vectors: dict[str, np.ndarray[Any, Any]]) -> str:
     """Name of the first of the longest vectors that are enough for a log, such as those of one of two recorders."""
     counts = Counter(map(len, vectors.values()))
     longest = max([length for length in counts if counts[length] >= ENOUGH_VECTORS] or counts)
     return next(name for name in vectors if len(vectors[name]) == longest)
 
 
-def _vectors(variables: dict[str, Any]) -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
+def _numeric_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, np.ndarray[Any, Any]]]:
     """Dotted name and values of every numeric vector, structs and matrices opened."""
-    for name, value in _opened(variables):
+    for name, value in _open_structs(variables):
         if isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.number) and not np.iscomplexobj(value):
             if value.ndim == 1:
                 yield name, value.astype(float)
@@ -89,13 +89,13 @@ def _is_transposed(matrix: np.ndarray[Any, Any]) -> bool:
     return bool(columns > max(rows, MOST_SIGNALS))
 
 
-def _opened(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
+def _open_structs(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
     """Dotted name and value of every variable, structs and sparse vectors opened."""
     for key, value in variables.items():
         if key.startswith("__"):
             continue
         if isinstance(value, dict):
-            yield from _opened(value, f"{prefix}{key}.")
+            yield from _open_structs(value, f"{prefix}{key}.")
         elif _is_sparse(value) and min(value.shape) == 1:
             yield f"{prefix}{key}", value.toarray().squeeze()
         else:
@@ -107,7 +107,7 @@ def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
 
     The last is empty where nothing has to be saved anew.
     """
-    for name, value in _opened(variables):
+    for name, value in _open_structs(variables):
         last = name.rpartition(".")[2]
         cells = list(value.flat) if isinstance(value, np.ndarray) and value.dtype == object else value
         if isinstance(value, np.ndarray) and value.dtype.names:  # a datetime, a table: scipy does not open them

@@ -23,7 +23,7 @@ NO_HELM = (
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredDataset:
     """Tables of a dataset's manoeuvres, one row each: `run`, `kind`, and the rows of `shipid.measures.rows`.
 
     left : run -> sentence: why it was not measured.
@@ -34,7 +34,7 @@ class Measured:
     left: dict[str, str]
 
 
-def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | None = None) -> Measured:
+def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | None = None) -> MeasuredDataset:
     """Measure every run; a run with breaks is measured in its unbroken pieces, named `run/1`, `run/2`, ...
 
     Instants are those of the log; where its clock has dates, they count from the begin of the piece.
@@ -54,7 +54,7 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
     if length is not None and not length > 0:
         raise DataError(f"a length of {length:g} m: it must be positive", path="--length")
     measures, judged, left = [], [], {}
-    for name, rows in _named(dataset):
+    for name, rows in _named_runs(dataset):
         if len(rows) < 2:
             left[name] = "it has one row"
             continue
@@ -72,10 +72,10 @@ def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | N
             judged += [
                 {"run": name, "kind": seen, **row} for row in criterion_rows(judge_criteria(seen, result, length))
             ]
-    return Measured(pd.DataFrame(measures), pd.DataFrame(judged), left)
+    return MeasuredDataset(pd.DataFrame(measures), pd.DataFrame(judged), left)
 
 
-def _named(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
+def _named_runs(dataset: Dataset) -> Iterator[tuple[str, pd.DataFrame]]:
     parts = list(stretches_of_runs(dataset))
     count, number = Counter(name for name, _ in parts), Counter[str]()
     for name, rows in parts:

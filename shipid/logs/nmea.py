@@ -24,7 +24,7 @@ from shipid.errors import DataError
 from shipid.logs.dates import COMPACT, DAY, HALF_DAY, NEXT_DAY, WEEKS
 from shipid.logs.foreign import refuse_foreign
 from shipid.logs.formats import LOOKED_AT, NmeaFormat
-from shipid.logs.sentences import NMEA_COLUMNS, SENTENCES, TIMES, has_checksum, parsed
+from shipid.logs.sentences import NMEA_COLUMNS, SENTENCES, TIMES, has_checksum, parse_sentence
 
 FIRST_DAY = datetime(1970, 1, 1).toordinal()
 LATE_DATE = 60.0  # s after midnight: so long a receiver may write the date of the day before
@@ -74,13 +74,13 @@ class _Heard:
     def __init__(self, stamped: bool) -> None:
         self.stamped, self.checked = stamped, True
         self.clock, self.stamps = _Clock(), array("d")
-        self.said: dict[str, tuple[array[float], array[int], list[str]]] = defaultdict(_nothing_said)
+        self.said: dict[str, tuple[array[float], array[int], list[str]]] = defaultdict(_empty_channel)
         self.unreadable, self.unread = 0, Counter[str]()
 
     def hear(self, line: str) -> None:
         """Take a line in; ValueError where no time is before a sentence that needs one."""
         stamp, dollar, body = line.partition("$")
-        sentence = parsed(body, self.checked) if dollar else None
+        sentence = parse_sentence(body, self.checked) if dollar else None
         if sentence is None:
             other = None if dollar else _BEGIN.match(line)
             self.unread.update([other[1]] if other else ())
@@ -95,7 +95,7 @@ class _Heard:
             self.unreadable += 1
             return
         if self.stamped and values:
-            self.stamps.append(_stamp(stamp))
+            self.stamps.append(_sentence_time(stamp))
         elif time is not None and (values or sentence.kind == "ZDA"):
             self.clock.add(sentence.talker, time, sentence.day(), "latitude" in values)
         place = len(self.stamps if self.stamped else self.clock.seconds) - 1
@@ -147,14 +147,14 @@ class _Heard:
         return f"{message}: set [format] kind or time"
 
 
-def _nothing_said() -> tuple[array[float], array[int], list[str]]:
+def _empty_channel() -> tuple[array[float], array[int], list[str]]:
     return array("d"), array("q"), []
 
 
 def _by_talker(name: str, t: Array, talkers: NDArray[np.str_]) -> Iterator[tuple[str, NDArray[np.int_]]]:
     """Yield the columns of what was said at t (N,) [s] by talkers (N,) of one column, and which of it they have."""
     counts = Counter(talkers.tolist())
-    main = _speaking(t, talkers == counts.most_common(1)[0][0])
+    main = _from_main_talker(t, talkers == counts.most_common(1)[0][0])
     yield name, np.flatnonzero(main)
     for talker in counts:
         those = np.flatnonzero((talkers == talker) & ~main)
@@ -162,22 +162,24 @@ def _by_talker(name: str, t: Array, talkers: NDArray[np.str_]) -> Iterator[tuple
             yield f"{name}_{talker}", those
 
 
-def _speaking(t: Array, main: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _from_main_talker(t: Array, main: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Whether what was said at t (N,) [s, also of the day] is of a main talker, or said while that is silent.
 
     A receiver may change its letters with the satellites in sight, as from GP to GN. Two receivers speak side by side.
     """
     places = np.flatnonzero(main)
-    steps = _apart(t[places][1:], t[places][:-1])
+    steps = _time_apart(t[places][1:], t[places][:-1])
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     behind = np.searchsorted(places, np.arange(len(t)))
     first, last = np.maximum(behind - 1, 0), np.minimum(behind, len(places) - 1)
     before, after = np.where(behind > 0, t[places[first]], t), np.where(behind < len(places), t[places[last]], t)
-    gap = _apart(after, before) * np.where((behind > 0) & (behind < len(places)), 1.0, 2.0)  # half of it is in the log
+    gap = _time_apart(after, before) * np.where(
+        (behind > 0) & (behind < len(places)), 1.0, 2.0
+    )  # half of it is in the log
     return np.asarray(main | (gap > SILENT * usual))
 
 
-def _apart(after: Array, before: Array) -> Array:
+def _time_apart(after: Array, before: Array) -> Array:
     """Return how far times (N,) [s] are apart, over midnight, too."""
     return np.asarray(np.abs((after - before + HALF_DAY) % DAY - HALF_DAY))
 
@@ -212,7 +214,7 @@ class _Clock:
         places = np.flatnonzero(first)
         behind = np.searchsorted(places, np.arange(len(since)))
         begins = since == np.append(since[places], np.nan)[behind]  # an instant may begin with another
-        kept = np.flatnonzero(_speaking(since, first) | begins)
+        kept = np.flatnonzero(_from_main_talker(since, first) | begins)
         before = np.searchsorted(kept, np.arange(len(since)), side="right") - 1
         return np.where(before < 0, np.nan, self._dated(since, kept)[before])
 
@@ -247,7 +249,7 @@ class _Clock:
         return self.days[near[nearest]] + round((self.seconds[near[nearest]] + apart[nearest] - now) / DAY)
 
 
-def _stamp(text: str) -> float:
+def _sentence_time(text: str) -> float:
     """Time before a sentence: a number, a date as seconds since 1970, or the time of an NMEA 4.10 TAG block.
 
     Dates are year-month-day, also in one number with the time of day, or day.month.year with dots. ValueError where it
@@ -278,7 +280,7 @@ def _stamp(text: str) -> float:
 
 def _is_stamp(text: str) -> bool:
     try:
-        return math.isfinite(_stamp(text))
+        return math.isfinite(_sentence_time(text))
     except ValueError:
         return False
 

@@ -27,7 +27,7 @@ from shipid.logs.foreign import ENOUGH, refuse_foreign
 from shipid.logs.formats import LOOKED_AT, Format, MatFormat, NmeaFormat, ParquetFormat, SheetFormat, TextFormat
 from shipid.logs.mat import is_mat, read_mat
 from shipid.logs.nmea import is_nmea, read_nmea
-from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_of
+from shipid.logs.workbook import check_width, is_workbook, sheet_text, sheets_with_values
 
 LONGEST_LINE = 8_000_000  # bytes: more is no log
 LARGE = 32_000_000  # bytes: a longer text is read by blocks, and only the columns that are asked for
@@ -47,7 +47,7 @@ def require_file(file: Path) -> int:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
 
 
-def read_table(
+def read_log_table(
     file: Path, form: Format, clock: str, columns: Iterable[str] = (), progress: Progress | None = None
 ) -> pd.DataFrame:
     """Read a log as its format says; `attrs["unreadable"]` counts the skipped lines, `attrs["notes"]` has sentences.
@@ -86,14 +86,14 @@ def read_table(
 def in_points(text: pd.Series[Any], decimal: str, thousands: str | None) -> pd.Series[Any]:
     """Numbers (N,) as text, with a point for the decimal sign and without marks of thousands between full groups."""
     if thousands is not None:
-        grouped = text.str.fullmatch(grouped_by(decimal, thousands))
+        grouped = text.str.fullmatch(grouped_number(decimal, thousands))
         whole = text.str.replace(thousands, "", regex=False).where(grouped, "no number")
         text = text.where(~text.str.contains(thousands, regex=False), whole)
     text = text.str.replace(",", ".", regex=False) if decimal == "," else text
     return text.replace("-0", "-0.0")  # degrees before minutes: a whole number has no such sign
 
 
-def grouped_by(decimal: str, thousands: str) -> str:
+def grouped_number(decimal: str, thousands: str) -> str:
     """A regular expression of a number with such marks of thousands."""
     mark, point = re.escape(thousands), re.escape(decimal)
     return rf"[+-]?[1-9]\d{{0,2}}(?:{mark}\d{{3}})+(?:{point}\d*)?"
@@ -113,7 +113,7 @@ def refuse_power_cut(content: bytes, file: Path) -> None:
         raise DataError(message, file=file, path=f"line {damaged[0]}")
 
 
-def _text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
+def _read_text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
     """Read a delimited text log as columns of text, named by its header, by `form.names` or by number."""
     if form.skip_rows == 0:
         refuse_foreign(file)
@@ -131,10 +131,10 @@ def _refuse_binary(file: Path, form: TextFormat) -> None:
             raise DataError(f"is no text: set [format] kind = {kind!r}", file=file, path="format.kind")
         refuse_power_cut(content, file)
         raise DataError(message, file=file, path="format.encoding")
-    widest(content[:LONGEST_LINE], form.separator, file)
+    check_line_width(content[:LONGEST_LINE], form.separator, file)
 
 
-def widest(head: bytes, separator: str, file: Path) -> None:
+def check_line_width(head: bytes, separator: str, file: Path) -> None:
     """Raise DataError where a line in the first bytes of a log has more cells than any log has."""
     mark = b" " if separator == "whitespace" else separator.encode()
     end = b"\n" if b"\n" in head else b"\r"
@@ -150,16 +150,16 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     """
     try:
         try:
-            table = _cells(source, form, _width(source, form, file))
+            table = _read_cells(source, form, _row_width(source, form, file))
         except pd.errors.ParserError:  # a later line has more cells
-            width = max(len(row) for _, row in _rows(source, form, file))
+            width = max(len(row) for _, row in _numbered_rows(source, form, file))
             check_width(width, file)
-            table = _cells(source, form, width)
+            table = _read_cells(source, form, width)
     except UnicodeDecodeError as error:
         message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
         raise DataError(message, file=file, path="format.encoding") from None
     except pd.errors.EmptyDataError:
-        raise _nothing_left(form, file) from None
+        raise _no_rows_error(form, file) from None
     except (pd.errors.ParserError, ValueError) as error:
         message = f"not a table with this separator ({error}): check separator and skip_rows"
         raise DataError(message, file=file, path="format.separator") from None
@@ -168,8 +168,8 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
         blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
     table = table.loc[~blank]
     if not len(table):
-        raise _nothing_left(form, file)
-    names, table = _named_columns(table, form, file)
+        raise _no_rows_error(form, file)
+    names, table = _name_columns(table, form, file)
     table, again = _without_headers(table, names, source, form, file)
     table, ragged = _without_ragged(table, names, source, form, file)
     table.columns = pd.Index(names)
@@ -177,7 +177,7 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
     return table.reset_index(drop=True)
 
 
-def _cells(source: Path | io.StringIO, form: TextFormat, width: int) -> pd.DataFrame:
+def _read_cells(source: Path | io.StringIO, form: TextFormat, width: int) -> pd.DataFrame:
     """Read all rows as text, also empty ones; raises ParserError where one has more than `width` cells."""
     if isinstance(source, io.StringIO):
         source.seek(0)
@@ -196,24 +196,24 @@ def _cells(source: Path | io.StringIO, form: TextFormat, width: int) -> pd.DataF
     )
 
 
-def _width(source: Path | io.StringIO, form: TextFormat, file: Path) -> int:
+def _row_width(source: Path | io.StringIO, form: TextFormat, file: Path) -> int:
     """Return the largest number of cells in the first rows."""
     if isinstance(source, Path):
         with source.open("rb") as stream:
             source = io.StringIO(stream.read(LONGEST_LINE // 8).decode(form.encoding, "replace"))
     else:
         source = io.StringIO(source.getvalue()[: LONGEST_LINE // 8])
-    return max([1, *(len(row) for _, row in islice(_rows(source, form, file), LOOKED_AT))])
+    return max([1, *(len(row) for _, row in islice(_numbered_rows(source, form, file), LOOKED_AT))])
 
 
-def _nothing_left(form: TextFormat, file: Path) -> DataError:
+def _no_rows_error(form: TextFormat, file: Path) -> DataError:
     if not form.skip_rows:
         return DataError("holds no line with values", file=file)
     message = f"no line is left after {form.skip_rows} skipped lines: lower skip_rows"
     return DataError(message, file=file, path="format.skip_rows")
 
 
-def _named_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[list[str], pd.DataFrame]:
+def _name_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[list[str], pd.DataFrame]:
     """Return a name for every column, empty where the header has none, and the rows below the header."""
     filled = [bool(table[name].fillna("").str.strip().ne("").any()) for name in table]
     width = max((index + 1 for index, one in enumerate(filled) if one), default=1)
@@ -288,19 +288,23 @@ def _short_rows(
 ) -> dict[int, int]:
     """Return place -> count of cells of the rows asked for that have fewer than `width` cells.
 
-    Places are those among `_rows`. To pandas, a cell that is not there is an empty one.
+    Places are those among `_numbered_rows`. To pandas, a cell that is not there is an empty one.
     """
-    rows = enumerate(_rows(source, form, file) if asked else ())
+    rows = enumerate(_numbered_rows(source, form, file) if asked else ())
     return {place: len(row) for place, (_, row) in rows if place in asked and len(row) < width}
 
 
 def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextFormat, file: Path) -> list[int]:
-    """Return the numbers in the log, from 1, of the first lines of rows at these places among `_rows`."""
+    """Return the numbers in the log, from 1, of the first lines of rows at these places among `_numbered_rows`."""
     asked = set(places)
-    return [number for place, (number, _) in enumerate(_rows(source, form, file) if asked else ()) if place in asked]
+    return [
+        number
+        for place, (number, _) in enumerate(_numbered_rows(source, form, file) if asked else ())
+        if place in asked
+    ]
 
 
-def _rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
+def _numbered_rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield number, from 1, of the first line and cells of what pandas takes for rows: neither skipped nor a comment.
 
     Quotes count only where a cell begins with one; lines may end between them. Raises DataError where they never close.
@@ -343,7 +347,7 @@ def _large_text(
         head = stream.read(1_000_000)
     if has_nul(head, form):
         return None
-    widest(head, form.separator, file)
+    check_line_width(head, form.separator, file)
     text = head.decode(form.encoding, "replace").rpartition("\n")[0]
     if not text:  # lines end with a carriage return alone
         return None
@@ -356,11 +360,11 @@ def _large_text(
     if {names[index] for index in places} != wanted or len(places) != len(wanted):
         return None
     plain = {
-        index: bool(pd.to_numeric(_decimal(first.iloc[:, index], form), errors="coerce").notna().any())
+        index: bool(pd.to_numeric(_with_decimal_point(first.iloc[:, index], form), errors="coerce").notna().any())
         for index in places
     }
     try:
-        reader = _blocks(file, form, len(names), plain)
+        reader = _read_blocks(file, form, len(names), plain)
         about = size * max(1, len(first)) / len(text)  # rows
         columns = _columns_of_blocks(reader, plain, about, progress)
     except (pyarrow.ArrowException, UnicodeError, ValueError):
@@ -374,7 +378,7 @@ def _large_text(
     return None if blank.any() else table  # whether such a line is empty, only all its cells tell
 
 
-def _blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) -> Iterator[pyarrow.RecordBatch]:
+def _read_blocks(file: Path, form: TextFormat, width: int, plain: dict[int, bool]) -> Iterator[pyarrow.RecordBatch]:
     """The columns of a text log at some places, block by block; `plain` says which of them are numbers."""
     import pyarrow.csv as arrow
 
@@ -444,17 +448,17 @@ def _start_threads(count: int) -> None:
                 thread.join()
 
 
-def _decimal(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
+def _with_decimal_point(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
     return column.str.replace(",", ".") if form.decimal == "," else column
 
 
-def _sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:
+def _read_sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
-    name = sheets_of(file)[0] if form.sheet is None else form.sheet
+    name = sheets_with_values(file)[0] if form.sheet is None else form.sheet
     return parse_text(io.StringIO(sheet_text(file, name)), form.text(), file)
 
 
-def _parquet(file: Path, *_: object) -> pd.DataFrame:
+def _read_parquet(file: Path, *_: object) -> pd.DataFrame:
     refuse_foreign(file)
     try:
         stored = read_arrow(file)
@@ -473,11 +477,11 @@ def _parquet(file: Path, *_: object) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class Reader:
+class LogReader:
     """One format of logs.
 
     options : model of the keys of [format] in a mapping.
-    read : (file, options, name of the column of time, progress as of `read_table`) -> table; raises DataError.
+    read : (file, options, name of the column of time, progress as of `read_log_table`) -> table; raises DataError.
     detect : (file, its first bytes) -> keys of [format] where it is of this format, else None; without it, no guess.
     scattered : whether rows are single sentences that do not say everything, so that empty cells are no defect.
     """
@@ -496,11 +500,11 @@ def _is_parquet(_: Path, head: bytes) -> dict[str, Any] | None:
     return {"kind": "parquet"} if head.startswith(b"PAR1") else None
 
 
-READERS: dict[str, Reader] = {
-    "text": Reader(TextFormat, _text),  # no signature: a guess takes every other file for text
-    "sheet": Reader(SheetFormat, _sheet, _is_sheet),
-    "parquet": Reader(ParquetFormat, _parquet, _is_parquet),
-    "mat": Reader(MatFormat, read_mat, is_mat),
-    "nmea": Reader(NmeaFormat, read_nmea, is_nmea, scattered=True),
+READERS: dict[str, LogReader] = {
+    "text": LogReader(TextFormat, _read_text),  # no signature: a guess takes every other file for text
+    "sheet": LogReader(SheetFormat, _read_sheet, _is_sheet),
+    "parquet": LogReader(ParquetFormat, _read_parquet, _is_parquet),
+    "mat": LogReader(MatFormat, read_mat, is_mat),
+    "nmea": LogReader(NmeaFormat, read_nmea, is_nmea, scattered=True),
 }
 """Kind, as in [format] of a mapping -> reader. To add a format: its options, its two functions, a row here."""

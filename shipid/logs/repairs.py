@@ -27,13 +27,13 @@ Interval = Annotated[tuple[float, ...], Field(min_length=2, max_length=2)]
 FEWEST_AT_END = 3  # rows in half a window, from which spikes at the end of a stretch are looked for
 
 
-class Strict(BaseModel):
+class StrictPart(BaseModel):
     """Base of every part of a mapping: unknown keys are refused, values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Repair(Strict):
+class Repair(StrictPart):
     """Fields of every repair: its kind, the reason for it, and whether it is enabled."""
 
     kind: str
@@ -67,7 +67,7 @@ class Despike(ColumnRepair):
     unit: str | None = None
 
 
-class Scale(ColumnRepair):
+class ScaleRepair(ColumnRepair):
     """Columns carry a known wrong factor: multiply them by `factor`."""
 
     factor: float
@@ -116,7 +116,7 @@ class Outcome:
     note: str
 
 
-def interpolate_at(t: NDArray[np.float64], values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
+def interpolate_missing(t: NDArray[np.float64], values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
     """Return values (N,) with the `missing` ones interpolated linearly in time from the finite others."""
     known = ~missing & np.isfinite(values)
     filled = np.where(missing, np.nan, values)
@@ -125,24 +125,24 @@ def interpolate_at(t: NDArray[np.float64], values: NDArray[np.float64], missing:
     return filled
 
 
-def _mended(rows: pd.DataFrame, values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
-    """`interpolate_at` within each unbroken stretch of rows: nothing after a break says what was before it."""
-    filled, t, stretch = values.copy(), rows["t"].to_numpy(), _stretch(rows)
+def _interpolate_in_stretches(rows: pd.DataFrame, values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
+    """`interpolate_missing` within each unbroken stretch of rows: nothing after a break says what was before it."""
+    filled, t, stretch = values.copy(), rows["t"].to_numpy(), _stretch_number(rows)
     for number in np.unique(stretch[missing]):
         here = stretch == number
-        filled[here] = interpolate_at(t[here], values[here], missing[here])
+        filled[here] = interpolate_missing(t[here], values[here], missing[here])
     return filled
 
 
-def _between(rows: pd.DataFrame, known: Mask) -> Mask:
+def _between_known(rows: pd.DataFrame, known: Mask) -> Mask:
     """Whether each row (N,) has a `known` one before it and one after it in its unbroken stretch."""
-    before = pd.Series(known).groupby(_stretch(rows)).cummax()
-    after = pd.Series(known)[::-1].groupby(_stretch(rows)[::-1]).cummax()[::-1]
+    before = pd.Series(known).groupby(_stretch_number(rows)).cummax()
+    after = pd.Series(known)[::-1].groupby(_stretch_number(rows)[::-1]).cummax()[::-1]
     between: Mask = before.to_numpy() & after.to_numpy()
     return between
 
 
-def _stretch(rows: pd.DataFrame) -> NDArray[np.int64]:
+def _stretch_number(rows: pd.DataFrame) -> NDArray[np.int64]:
     """Number of the unbroken stretch of each row (N,)."""
     return np.cumsum((rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1)
 
@@ -160,13 +160,13 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
         dropped = np.append(false, False) | np.insert(false, 0, False)
         known = ~dropped & np.isfinite(values)
         values[known] = np.unwrap(values[known])
-        healed[name] = _mended(rows, values, dropped)
+        healed[name] = _interpolate_in_stretches(rows, values, dropped)
         touched |= dropped
         count += int(false.sum())
     return Outcome(rows.assign(**healed), touched, count, f"{int(touched.sum())} rows interpolated")
 
 
-def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
+def remove_spikes(rows: pd.DataFrame, repair: Despike) -> Outcome:
     """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest of its stretch.
 
     Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. In the
@@ -180,20 +180,22 @@ def despike(rows: pd.DataFrame, repair: Despike) -> Outcome:
     if width == 1:
         message = f"its window, {repair.window:g} s, holds one row, which is its own median"
         raise DataError(f"{message}: rows are {step:.3g} s apart, give {2 * step:.3g} s or more", path="repair.despike")
-    stretch, healed = _stretch(rows), {}
+    stretch, healed = _stretch_number(rows), {}
     for name in repair.columns:
         pieces = rows[name].interpolate(limit_area="inside").groupby(stretch)
-        median = pieces.transform(lambda piece: _expected(piece, width, repair.threshold))
+        median = pieces.transform(lambda piece: _expected_values(piece, width, repair.threshold))
         spikes = (rows[name] - median).abs().to_numpy() > repair.threshold
         values = rows[name].to_numpy()
         known = ~spikes & np.isfinite(values)
-        healed[name] = np.where(spikes & ~_between(rows, known), median, _mended(rows, values, spikes))
+        healed[name] = np.where(
+            spikes & ~_between_known(rows, known), median, _interpolate_in_stretches(rows, values, spikes)
+        )
         touched |= spikes
         count += int(spikes.sum())
     return Outcome(rows.assign(**healed), touched, count, f"median of {width} rows")
 
 
-def _expected(piece: pd.Series[float], width: int, threshold: float) -> pd.Series[float]:
+def _expected_values(piece: pd.Series[float], width: int, threshold: float) -> pd.Series[float]:
     """The median over whole windows of a stretch; in half a window at its ends a robust line, unless it fits badly."""
     median = piece.rolling(width, center=True, min_periods=width).median()
     half, values = width // 2, piece.to_numpy()
@@ -208,7 +210,7 @@ def _expected(piece: pd.Series[float], width: int, threshold: float) -> pd.Serie
     return median
 
 
-def scale(rows: pd.DataFrame, repair: Scale) -> Outcome:
+def scale_columns(rows: pd.DataFrame, repair: ScaleRepair) -> Outcome:
     """Multiply: x <- factor x, for every column named."""
     scaled = {name: repair.factor * rows[name] for name in repair.columns}
     return _all_rows(rows.assign(**scaled), f"times {repair.factor:g}")
@@ -299,8 +301,8 @@ def _all_rows(rows: pd.DataFrame, note: str) -> Outcome:
 REPAIRS: dict[str, tuple[type[Repair], Callable[[pd.DataFrame, Any], Outcome]]] = {
     "wrap_interpolation": (WrapInterpolation, heal_wrap),
     BREAK: (Break, break_runs),
-    "despike": (Despike, despike),
-    "scale": (Scale, scale),
+    "despike": (Despike, remove_spikes),
+    "scale": (ScaleRepair, scale_columns),
     "heading_offset": (HeadingOffset, turn_heading),
     "lever_arm": (LeverArm, move_origin),
     "latency": (Latency, take_earlier),

@@ -30,7 +30,7 @@ class Leg:
     last: int
 
 
-def manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
+def find_manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
     """Manoeuvres of every run in the order of time, with names that are unique; a draft for a person to correct.
 
     Parameters
@@ -50,7 +50,7 @@ def manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
     return segments
 
 
-def kind_of(rows: pd.DataFrame) -> str:
+def run_kind(rows: pd.DataFrame) -> str:
     """Return the kind of manoeuvre that takes most of a run."""
     t = rows["t"].to_numpy()
     spans: dict[str, float] = {}
@@ -64,11 +64,11 @@ def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
     t, psi = rows["t"].to_numpy(), np.unwrap(rows["psi"].to_numpy())
     if len(t) < 3:
         return
-    legs = _legs(_helm(rows), t)
+    legs = _helm_legs(_steering_angle(rows), t)
     index, start = 0, 0
     while index < len(legs):
         leg = legs[index]
-        size = _zigzag(legs[index:], psi, t)
+        size = _zigzag_length(legs[index:], psi, t)
         if size:
             kind, last = "zigzag", legs[index + size - 1].last
             index += size
@@ -79,13 +79,13 @@ def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
             index += 1
             continue
         first = max(start, int(np.searchsorted(t, t[leg.first] - LEAD)))
-        yield from _straight(rows, start, first)
+        yield from _between_manoeuvres(rows, start, first)
         yield kind, (first, last)
         start = last
-    yield from _straight(rows, start, len(t) - 1)
+    yield from _between_manoeuvres(rows, start, len(t) - 1)
 
 
-def _helm(rows: pd.DataFrame) -> Array:
+def _steering_angle(rows: pd.DataFrame) -> Array:
     """Mean steering angle [rad], about its median in the straightest rows; yaw rate in its place if none is logged."""
     names = [name for name in map(str, rows.columns) if is_steering(name)]
     if not names:
@@ -96,7 +96,7 @@ def _helm(rows: pd.DataFrame) -> Array:
     return np.asarray(helm - (np.median(small) if len(small) else 0.0))
 
 
-def _legs(helm: Array, t: Array) -> list[Leg]:
+def _helm_legs(helm: Array, t: Array) -> list[Leg]:
     """Return the stretches with the helm on one side; stretches of less than a few seconds join the one before."""
     side = np.where(np.abs(helm) >= HELM, np.sign(helm), 0.0).astype(int)
     short = min(SHORT, (t[-1] - t[0]) / 50)
@@ -111,7 +111,7 @@ def _legs(helm: Array, t: Array) -> list[Leg]:
     return legs
 
 
-def _zigzag(legs: list[Leg], psi: Array, t: Array) -> int:
+def _zigzag_length(legs: list[Leg], psi: Array, t: Array) -> int:
     """Return how many legs from here on are one zigzag, helm from side to side, only briefly amidships; 0 if none."""
     sides: list[Leg] = []
     size = 0
@@ -128,7 +128,7 @@ def _zigzag(legs: list[Leg], psi: Array, t: Array) -> int:
     return size if len(sides) >= FEWEST_LEGS else 0
 
 
-def _straight(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, tuple[int, int]]]:
+def _between_manoeuvres(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, tuple[int, int]]]:
     """Return the part between manoeuvres: a speed run if the shaft changes speed, else a transit; nothing if short."""
     t = rows["t"].to_numpy()
     if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):

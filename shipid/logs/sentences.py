@@ -19,7 +19,7 @@ Said = Iterator[tuple[str, str | float]]
 
 
 @dataclass(frozen=True)
-class Sentence:
+class NmeaSentence:
     """A sentence: the letters of its talker, its kind, such as RMC, and the fields behind them.
 
     Of a proprietary one, such as `$PASHR`, the talker is empty.
@@ -47,14 +47,14 @@ class Sentence:
     def day(self) -> int | None:
         """Return the number of the day that a valid RMC or ZDA says, None of any other sentence."""
         if self.kind == "RMC" and self.fields[1] != "V":
-            return _day_of(self.fields[8])
+            return _day_number(self.fields[8])
         if self.kind == "ZDA":
             day, month, year = self.fields[1:4]
-            return _day_of(f"{day:0>2}{month:0>2}{year[-2:]}")
+            return _day_number(f"{day:0>2}{month:0>2}{year[-2:]}")
         return None
 
 
-def parsed(text: str, checked: bool) -> Sentence | None:
+def parse_sentence(text: str, checked: bool) -> NmeaSentence | None:
     """Return the sentence in a text that begins behind its `$`; None where it is none or its checksum fails.
 
     checked : whether one without a checksum is none.
@@ -71,7 +71,7 @@ def parsed(text: str, checked: bool) -> Sentence | None:
     address = address.upper()
     own = address.startswith("P")
     fields += [""] * (MOST_FIELDS - len(fields))
-    return Sentence("" if own else address[:2], address if own else address[2:], fields)
+    return NmeaSentence("" if own else address[:2], address if own else address[2:], fields)
 
 
 def has_checksum(text: str) -> bool:
@@ -81,7 +81,7 @@ def has_checksum(text: str) -> bool:
 
 
 @functools.cache
-def _day_of(text: str) -> int | None:
+def _day_number(text: str) -> int | None:
     """Number of the day of a date DDMMYY, of 1969 to 2068; None where it is none."""
     try:
         return datetime.strptime(text, "%d%m%y").toordinal()
@@ -89,7 +89,7 @@ def _day_of(text: str) -> int | None:
         return None
 
 
-def _position(fields: Fields, place: int) -> Said:
+def _read_position(fields: Fields, place: int) -> Said:
     """Latitude and longitude [deg] of four fields from a place on; nothing where they are empty."""
     for name, at, sides in (("latitude", place, "NS"), ("longitude", place + 2, "EW")):
         text, side = fields[at : at + 2]
@@ -101,56 +101,56 @@ def _position(fields: Fields, place: int) -> Said:
         yield name, (degrees + minutes / 60.0) * (1.0 if side == sides[0] else -1.0)
 
 
-def _gga(fields: Fields) -> Said:
-    return _position(fields, 1) if fields[5] != "0" else iter(())
+def _read_gga(fields: Fields) -> Said:
+    return _read_position(fields, 1) if fields[5] != "0" else iter(())
 
 
-def _gns(fields: Fields) -> Said:
+def _read_gns(fields: Fields) -> Said:
     """A fix of several systems, with a letter each: N where a system takes no part in it."""
-    return _position(fields, 1) if fields[5].strip("N") else iter(())
+    return _read_position(fields, 1) if fields[5].strip("N") else iter(())
 
 
-def _gll(fields: Fields) -> Said:
-    return _position(fields, 0) if fields[5] != "V" else iter(())
+def _read_gll(fields: Fields) -> Said:
+    return _read_position(fields, 0) if fields[5] != "V" else iter(())
 
 
-def _rmc(fields: Fields) -> Said:
+def _read_rmc(fields: Fields) -> Said:
     if fields[1] != "V":
-        yield from _position(fields, 2)
+        yield from _read_position(fields, 2)
         yield from (("sog", fields[6]), ("cog", fields[7]))
 
 
-def _vtg(fields: Fields) -> Said:
+def _read_vtg(fields: Fields) -> Said:
     if fields[8] != "N":
         yield "cog", fields[0]
         yield "sog", fields[4] or (float(fields[6]) * KMH_IN_KNOTS if fields[6] else "")
 
 
-def _hdt(fields: Fields) -> Said:
+def _read_hdt(fields: Fields) -> Said:
     yield "heading", fields[0]
 
 
-def _ths(fields: Fields) -> Said:
+def _read_ths(fields: Fields) -> Said:
     yield "heading", fields[0] if fields[1] != "V" else ""
 
 
-def _rot(fields: Fields) -> Said:
+def _read_rot(fields: Fields) -> Said:
     yield "rot", fields[0] if fields[1] != "V" else ""
 
 
-def _rsa(fields: Fields) -> Said:
+def _read_rsa(fields: Fields) -> Said:
     for name, place in (("rudder", 0), ("rudder_port", 2)):
         yield name, fields[place] if fields[place + 1] != "V" else ""
 
 
-def _rpm(fields: Fields) -> Said:
+def _read_rpm(fields: Fields) -> Said:
     """Shafts (S) and engines (E) by their number: 0 is that of the middle, odd ones are to starboard."""
     source, number, speed = fields[:3]
     if fields[4] != "V" and source in ("S", "E"):
         yield f"{'rpm' if source == 'S' else 'engine_rpm'}{'' if number == '1' else f'_{number or 0}'}", speed
 
 
-def _mwv(fields: Fields) -> Said:
+def _read_mwv(fields: Fields) -> Said:
     """The apparent wind (reference R), its speed in knots (N), km/h (K) or m/s (M)."""
     angle, reference, speed, unit, status = fields[:5]
     if status != "V" and reference == "R":
@@ -159,15 +159,15 @@ def _mwv(fields: Fields) -> Said:
         yield "apparent_speed", float(speed) * factor if speed and factor is not None else ""
 
 
-def _mwd(fields: Fields) -> Said:
+def _read_mwd(fields: Fields) -> Said:
     """The true wind, its speed in m/s, in knots or in both."""
     yield "wind_from", fields[0]
     yield "wind_speed", fields[6] or (float(fields[4]) * KNOT if fields[4] else "")
 
 
 SENTENCES: dict[str, Callable[[Fields], Said]] = {
-    "GGA": _gga, "GNS": _gns, "GLL": _gll, "RMC": _rmc, "VTG": _vtg, "HDT": _hdt, "THS": _ths, "ROT": _rot, "RSA": _rsa,
-    "RPM": _rpm, "MWV": _mwv, "MWD": _mwd,
+    "GGA": _read_gga, "GNS": _read_gns, "GLL": _read_gll, "RMC": _read_rmc, "VTG": _read_vtg, "HDT": _read_hdt, "THS": _read_ths, "ROT": _read_rot, "RSA": _read_rsa,
+    "RPM": _read_rpm, "MWV": _read_mwv, "MWD": _read_mwd,
 }  # fmt: skip
 """Kind of a sentence -> what its fields say: deg; rot deg/min; sog kn; rpm; wind speeds m/s."""
 TIMES = {"GGA": 0, "GNS": 0, "GLL": 4, "RMC": 0, "ZDA": 0}

@@ -56,15 +56,15 @@ def check_width(cells: int, file: Path) -> None:
         )
 
 
-def sheets_of(file: Path) -> list[str]:
+def sheets_with_values(file: Path) -> list[str]:
     """Return the names of the sheets of a workbook that have values, the one with most cells first; hidden ones last.
 
     Raises
     ------
     DataError : no sheet has any, not a workbook or a damaged one, or python-calamine is not installed.
     """
-    book = _opened(file)
-    cells = {name: sheet.height * sheet.width for name in book.sheet_names for sheet in [_sheet(book, name, file)]}
+    book = _open_workbook(file)
+    cells = {name: sheet.height * sheet.width for name in book.sheet_names for sheet in [_open_sheet(book, name, file)]}
     hidden = {one.name: not str(one.visible).endswith(".Visible") for one in book.sheets_metadata}
     names = sorted((name for name in cells if cells[name]), key=lambda name: (hidden[name], -cells[name]))
     if not names:
@@ -80,19 +80,19 @@ def sheet_text(file: Path, name: str) -> str:
 
     Raises
     ------
-    DataError : no sheet has this name; else as of `sheets_of`.
+    DataError : no sheet has this name; else as of `sheets_with_values`.
     """
-    book = _opened(file)
+    book = _open_workbook(file)
     if name not in book.sheet_names:
         raise DataError(f"no sheet {name!r}: {suggest_name(name, book.sheet_names)}", file=file, path="format.sheet")
-    sheet = _sheet(book, name, file)
+    sheet = _open_sheet(book, name, file)
     check_width(sheet.width, file)
     first = sheet.start[1] if sheet.start is not None else 0
     lines = io.StringIO()
     writer = csv.writer(lines, delimiter=SEPARATOR, lineterminator="\n")
-    formulas = _formulas(file, name)
+    formulas = _formulas_without_value(file, name)
     for number, row in enumerate(sheet.to_python(skip_empty_area=False)):
-        cells = [_written(cell) for cell in row]
+        cells = [_cell_text(cell) for cell in row]
         for place, formula in formulas.get(number, {}).items():
             if place < len(cells) and not cells[place]:
                 cells[place] = formula
@@ -100,7 +100,7 @@ def sheet_text(file: Path, name: str) -> str:
     return lines.getvalue()
 
 
-def _formulas(file: Path, name: str) -> dict[int, dict[int, str]]:
+def _formulas_without_value(file: Path, name: str) -> dict[int, dict[int, str]]:
     """Row -> column -> formula of a sheet of an .xlsx file, counted from 0, where no value of it is stored."""
     found: dict[int, dict[int, str]] = {}
     with suppress(*_DAMAGES), zipfile.ZipFile(file) as packed:
@@ -118,7 +118,7 @@ def _formulas(file: Path, name: str) -> dict[int, dict[int, str]]:
     return found
 
 
-def _opened(file: Path) -> CalamineWorkbook:
+def _open_workbook(file: Path) -> CalamineWorkbook:
     try:
         from python_calamine import CalamineError, CalamineWorkbook
     except ImportError:
@@ -132,24 +132,24 @@ def _opened(file: Path) -> CalamineWorkbook:
             raise DataError(message, file=file)
         return CalamineWorkbook.from_filelike(io.BytesIO(file.read_bytes()))  # by content, whatever its name is
     except (CalamineError, zipfile.BadZipFile, ValueError) as error:
-        raise _damaged(error, file) from None
+        raise _damaged_workbook(error, file) from None
 
 
-def _sheet(book: CalamineWorkbook, name: str, file: Path) -> CalamineSheet:
+def _open_sheet(book: CalamineWorkbook, name: str, file: Path) -> CalamineSheet:
     from python_calamine import CalamineError
 
     try:
         return book.get_sheet_by_name(name)
     except CalamineError as error:
-        raise _damaged(error, file) from None
+        raise _damaged_workbook(error, file) from None
 
 
-def _damaged(error: Exception, file: Path) -> DataError:
+def _damaged_workbook(error: Exception, file: Path) -> DataError:
     message = f"not a workbook (.xlsx, .ods), or damaged ({type(error).__name__}): set [format] kind"
     return DataError(message, file=file, path="format.kind")
 
 
-def _written(cell: Any) -> str:
+def _cell_text(cell: Any) -> str:
     """Return a cell as text."""
     if isinstance(cell, bool):
         return str(cell).upper()

@@ -17,7 +17,7 @@ from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import assumed, check_columns
-from shipid.logs.dates import span_of
+from shipid.logs.dates import format_span
 from shipid.predictor import Predictor
 from shipid.report.content import Line
 from shipid.study.apply import BandSettings, Forecast, instants_along, predict_instants, read_or_import, tables_along
@@ -259,5 +259,5 @@ def _longest_alarms(instants: pd.DataFrame, most: int = 5) -> list[str]:
         edges = np.flatnonzero(np.diff(np.r_[False, outside, False].astype(int)))
         spans += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     spans.sort(key=lambda span: -span[0])
-    lines = [f"  {run}: from {span_of(first, last)}" for _, run, first, last in spans[:most]]
+    lines = [f"  {run}: from {format_span(first, last)}" for _, run, first, last in spans[:most]]
     return [*lines, f"  and {len(spans) - most} shorter ones"] if len(spans) > most else lines

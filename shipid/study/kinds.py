@@ -10,8 +10,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, stretches_by_run
-from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, declared_kind
-from shipid.logs.segments import kind_of
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, kind_in_name
+from shipid.logs.segments import run_kind
 from shipid.physics.signals import is_shaft, is_steering
 
 Array = NDArray[np.float64]
@@ -38,7 +38,7 @@ def kinds_of_runs(dataset: Dataset, runs: Container[str] | None = None, test: Co
     speed = float(speeds.groupby(frame["run"].to_numpy()).mean().median())
     shaft = float(frame[shafts].abs().max(axis=1).median()) if shafts else 0.0
     return {
-        run: declared.get(run) or declared_kind(run) or kind_by_motion(longest_piece(parts), speed, shaft)
+        run: declared.get(run) or kind_in_name(run) or kind_by_motion(longest_piece(parts), speed, shaft)
         for run, parts in stretches_by_run(dataset).items()
         if runs is None or run in runs
     }
@@ -67,7 +67,7 @@ def kind_by_motion(rows: pd.DataFrame, speed: float, shaft: float) -> str:
             return COASTING
     if moved < SLOW_SHARE * speed:
         return LOW_SPEED
-    kind = kind_of(rows)
+    kind = run_kind(rows)
     return RANDOM if kind in ("zigzag", "speed run", "transit") and _is_random_helm(rows) else kind
 
 

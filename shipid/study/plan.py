@@ -20,7 +20,7 @@ from shipid.arguments import check_mapping
 from shipid.document import Document
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.files import quote_argument
-from shipid.logs.importing import digest_of, sha256_of
+from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import Truth, check_truth, truth_vessel
@@ -557,9 +557,9 @@ def _sources(data: Data | None, file: Path) -> dict[str, str]:
         digests["mapping"] = mapping.digest
         if data.log is not None:
             with suppress(DataError):
-                digests["log"] = digest_of(mapping, beside(file.parent, data.log))
+                digests["log"] = log_digest(mapping, beside(file.parent, data.log))
     if data.dataset is not None and beside(file.parent, data.dataset).is_file():
-        digests["dataset"] = sha256_of(beside(file.parent, data.dataset))
+        digests["dataset"] = file_digest(beside(file.parent, data.dataset))
     return digests
 
 

@@ -33,9 +33,9 @@ from shipid.data.windows import (
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
 from shipid.hybrid.physics import Physics, assumed, check_columns
-from shipid.logs.catalogue import fetch
+from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
-from shipid.logs.kinds import declared_kind
+from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
 from shipid.metrics import ErrorSummary, position_error, summarise_errors
 from shipid.observer import Estimates, Observer, at_windows, observe, tune_observer
@@ -124,9 +124,7 @@ def obtain(plan: Plan) -> Dataset:
         with _located(plan):
             frame = simulate_truth(study.truth, plan.truth)
         runs = map(str, frame["run"].unique())
-        kinds = {
-            run: declared_kind(kind_name(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)
-        }
+        kinds = {run: kind_in_name(kind_name(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
         manoeuvres = {run: kind for run, kind in kinds.items() if kind is not None}
         known = {"vessel": study.truth.vessel, "source": "simulated", "clock": "run", "flags": []}
         return Dataset(frame, {**known, "manoeuvres": manoeuvres})
@@ -135,7 +133,7 @@ def obtain(plan: Plan) -> Dataset:
         return read_dataset(beside(folder, study.data.dataset))
     source = mapping_of(study.data, Path(plan.file))
     assert source is not None
-    log = fetch(source) if study.data.log is None else beside(folder, study.data.log)
+    log = fetch_log(source) if study.data.log is None else beside(folder, study.data.log)
     return import_log(read_mapping(source), log, without=study.data.without)
 
 

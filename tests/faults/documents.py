@@ -61,7 +61,7 @@ def mapping(seed: int) -> None:
         file = Path(folder) / "x.toml"
         file.write_bytes(mutated("mapping", seed)[0])
         parsed = read_mapping(file)
-        with patch("shipid.logs.catalogue.fetch", side_effect=AssertionError):
+        with patch("shipid.logs.catalogue.fetch_log", side_effect=AssertionError):
             import_log(parsed, BAD / "logs" / "good.csv")
 
 

@@ -17,7 +17,7 @@ import pymap3d
 from shipid.errors import ShipidError
 from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import untried
+from shipid.logs.guess.draft import draft_text
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from tests.logs.drawn_words import FILE_NAMES, SIDES, STYLES, UNIT_SUFFIX, UNIT_TEXT, WORDS
@@ -636,7 +636,7 @@ def judge(drawn: Drawn) -> Verdict:
     except ShipidError as error:
         return Verdict("right" if drawn.impossible else "reported", (f"refused: {error.message}",))
     file = drawn.path.parent / f"{drawn.path.stem}-draft.toml"
-    file.write_text(untried(guessed), encoding="utf-8")
+    file.write_text(draft_text(guessed), encoding="utf-8")
     try:
         whole = read_mapping(file).model_copy(update={"segment": ()})
         frame = import_log(whole, drawn.path).frame

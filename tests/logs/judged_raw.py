@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import ShipidError
-from shipid.logs.guess.clues import LIKELY, Finding, Suggestion
+from shipid.logs.guess.clues import LIKELY, Clue, Suggestion
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import ENABLED, untried
+from shipid.logs.guess.draft import ENABLED, draft_text
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping, to_si
 from tests.logs.drawn_logs import Verdict
@@ -28,7 +28,7 @@ def judge_raw(stranger: RawStranger, **known: Any) -> Verdict:
     except ShipidError as error:
         return Verdict("reported", (f"refused: {error.message}",))
     file = stranger.folder.parent / f"{stranger.folder.name}-draft.toml"
-    file.write_text(untried(guessed), encoding="utf-8")
+    file.write_text(draft_text(guessed), encoding="utf-8")
     try:
         names = import_log(read_mapping(file), stranger.folder).runs
     except ShipidError as error:
@@ -135,7 +135,7 @@ def _repairs(guessed: Guess, stranger: RawStranger) -> list[tuple[bool, str]]:
     return [(False, fault) for finding in on if (fault := _needless(finding, guessed, stranger))]
 
 
-def _needless(finding: Finding, guessed: Guess, stranger: RawStranger) -> str:
+def _needless(finding: Clue, guessed: Guess, stranger: RawStranger) -> str:
     repair: dict[str, Any] = finding.repair or {}
     units = {column.header: column for column in stranger.columns}
     used = {column.name: _truth(units, column.source) for column in guessed.columns}

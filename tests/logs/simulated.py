@@ -11,7 +11,7 @@ from pymap3d import ned2geodetic
 
 from shipid.engine.rollout import rollout
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.evidence import windows
+from shipid.logs.guess.evidence import row_windows
 from shipid.vessel.load import load_vessel
 
 KNOT = 1852 / 3600
@@ -76,7 +76,7 @@ def as_bridge(frame: pd.DataFrame) -> pd.DataFrame:
 
 def state_of(columns: dict[str, np.ndarray], t: np.ndarray, unit: str = "s") -> State:
     """Return the start of a guess of columns (N,) at instants t (N,) [s], drafted from a clock in this unit."""
-    return State(t, unit, columns, windows(t))
+    return State(t, unit, columns, row_windows(t))
 
 
 def state_with_pose(columns: dict[str, np.ndarray], wrong: float = 1.0, unit: str = "s") -> State:

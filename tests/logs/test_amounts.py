@@ -10,9 +10,9 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.files import write_new
-from shipid.logs.amounts import is_unit, parted, without_prefix
+from shipid.logs.amounts import is_unit, split_amounts, without_prefix
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import untried
+from shipid.logs.guess.draft import draft_text
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import KNOT, as_bridge, si_log
 
@@ -33,7 +33,7 @@ def written(decimal: str = ".") -> pd.DataFrame:
 
 def drafted(file: Path) -> tuple[Guess, Path]:
     proposal = guess(file)
-    return proposal, write_new(untried(proposal), file.parent / "draft.toml")
+    return proposal, write_new(draft_text(proposal), file.parent / "draft.toml")
 
 
 @pytest.mark.parametrize(("decimal", "separator"), [(".", ","), (",", ";"), (".", "\t")])
@@ -107,7 +107,7 @@ def test_true_and_magnetic_north_in_a_column_are_refused(first: str, second: str
     ],
 )
 def test_a_number_and_its_unit(text: str, number: str, unit: str) -> None:
-    bare, units = parted(pd.Series([text]))
+    bare, units = split_amounts(pd.Series([text]))
     assert [*bare, *units] == [number, unit]
 
 

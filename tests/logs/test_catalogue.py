@@ -9,7 +9,7 @@ import pytest
 import requests
 
 from shipid.errors import DataError, DocumentError
-from shipid.logs.catalogue import available, fetch
+from shipid.logs.catalogue import bundled_mappings, fetch_log
 from shipid.logs.importing import read_mapping
 from tests.logs.conftest import PLAIN
 
@@ -18,12 +18,12 @@ NAME = "gunnerus-2022"
 
 def test_from_the_data_folder(data_folder: Path, gunnerus_log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHIPID_DATA", str(data_folder))
-    assert fetch(NAME) == gunnerus_log
+    assert fetch_log(NAME) == gunnerus_log
 
 
 def test_every_bundled_mapping_names_its_bytes() -> None:
-    assert NAME in available()
-    for name in available():
+    assert NAME in bundled_mappings()
+    for name in bundled_mappings():
         source = read_mapping(name).source
         assert None not in (source.url, source.sha256, source.file, source.citation, source.licence)
 
@@ -31,12 +31,12 @@ def test_every_bundled_mapping_names_its_bytes() -> None:
 def test_absent_and_changed_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SHIPID_DATA", str(tmp_path))
     with pytest.raises(DataError, match="unset SHIPID_DATA to download"):
-        fetch(NAME)
+        fetch_log(NAME)
     file = tmp_path / str(read_mapping(NAME).source.file)
     file.parent.mkdir()
     file.write_text("tvec\n")
     with pytest.raises(DataError, match="sha256 differs") as caught:
-        fetch(NAME)
+        fetch_log(NAME)
     assert caught.value.file == str(file)
 
 
@@ -57,7 +57,7 @@ def test_failed_downloads(failure: Exception, remedy: str, monkeypatch: pytest.M
     monkeypatch.delenv("SHIPID_DATA", raising=False)
     monkeypatch.setattr(pooch, "retrieve", refuse)
     with pytest.raises(DataError, match=remedy) as caught:
-        fetch(NAME)
+        fetch_log(NAME)
     assert "\n" not in str(caught.value)
 
 
@@ -72,7 +72,7 @@ def test_download_keeps_the_checksum(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(pooch.core, "choose_downloader", lambda *_, **__: FromDisk())
     with pytest.raises(DataError, match="is not the published file"):
-        fetch(NAME)
+        fetch_log(NAME)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -94,11 +94,11 @@ def test_download_of_a_users_mapping_stays_in_the_cache(
     source = f'[source]\nurl = "https://example.org/log.csv"\nsha256 = "{hashlib.sha256(log).hexdigest()}"\n'
     mapping.write_text(PLAIN.read_text() + source)
     monkeypatch.chdir(folder)
-    file = fetch(str(mapping) if absolute else "../mine/own.toml")
+    file = fetch_log(str(mapping) if absolute else "../mine/own.toml")
     assert file == cache / "own-log.csv"
     assert file.read_bytes() == log
 
 
 def test_unknown_name() -> None:
     with pytest.raises(DocumentError, match="did you mean 'gunnerus-2022'"):
-        fetch("gunnerus-2021")
+        fetch_log("gunnerus-2021")

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.cells import column_of, numbers_of, of_minutes, of_quaternion
+from shipid.logs.cells import log_column, of_minutes, of_quaternion, parse_numbers
 from shipid.logs.formats import TextFormat
 
 FILE = Path("log.csv")
@@ -18,21 +18,21 @@ FILE = Path("log.csv")
 def test_texts_become_numbers_as_the_format_says() -> None:
     log = pd.DataFrame({"n": ["1.250,5", " -3,25", "n/a", ""]})
     form = TextFormat(decimal=",", thousands=".", missing=("", "n/a"))
-    np.testing.assert_equal(numbers_of(log, "n", form, FILE, "columns.n.from"), [1250.5, -3.25, np.nan, np.nan])
+    np.testing.assert_equal(parse_numbers(log, "n", form, FILE, "columns.n.from"), [1250.5, -3.25, np.nan, np.nan])
 
 
 def test_a_text_that_is_no_number_is_named_with_its_row_in_the_file() -> None:
     log = pd.DataFrame({"n": ["1", "2", "off"]}, index=[0, 1, 7])
     with pytest.raises(DataError, match=r"log\.csv: row 8: 'off' is no number \(column 'n'; 1 such rows\)"):
-        numbers_of(log, "n", TextFormat(), FILE, "columns.n.from")
+        parse_numbers(log, "n", TextFormat(), FILE, "columns.n.from")
 
 
 def test_a_column_that_is_there_twice_or_not_at_all_is_refused() -> None:
     log = pd.DataFrame([[1.0, 2.0, 3.0]], columns=["n", "n", "speed"])
     with pytest.raises(DataError, match="'n' appears twice"):
-        column_of(log, "n", FILE, "columns.n.from")
+        log_column(log, "n", FILE, "columns.n.from")
     with pytest.raises(DataError, match=r"columns\.u\.from: column 'sped' is not in the log: .*speed"):
-        column_of(log, "sped", FILE, "columns.u.from")
+        log_column(log, "sped", FILE, "columns.u.from")
 
 
 def test_degrees_and_minutes() -> None:
@@ -59,5 +59,5 @@ def test_sixty_minutes_are_named(text: str) -> None:
     with pytest.raises(
         DataError, match=r"is 60 minutes or seconds, and the most are 59 \(column 'p'; 1 such"
     ) as caught:
-        numbers_of(log, "p", TextFormat(), Path("log.csv"), "columns.latitude.from", sides)
+        parse_numbers(log, "p", TextFormat(), Path("log.csv"), "columns.latitude.from", sides)
     assert caught.value.path == "row 2"

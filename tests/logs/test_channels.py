@@ -10,7 +10,7 @@ import pytest
 from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.errors import DataError, DocumentError
-from shipid.logs.importing import digest_of, import_log, read_mapping
+from shipid.logs.importing import import_log, log_digest, read_mapping
 from tests.logs.conftest import DATES, PLAIN, as_log, stamps, turning
 
 Write = Callable[..., Path]
@@ -91,9 +91,9 @@ latency = {late["compass"]}
         tolerance = 1.1 * sag if name in ("north", "east") else 1e-9
         np.testing.assert_allclose(dataset.frame[name], truth[name], atol=tolerance, err_msg=name)
     np.testing.assert_array_equal(dataset.frame["propeller.n"], truth["port.n"])
-    one = digest_of(read_mapping(mapping), log)
+    one = log_digest(read_mapping(mapping), log)
     (tmp_path / "gps.txt").write_text((tmp_path / "gps.txt").read_text() + "\n")
-    assert digest_of(read_mapping(mapping), log) != one  # the digest covers every file
+    assert log_digest(read_mapping(mapping), log) != one  # the digest covers every file
 
 
 @pytest.mark.parametrize("unit", DATES)

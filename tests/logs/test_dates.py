@@ -9,8 +9,16 @@ import pytest
 
 from shipid.errors import DataError, DocumentError
 from shipid.logs import dates
-from shipid.logs.dates import date_of, date_texts, dated, moment_of, seconds, span_of, time_texts
-from shipid.logs.guess.sniff import sniff
+from shipid.logs.dates import (
+    date_texts,
+    format_date,
+    format_moment,
+    format_span,
+    join_date_and_time,
+    parse_dates,
+    time_texts,
+)
+from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.conftest import T, mapping_with
 
@@ -52,29 +60,29 @@ def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
 def test_dates_as_they_are_written(style: str, unix: bool) -> None:
     """From a minute before midnight; a time of day goes on after it."""
     moments = pd.Timestamp("2022-10-26T23:59:30.5") + pd.to_timedelta(T, "s")
-    times = seconds(pd.Series(moments.strftime(style)))
+    times = parse_dates(pd.Series(moments.strftime(style)))
     np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
 
 
 def test_few_ways_of_writing_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each costs milliseconds, in each of two thousand files of a folder: only those are tried that a text may have."""
     tried: list[str] = []
-    by_pandas = dates._moments
-    monkeypatch.setattr(dates, "_moments", lambda texts, way: tried.append(way) or by_pandas(texts, way))
+    by_pandas = dates._parse_moments
+    monkeypatch.setattr(dates, "_parse_moments", lambda texts, way: tried.append(way) or by_pandas(texts, way))
     for way in dates.WAYS:
         tried.clear()
         moments = pd.Timestamp("2022-10-26T23:40:30.5") + pd.to_timedelta(T * 20, "s")
-        assert way in dates.ways_of(pd.Series(moments.strftime(way.replace("%S", "%S.%f"))))
+        assert way in dates.date_formats(pd.Series(moments.strftime(way.replace("%S", "%S.%f"))))
         assert len(tried) <= 8, way
     tried.clear()
-    assert dates.ways_of(pd.Series(moments.strftime("%Y-%m-%d %H:%M:%S"))) == []
+    assert dates.date_formats(pd.Series(moments.strftime("%Y-%m-%d %H:%M:%S"))) == []
     assert tried == []
 
 
 @pytest.mark.parametrize("kind", ["int64", "float64"])
 def test_dates_in_one_number(kind: str) -> None:
     moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(np.arange(90), "s")
-    times = seconds(pd.Series(moments.strftime("%Y%m%d%H%M%S").astype("int64").astype(kind)))
+    times = parse_dates(pd.Series(moments.strftime("%Y%m%d%H%M%S").astype("int64").astype(kind)))
     assert times.tolist() == (1666828770 + np.arange(90)).tolist()
 
 
@@ -102,7 +110,7 @@ def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.Dat
     assert caught.value.path == "row 61"
     if name != "hhmmss":  # numbers that go back may be anything
         with pytest.raises(DataError, match=message) as caught:
-            sniff(tmp_path / "log.csv")
+            recognise_log(tmp_path / "log.csv")
         assert caught.value.path == "row 61"
 
 
@@ -115,34 +123,34 @@ def test_a_week_number_that_rolled_over_has_its_word(log: pd.DataFrame, tmp_path
     with pytest.raises(DataError, match=message):
         import_log(read_mapping(mapping), tmp_path / "log.csv")
     with pytest.raises(DataError, match=message):
-        sniff(tmp_path / "log.csv")
+        recognise_log(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize("style", ["%Y-%m-%dT%H:%M:%S.%f%z", "%H:%M:%S.%f"])
 def test_the_end_of_daylight_saving_in_times_that_say_their_zone_or_are_utc(style: str) -> None:
     zone = "Europe/Berlin" if "z" in style else "UTC"
     moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert(zone) + pd.to_timedelta(T, "s")
-    np.testing.assert_allclose(np.diff(seconds(pd.Series(moments.strftime(style)))), 0.5, atol=1e-6)
+    np.testing.assert_allclose(np.diff(parse_dates(pd.Series(moments.strftime(style)))), 0.5, atol=1e-6)
 
 
 @pytest.mark.parametrize("style", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])
 def test_of_day_and_month_that_is_taken_with_which_the_log_is_short(style: str) -> None:
     """From 5 June to 6 June, not from 6 May; and where nothing decides, the day comes first."""
     moments = pd.Timestamp("2025-06-05T23:59:00") + pd.to_timedelta(10.0 * np.arange(20), "s")
-    times = seconds(pd.Series(moments.strftime(style)))
+    times = parse_dates(pd.Series(moments.strftime(style)))
     np.testing.assert_allclose(np.diff(times), 10.0)
-    one_day = seconds(pd.Series(["05/06/2025 10:00:00", "05/06/2025 10:00:01"]))
-    assert date_of(one_day[0]) == "2025-06-05 10:00:00"
-    assert date_of(times[0]) == "2025-06-05 23:59:00"
+    one_day = parse_dates(pd.Series(["05/06/2025 10:00:00", "05/06/2025 10:00:01"]))
+    assert format_date(one_day[0]) == "2025-06-05 10:00:00"
+    assert format_date(times[0]) == "2025-06-05 23:59:00"
 
 
 def test_noon_and_midnight_of_twelve_hours() -> None:
     texts = ["12:00:00 AM", "12:30:00 am", "1:00:00 AM", "12:00:00 PM", "12:15:00PM", "11:59:59 pm"]
-    np.testing.assert_allclose(seconds(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
+    np.testing.assert_allclose(parse_dates(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
 
 
 def test_what_is_no_date_is_not_a_number() -> None:
-    times = seconds(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
+    times = parse_dates(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
     np.testing.assert_array_equal(times, [1666857600.0, np.nan, 1666857601.0])
 
 
@@ -153,8 +161,8 @@ def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log:
         "%Y-%m-%dT%H:%M:%S.%f"
     )
     zoned = moments + zone
-    assert np.isfinite(seconds(zoned)).all()
-    assert np.isfinite(seconds(moments)).all()
+    assert np.isfinite(parse_dates(zoned)).all()
+    assert np.isfinite(parse_dates(moments)).all()
     zoned[3] = moments[3]
     log.assign(time=zoned).to_csv(tmp_path / "log", index=False)
     mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
@@ -208,7 +216,7 @@ def test_a_second_that_rounds_to_midnight_keeps_its_date() -> None:
     """It was 24:00:00, which no date has: the row had no time."""
     days = date_texts([np.array([2024.0, 2024.0]), np.array([5.0, 5.0]), np.array([14.0, 15.0])])
     times = time_texts([np.array([23.0, 0.0]), np.array([59.0, 0.0]), np.array([59.9999999, 0.1])])
-    assert np.diff(seconds(dated(days, times))) == pytest.approx([0.1], abs=2e-6)
+    assert np.diff(parse_dates(join_date_and_time(days, times))) == pytest.approx([0.1], abs=2e-6)
 
 
 DAYS = ("%Y%m%d", "%d%m%Y", "%d%m%y", "%y%m%d", "day of Excel")
@@ -236,7 +244,7 @@ def test_a_date_in_one_number_beside_a_time_of_day(
     since = (moments - pd.Timestamp(0)) / pd.Timedelta("1s")
     mapping = mapping_with(tmp_path, form, ('from = "time"', 'from = "time"\nunit = "date"\ndate = "Date"'))
     np.testing.assert_allclose(import_log(read_mapping(mapping), file).frame["t"], since, atol=1e-5)
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.clock == {"from": "time", "unit": "date", "date": "Date"}
     np.testing.assert_allclose(sniffed.t, since, atol=1e-5)
 
@@ -249,31 +257,31 @@ def test_a_date_of_six_digits_that_may_be_another_is_asked(
 ) -> None:
     times = pd.to_datetime(T, unit="s").strftime("%H:%M:%S.%f")
     log.assign(time=times, Date=day).to_csv(tmp_path / "log.csv", index=False)
-    (asked,) = sniff(tmp_path / "log.csv").doubts
+    (asked,) = recognise_log(tmp_path / "log.csv").doubts
     assert other in asked
 
 
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
     """Trials of three days in one file, each from eight in the morning; a minute back is an error, and stays one."""
     hours = pd.Series(["08:00:00", "11:30:00", "08:15:00", "16:00:00", "08:05:00", "08:04:00"])
-    times = seconds(hours)
+    times = parse_dates(hours)
     np.testing.assert_allclose(np.diff(times) / 3600, [3.5, 20.75, 7.75, 16 + 5 / 60, -1 / 60])
 
 
 def test_a_moment_and_its_date() -> None:
     text = "2022-11-30 09:15:02"
-    t = float(seconds(pd.Series([text]))[0])
-    assert date_of(t) == text
-    assert moment_of(t) == f"{text} UTC"
-    assert span_of(t, t + 60.0) == f"{text} to 2022-11-30 09:16:02 UTC"
+    t = float(parse_dates(pd.Series([text]))[0])
+    assert format_date(t) == text
+    assert format_moment(t) == f"{text} UTC"
+    assert format_span(t, t + 60.0) == f"{text} to 2022-11-30 09:16:02 UTC"
 
 
 @pytest.mark.parametrize("t", [-1e308, -5.0, 0.0, 12.5, 9.99e7, 1e13, 1e308, float("inf"), float("nan")])
 def test_a_moment_without_a_date_is_seconds(t: float) -> None:
     """A damaged clock too: no date is beyond the year 9999."""
-    assert moment_of(t) == f"{t:.10g} s"
-    assert span_of(0.0, t) == f"0 to {t:.10g} s"
-    assert span_of(t, 1.7e9).endswith(" s")
+    assert format_moment(t) == f"{t:.10g} s"
+    assert format_span(0.0, t) == f"0 to {t:.10g} s"
+    assert format_span(t, 1.7e9).endswith(" s")
 
 
 @pytest.mark.parametrize("rate", [1, 2, 5, 10, 20])
@@ -281,6 +289,6 @@ def test_a_moment_without_a_date_is_seconds(t: float) -> None:
 def test_whole_seconds_may_be_written_without_a_fraction(style: str, rate: int) -> None:
     moments = pd.Timestamp("2024-02-01T10:00:00") + pd.to_timedelta(np.arange(1200) / rate, "s")
     texts = pd.Series(moments.strftime(style)).str.replace(".000000", "", regex=False)
-    times = seconds(texts)
+    times = parse_dates(texts)
     np.testing.assert_allclose(np.diff(times), 1 / rate, atol=1e-5)
-    np.testing.assert_array_equal(seconds(texts.astype("category")), times)
+    np.testing.assert_array_equal(parse_dates(texts.astype("category")), times)

@@ -15,10 +15,10 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.foreign import foreign
+from shipid.logs.foreign import foreign_format
 from shipid.logs.formats import MatFormat, NmeaFormat, ParquetFormat, TextFormat
-from shipid.logs.guess.sniff import sniff
-from shipid.logs.readers import read_table
+from shipid.logs.guess.sniff import recognise_log
+from shipid.logs.readers import read_log_table
 
 TABLE = pd.DataFrame({"time": np.arange(30.0), "north": 2.0 * np.arange(30.0), "heading": 0.1})
 TEXT = TABLE.to_csv(index=False).encode()
@@ -103,11 +103,11 @@ def test_the_line_names_the_kind_and_what_to_do(name: str, tmp_path: Path) -> No
     content, kind, remedy = FILES[name]
     (tmp_path / name).write_bytes(content)
     with pytest.raises(DataError) as drafted:
-        sniff(tmp_path / name)
+        recognise_log(tmp_path / name)
     said = [drafted.value.message]
     for form in (TextFormat(), ParquetFormat(kind="parquet"), MatFormat(kind="mat"), NmeaFormat(kind="nmea")):
         with pytest.raises(DataError) as read:
-            read_table(tmp_path / name, form, "time")
+            read_log_table(tmp_path / name, form, "time")
         said.append(read.value.message)
     for message in said:
         assert kind in message
@@ -120,7 +120,7 @@ def test_a_data_base_is_named(tmp_path: Path) -> None:
         TABLE.to_sql("log", base, index=False)
     base.close()
     with pytest.raises(DataError, match="SQLite"):
-        sniff(tmp_path / "log.db3")
+        recognise_log(tmp_path / "log.db3")
 
 
 @pytest.mark.parametrize(
@@ -139,10 +139,10 @@ def test_a_data_base_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_what_a_reader_reads_is_not_foreign(head: bytes) -> None:
-    assert foreign(head) is None
+    assert foreign_format(head) is None
 
 
 def test_a_track_before_the_table_may_be_skipped(tmp_path: Path) -> None:
     """A text with a head of XML is read where the mapping skips the head."""
     (tmp_path / "log.txt").write_bytes(b'<?xml version="1.0"?>\n' + TEXT)
-    assert len(read_table(tmp_path / "log.txt", TextFormat(skip_rows=1), "time")) == len(TABLE)
+    assert len(read_log_table(tmp_path / "log.txt", TextFormat(skip_rows=1), "time")) == len(TABLE)

@@ -11,9 +11,9 @@ import pytest
 from pymap3d import geodetic2ned, ned2geodetic
 
 from shipid.data.dataset import Dataset
-from shipid.logs.frames import PARALLEL, convergence, unwrap_in_place
+from shipid.logs.frames import PARALLEL, meridian_convergence, unwrap_in_place
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.joining import join
+from shipid.logs.joining import join_datasets
 from tests.logs.conftest import turning
 
 T = np.arange(0.0, 60.0, 0.5)
@@ -107,9 +107,9 @@ def test_true_north_is_seen_in_the_plane_where_a_step_to_the_north_leads(seed: i
     steps = [geodetic2ned(*one, 0.0, *place, 0.0) for one in ((lat, lon), ahead)]
     seen = np.arctan2(steps[1][1] - steps[0][1], steps[1][0] - steps[0][0])
     lon %= 360.0
-    off = np.angle(np.exp(1j * (seen - true - convergence(lat, lon, *place))))
+    off = np.angle(np.exp(1j * (seen - true - meridian_convergence(lat, lon, *place))))
     np.testing.assert_allclose(off, 0.0, atol=(1e5 / 6.37e6) ** 2)
-    assert convergence(*place, *place) == 0.0
+    assert meridian_convergence(*place, *place) == 0.0
 
 
 @pytest.mark.parametrize("speeds", SPEEDS)
@@ -171,7 +171,7 @@ def test_recordings_joined_are_one_recording(seed: int, tmp_path: Path) -> None:
     logs = recorded(place), recorded(other, u=5.0, begin=500.0)
     days = [imported(log, tmp_path) for log in logs]
     named = [Dataset(day.frame.assign(run=name), day.metadata) for day, name in zip(days, "ab", strict=True)]
-    whole, notes = join({Path(f"{name}.parquet"): day for name, day in zip("ab", named, strict=True)})
+    whole, notes = join_datasets({Path(f"{name}.parquet"): day for name, day in zip("ab", named, strict=True)})
     far = imported(logs[1], tmp_path, more=origin((days[0].metadata["origin"]["latitude"], place[1])))
     rows = whole.select(["b"]).frame
     assert "and turned with all directions by" in notes[0]

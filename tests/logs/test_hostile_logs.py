@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.errors import DataError, ShipidError
-from shipid.logs.readers import READERS, read_table
+from shipid.logs.readers import READERS, read_log_table
 from tests.logs.conftest import PLAIN, as_log, turning
 
 T = np.arange(0.0, 60.0, 0.5)
@@ -337,7 +337,7 @@ def test_damaged_bytes_are_said_to_be_damaged(kind: str, tmp_path: Path) -> None
             damaged[place] = random.integers(256)
         file.write_bytes(damaged[: None if kind == "parquet" else int(random.integers(130, len(damaged)))])
         try:
-            read_table(file, READERS[kind].options(kind=kind), "t")
+            read_log_table(file, READERS[kind].options(kind=kind), "t")
         except DataError as error:
             said.append(str(error))
     assert said

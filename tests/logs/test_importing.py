@@ -13,8 +13,8 @@ import pytest
 from shipid.data.dataset import Dataset, flag_bit, read_dataset, stretches_of_runs, write_dataset
 from shipid.errors import DataError, DocumentError
 from shipid.logs import frames, readers
-from shipid.logs.importing import import_log, read_mapping, runs_of
-from shipid.logs.mapping import Source
+from shipid.logs.importing import import_log, read_mapping, run_files
+from shipid.logs.mapping import LogSource
 from tests.logs.conftest import CLOCKS, DATES, PLAIN, SPEEDS, as_log, stamps, turning
 
 Write = Callable[..., Path]
@@ -483,7 +483,7 @@ def test_a_heading_that_counts_on_or_begins_anew_needs_no_wrap(tmp_path: Path) -
 def test_a_run_is_named_by_a_file_in_utf_8(tmp_path: Path) -> None:
     (tmp_path / os.fsdecode(b"a\xe9.csv")).touch()
     with pytest.raises(DataError, match="its name is not UTF-8"):
-        runs_of(Source(runs="*.csv"), tmp_path)
+        run_files(LogSource(runs="*.csv"), tmp_path)
 
 
 @pytest.mark.parametrize("large", [False, True])

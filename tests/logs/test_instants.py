@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.instants import even_clock, evenly, rounding_of
+from shipid.logs.instants import clock_rounding, even_clock, even_instants
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ def test_lost_rows_of_a_rounded_clock_are_found_whatever_it_counts_from(
     t = 0.03 + every * np.arange(int(300 / every))
     seconds = np.floor(np.delete(t, np.concatenate([np.arange(first, first + count) for first, count in lost])))
     log = pd.DataFrame(index=range(len(seconds)))
-    even, since_1970 = (evenly(seconds + begin, every, log, Path("log.csv")) - begin for begin in (0.0, 1.7e9))
+    even, since_1970 = (even_instants(seconds + begin, every, log, Path("log.csv")) - begin for begin in (0.0, 1.7e9))
     np.testing.assert_allclose(since_1970, even, atol=1e-5)
     assert np.abs(even - seconds).max() < 1.0 + every
 
@@ -36,13 +36,13 @@ def test_a_rounded_clock_starts_anew_after_a_pause() -> None:
 def test_a_clock_of_another_rate_is_refused() -> None:
     t = np.floor(np.arange(0.0, 60.0, 0.1) + 1e-9)
     with pytest.raises(DataError, match=r"log\.csv: row \d+, clock\.every: the time is .* from rows every 0\.2 s"):
-        evenly(t, 0.2, pd.DataFrame(index=range(len(t))), Path("log.csv"))
+        even_instants(t, 0.2, pd.DataFrame(index=range(len(t))), Path("log.csv"))
 
 
 def test_the_rounding_of_a_clock_grows_with_its_numbers() -> None:
     """Of numbers with three digits, 9.99 is known to 0.01, and 99.9 to 0.1."""
     t = np.arange(1.0, 99.0, 0.05)
-    rounding = rounding_of(np.array([float(f"{value:.3g}") for value in t]))
+    rounding = clock_rounding(np.array([float(f"{value:.3g}") for value in t]))
     np.testing.assert_allclose(rounding[[0, -1]], [0.05, 0.1], rtol=1e-6)
 
 

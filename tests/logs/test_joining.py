@@ -12,7 +12,7 @@ import pytest
 from shipid.data.dataset import BREAK, Dataset, read_dataset, stretches_of_runs, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
-from shipid.logs.joining import PAUSE, join
+from shipid.logs.joining import PAUSE, join_datasets
 from tests.cli.running import ended, output_of
 
 ORIGIN = {"latitude": 54.0, "longitude": 10.0}
@@ -34,7 +34,7 @@ def recording(seed: int, runs: tuple[str, ...] = ("a", "b"), begin: float = 0.0,
 
 
 def joined(*parts: Dataset) -> tuple[Dataset, list[str]]:
-    return join({Path(f"day {number}.parquet"): part for number, part in enumerate(parts)})
+    return join_datasets({Path(f"day {number}.parquet"): part for number, part in enumerate(parts)})
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -92,13 +92,13 @@ def test_runs_of_one_name_are_told_apart_by_their_files() -> None:
     assert whole.runs == ["day 0 a", "day 0 b", "day 1 a", "day 1 b"]
     assert whole.metadata["manoeuvres"] == {"day 0 a": "zigzag", "day 1 a": "zigzag"}
     assert "names begin with day 0, day 1" in notes[0]
-    same = join({Path("one/log.parquet"): recording(1), Path("two/log.parquet"): recording(2, begin=900.0)})[0]
+    same = join_datasets({Path("one/log.parquet"): recording(1), Path("two/log.parquet"): recording(2, begin=900.0)})[0]
     assert same.runs == ["log 1 a", "log 1 b", "log 2 a", "log 2 b"]
 
 
 def test_no_two_runs_of_files_have_one_name_with_the_name_of_the_file() -> None:
     parts = recording(1, ("1 a", "b")), recording(2, ("a", "b"), begin=1000.0)
-    whole, _ = join({Path("day.parquet"): parts[0], Path("day 1.parquet"): parts[1]})
+    whole, _ = join_datasets({Path("day.parquet"): parts[0], Path("day 1.parquet"): parts[1]})
     assert len(whole.runs) == 4
     assert whole.runs == ["1 day 1 a", "1 day b", "2 day 1 a", "2 day 1 b"]
 

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, WORDS, declared_kind
+from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, WORDS, kind_in_name
 from shipid.logs.mapping import Manoeuvre
 
 
@@ -41,4 +41,4 @@ def test_a_mapping_takes_every_kind() -> None:
     ],
 )
 def test_names_say_the_kind(name: str, kind: str | None) -> None:
-    assert declared_kind(name) == kind
+    assert kind_in_name(name) == kind

@@ -14,7 +14,7 @@ from shipid.logs.formats import MatFormat
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mat import _no_vectors, is_mat, read_mat
-from shipid.logs.readers import read_table
+from shipid.logs.readers import read_log_table
 from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
 
 
@@ -61,7 +61,7 @@ def test_a_matlab_array_of_structs_is_named(log: pd.DataFrame, tmp_path: Path) -
     savemat(file, {"log": rows})
     message = r"no variable .* 'log' is an array of 120 structs, .* such as s\.time = \[log\.time\]"
     with pytest.raises(DataError, match=message):
-        read_table(file, MatFormat(kind="mat"), "time")
+        read_log_table(file, MatFormat(kind="mat"), "time")
     savemat(file, {**{name: log[name].to_numpy() for name in log}, "log": rows})
     changes = [('from = "rpm"', 'from = "log.rpm"')]
     with pytest.raises(DataError, match=r"'log\.rpm' is in an array of structs: save"):

@@ -13,7 +13,7 @@ from shipid.errors import DataError
 from shipid.logs import nmea
 from shipid.logs.formats import NmeaFormat
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.readers import READERS, read_table
+from shipid.logs.readers import READERS, read_log_table
 from tests.logs.conftest import T, turning
 
 
@@ -112,7 +112,7 @@ def test_values_that_a_sentence_calls_invalid_are_not_taken(tmp_path: Path) -> N
     ]
     later = ["GPRMC,120001,A,4807.0,N,01131.0,E,,,271022,,,A", "AGRSA,33.0,V,,", "GPVTG,99.0,T,,M,77.0,N,,K,N"]
     (tmp_path / "log").write_text("\n".join(map(sentence, begin + later)))
-    table = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")
+    table = read_log_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")
     assert table["rudder"].tolist() == pytest.approx([10.5, np.nan], nan_ok=True)
     assert table["rudder_port"].isna().all()
     assert table["sog"].tolist() == pytest.approx([5.0, np.nan], nan_ok=True)
@@ -143,7 +143,7 @@ def test_a_fix_is_of_the_day_that_the_sentences_say(fixes: list[str], hours: lis
         else:
             lines.append(f"GPGGA,{time},4807.0,N,01131.0,E,1,8,0.9,5.0,M,46.9,M,,")
     (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
-    t = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")["time"]
+    t = read_log_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")["time"]
     np.testing.assert_allclose((t - t[0]) / 3600, hours)
     days = [
         datetime.strptime(fix.split()[2], "%d%m%y").replace(tzinfo=UTC)
@@ -196,7 +196,7 @@ def test_the_true_wind_is_read_in_knots_too(speed: str, tmp_path: Path) -> None:
     fixes = [f"GPRMC,12000{k},A,4807.0,N,01131.0,E,5.0,84.0,271022,,,A" for k in (0, 1)]
     lines = [line for fix in fixes for line in (fix, f"WIMWD,120.0,T,118.0,M,{speed}")]
     (tmp_path / "log").write_text("\n".join(map(sentence, lines)))
-    table = read_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")
+    table = read_log_table(tmp_path / "log", NmeaFormat(kind="nmea"), "time")
     assert table["wind_speed"].tolist() == pytest.approx([5.1444, 5.1444], abs=1e-4)
 
 
@@ -280,7 +280,7 @@ def read(lines: list[str], file: Path) -> pd.DataFrame:
     file.write_text("\n".join(lines) + "\n")
     assert READERS["nmea"].detect is not None
     assert READERS["nmea"].detect(file, file.read_bytes()) == {"kind": "nmea", "time": "fix"}
-    return read_table(file, NmeaFormat(kind="nmea"), "time")
+    return read_log_table(file, NmeaFormat(kind="nmea"), "time")
 
 
 def test_messages_of_ais_and_targets_of_a_radar_are_passed_over(tmp_path: Path) -> None:
@@ -303,7 +303,7 @@ def test_how_far_a_long_log_is_read_is_said(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(nmea, "SAID", 500)
     file, shares = tmp_path / "log", list[float]()
     file.write_text("\n".join(sentence(RMC.format(k // 60 % 60, k % 60)) for k in range(2200)) + "\n")
-    read_table(file, NmeaFormat(kind="nmea"), "time", progress=shares.append)
+    read_log_table(file, NmeaFormat(kind="nmea"), "time", progress=shares.append)
     assert shares == pytest.approx([500 / 2200, 1000 / 2200, 1500 / 2200, 2000 / 2200], abs=0.06)
 
 

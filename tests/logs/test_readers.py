@@ -12,12 +12,12 @@ from scipy.io import savemat
 
 from shipid.errors import DataError
 from shipid.logs import readers
-from shipid.logs.cells import column_of
-from shipid.logs.dates import seconds
+from shipid.logs.cells import log_column
+from shipid.logs.dates import parse_dates
 from shipid.logs.formats import ParquetFormat, TextFormat
-from shipid.logs.guess.sniff import sniff
+from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.readers import read_table, require_file, widest
+from shipid.logs.readers import check_line_width, read_log_table, require_file
 from shipid.logs.workbook import WIDEST
 from tests.logs.conftest import NAMES, T, as_log, assert_is_the_motion, mapping_with, turning
 
@@ -69,17 +69,17 @@ def test_a_large_text_is_read_by_blocks_as_a_small_one(
     form, text = LARGE_TEXTS[name]
     file = tmp_path / "log.csv"
     file.write_text(text, encoding=form.encoding)
-    small = read_table(file, form, "a")
+    small = read_log_table(file, form, "a")
     monkeypatch.setattr(readers, "LARGE", 1)
     shares: list[float] = []
-    large = read_table(file, form, "a", ("b", "c"), shares.append)
+    large = read_log_table(file, form, "a", ("b", "c"), shares.append)
     assert [str(column) for column in large] == ["a", "b", "c"]
     assert large["a"].to_numpy().tolist() == [0.5, 1.5, 2.5]
     np.testing.assert_array_equal(large["b"].to_numpy(dtype=float), [1.0, np.nan, 3.0])
     assert large["c"].tolist() == small["c"].tolist()
     assert shares
     assert max(shares) <= 1.0
-    assert list(read_table(file, form, "a", ("b",))) == ["a", "b"]
+    assert list(read_log_table(file, form, "a", ("b",))) == ["a", "b"]
 
 
 def test_a_large_text_is_refused_where_no_threads_can_be_started(
@@ -99,7 +99,7 @@ def test_a_large_text_is_refused_where_no_threads_can_be_started(
     monkeypatch.setattr(readers, "LARGE", 1)
     monkeypatch.setattr(threading.Thread, "start", one)
     with pytest.raises(RuntimeError, match="start new thread"):
-        read_table(file, TextFormat(), "a", ("b",))
+        read_log_table(file, TextFormat(), "a", ("b",))
     assert not started[0].is_alive()
 
 
@@ -111,9 +111,9 @@ def test_a_large_text_is_refused_where_no_threads_can_be_started(
 def test_a_large_text_is_read_as_a_small_one(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "log.csv"
     file.write_bytes(text.encode())
-    small = read_table(file, TextFormat(), "a", ("b", "c"))
+    small = read_log_table(file, TextFormat(), "a", ("b", "c"))
     monkeypatch.setattr(readers, "LARGE", 1)
-    pd.testing.assert_frame_equal(read_table(file, TextFormat(), "a", ("b", "c")), small)
+    pd.testing.assert_frame_equal(read_log_table(file, TextFormat(), "a", ("b", "c")), small)
 
 
 @pytest.mark.parametrize("first", [0, 200], ids=["short lines", "long lines first"])
@@ -124,7 +124,7 @@ def test_a_large_text_whose_lines_become_shorter_is_read_to_its_end(
     lines = [f"{row}.{'0' * first if row < 6000 else ''}5,{2 * row}" for row in range(150_000)]
     (tmp_path / "log.csv").write_text("a,b\n" + "\n".join(lines) + "\n")
     monkeypatch.setattr(readers, "LARGE", 1)
-    table = read_table(tmp_path / "log.csv", TextFormat(), "a", ("b",))
+    table = read_log_table(tmp_path / "log.csv", TextFormat(), "a", ("b",))
     assert len(table) == len(lines)
     np.testing.assert_array_equal(table["b"], 2.0 * np.arange(len(lines)))
 
@@ -152,15 +152,15 @@ def test_a_device_and_a_folder_are_no_logs(tmp_path: Path) -> None:
             require_file(path)
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(DataError, match="a device or a pipe"):
-        read_table(tmp_path / "pipe", TextFormat(), "time")
+        read_log_table(tmp_path / "pipe", TextFormat(), "time")
 
 
 def test_a_short_line_is_refused_or_left_out(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("a,b,c\n1,2,3\n2,3\n3,4,\n4,5,6\n")
     with pytest.raises(DataError, match=r"line 3: 2 cells, where the header has 3: .*ragged = 'drop'"):
-        read_table(file, TextFormat(), "a")
-    table = read_table(file, TextFormat(ragged="drop"), "a")
+        read_log_table(file, TextFormat(), "a")
+    table = read_log_table(file, TextFormat(ragged="drop"), "a")
     assert table["a"].tolist() == ["1", "3", "4"]  # an empty cell is none that is missing
     assert table.attrs["ragged"] == [3]
 
@@ -170,8 +170,8 @@ def test_the_number_of_a_wrong_line_counts_the_comments_before_it(tmp_path: Path
     file = tmp_path / "log.csv"
     file.write_text(f"recorder 7\n# of a day\na,b\n0,1\n# noon\n{wrong}\n3,4\n4,5\n")
     with pytest.raises(DataError, match=f"line 6: {said}"):
-        read_table(file, TextFormat(comment="#", skip_rows=1), "a")
-    table = read_table(file, TextFormat(comment="#", skip_rows=1, ragged="drop"), "a")
+        read_log_table(file, TextFormat(comment="#", skip_rows=1), "a")
+    table = read_log_table(file, TextFormat(comment="#", skip_rows=1, ragged="drop"), "a")
     assert table.attrs["ragged"] == [6]
 
 
@@ -205,13 +205,13 @@ def test_rows_are_counted_as_the_reader_of_csv_does(seed: int, tmp_path: Path) -
     file = tmp_path / "log.csv"
     file.write_text("\n".join(lines) + "\n")
     form = TextFormat(separator=separator, comment=comment, ragged="drop")
-    table = read_table(file, form, "time")
+    table = read_log_table(file, form, "time")
     assert [*table["time"]] == good
     assert table.attrs["ragged"] == [*wrong]
     if wrong:
         first, count = next(iter(wrong.items()))
         with pytest.raises(DataError, match=f"{count} cells, where the header has 3") as caught:
-            read_table(file, form.model_copy(update={"ragged": "refuse"}), "time")
+            read_log_table(file, form.model_copy(update={"ragged": "refuse"}), "time")
         assert caught.value.path == f"line {first}"
 
 
@@ -226,7 +226,7 @@ def test_what_a_power_cut_leaves_is_named(seed: int, tmp_path: Path) -> None:
     lines[hit : hit + 1] = [lines[hit][:place] + nul + lines[hit][place:] if hit < len(lines) else nul]
     file = tmp_path / "log.csv"
     file.write_text("\n".join(lines) + "\n")
-    for read in (lambda: read_table(file, TextFormat(ragged="drop"), "time"), lambda: sniff(file)):
+    for read in (lambda: read_log_table(file, TextFormat(ragged="drop"), "time"), lambda: recognise_log(file)):
         with pytest.raises(DataError, match="holds NUL bytes, as after a power cut: remove them") as caught:
             read()
         assert caught.value.path == f"line {hit + 1}"
@@ -235,7 +235,7 @@ def test_what_a_power_cut_leaves_is_named(seed: int, tmp_path: Path) -> None:
 def test_a_quote_that_is_never_closed_is_named(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text('time,x\n0,1\n1,"2\n' + "".join(f"{k},{k}\n" for k in range(2, 20_000)))
     with pytest.raises(DataError, match="is its closing quote lacking") as caught:
-        read_table(tmp_path / "log.csv", TextFormat(), "time")
+        read_log_table(tmp_path / "log.csv", TextFormat(), "time")
     assert caught.value.path == "line 3"
 
 
@@ -252,10 +252,10 @@ def test_a_line_of_very_many_cells_is_refused(separator: str, cells: int, refuse
     mark = b" " if separator == "whitespace" else separator.encode()
     head = b"t,u\n" + mark.join([b"a"] * cells) + b"\n"
     if not refused:
-        widest(head, separator, Path("log.csv"))
+        check_line_width(head, separator, Path("log.csv"))
         return
     with pytest.raises(DataError, match=f"a line of more than {WIDEST} cells"):
-        widest(head, separator, Path("log.csv"))
+        check_line_width(head, separator, Path("log.csv"))
 
 
 def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: Path) -> None:
@@ -264,9 +264,9 @@ def test_nested_columns_of_parquet_are_left_and_durations_are_seconds(tmp_path: 
     plain = {"t": pd.to_timedelta(steps, unit="s"), "u": np.sin(steps)}
     frame = pd.DataFrame({**plain, "cells": [[1.0, 2.0]] * 40, "box": [{"a": 1}] * 40})
     frame.to_parquet(tmp_path / "log.parquet")
-    table = read_table(tmp_path / "log.parquet", ParquetFormat(kind="parquet"), "t")
+    table = read_log_table(tmp_path / "log.parquet", ParquetFormat(kind="parquet"), "t")
     assert list(table.columns) == ["t", "u"]
-    np.testing.assert_allclose(seconds(table["t"]), steps)
+    np.testing.assert_allclose(parse_dates(table["t"]), steps)
     assert [*table.attrs["other"]] == ["cells", "box"]
     with pytest.raises(DataError, match=r"'box' is nested \(struct<a: int64>\): write each of its values as a column"):
-        column_of(table, "box", tmp_path / "log.parquet", "columns.psi.from")
+        log_column(table, "box", tmp_path / "log.parquet", "columns.psi.from")

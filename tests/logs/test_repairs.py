@@ -10,7 +10,7 @@ import pytest
 from shipid.data.dataset import BREAK, Dataset, flag_bit, stretches_of_runs
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.repairs import FLAGS, Despike, Latency, apply_repairs, despike
+from shipid.logs.repairs import FLAGS, Despike, Latency, apply_repairs, remove_spikes
 from tests.logs.conftest import as_log, turning
 
 T = np.arange(0.0, 240.0, 0.5)
@@ -143,7 +143,7 @@ def test_a_spike_is_mended_by_its_own_stretch(seed: int) -> None:
     spikes = np.unique([*rng.choice(ends, 2, replace=False), *rng.choice(3 * size, 3, replace=False)])
     wrong[spikes] += rng.choice([-500.0, 500.0], len(spikes))
     repair = Despike(kind="despike", reason="a test", columns=("north",), window=10.0, threshold=50.0)
-    outcome = despike(pd.DataFrame({"t": t, "north": wrong, "flags": flags}), repair)
+    outcome = remove_spikes(pd.DataFrame({"t": t, "north": wrong, "flags": flags}), repair)
     assert np.flatnonzero(outcome.touched).tolist() == spikes.tolist()
     np.testing.assert_allclose(outcome.rows["north"], true, atol=1e-6)
 
@@ -251,7 +251,7 @@ def test_a_spike_at_an_end_is_replaced_and_nothing_else_is(seed: int) -> None:
     spoilt[wild] += random.choice([-1, 1], len(wild)) * random.uniform(150, 900, len(wild))
     rows = pd.DataFrame({"t": t, "north": spoilt, "flags": np.zeros(len(t), dtype=np.int64)})
     repair = Despike(kind="despike", reason="drawn", columns=("north",), window=10.0, threshold=60.0)
-    outcome = despike(rows, repair)
+    outcome = remove_spikes(rows, repair)
     assert np.flatnonzero(outcome.touched).tolist() == wild.tolist()
     assert np.abs(outcome.rows["north"] - north).max() < 10
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset, stretches_of_runs
-from shipid.logs.segments import kind_of, manoeuvres
+from shipid.logs.segments import find_manoeuvres, run_kind
 from tests.logs.conftest import as_dataset
 
 Part = tuple[float, float, float, float]  # seconds, helm [deg], yaw rate [deg/s], shaft [rev/s]
@@ -30,7 +30,7 @@ def recording(*parts: Part, helm: bool = True) -> Dataset:
 
 
 def cut(dataset: Dataset) -> list[tuple[str | None, float, float]]:
-    return [(one.manoeuvre, one.start, one.end) for one in manoeuvres(dataset)]
+    return [(one.manoeuvre, one.start, one.end) for one in find_manoeuvres(dataset)]
 
 
 def test_each_manoeuvre_begins_ten_seconds_before_its_first_order() -> None:
@@ -46,7 +46,7 @@ def test_each_manoeuvre_begins_ten_seconds_before_its_first_order() -> None:
 
 
 def test_names_count_each_kind() -> None:
-    names = [one.run for one in manoeuvres(recording(STRAIGHT, TURN, STRAIGHT, TURN, STRAIGHT))]
+    names = [one.run for one in find_manoeuvres(recording(STRAIGHT, TURN, STRAIGHT, TURN, STRAIGHT))]
     assert names == ["transit 1", "turning 1", "transit 2", "turning 2", "transit 3"]
 
 
@@ -74,7 +74,7 @@ def test_a_straight_with_another_shaft_speed_is_a_speed_run() -> None:
 
 
 def test_times_are_in_the_unit_of_the_clock() -> None:
-    (transit, *_) = manoeuvres(recording(STRAIGHT, TURN), unit=60.0)
+    (transit, *_) = find_manoeuvres(recording(STRAIGHT, TURN), unit=60.0)
     assert (transit.start, transit.end) == (0.0, pytest.approx(110.0 / 60.0))
 
 
@@ -84,4 +84,4 @@ def test_times_are_in_the_unit_of_the_clock() -> None:
 )
 def test_the_kind_of_a_run_is_what_takes_most_of_it(parts: list[Part], kind: str) -> None:
     ((_, rows),) = stretches_of_runs(recording(*parts))
-    assert kind_of(rows) == kind
+    assert run_kind(rows) == kind

@@ -7,7 +7,7 @@ import numpy as np
 import pynmea2
 import pytest
 
-from shipid.logs.sentences import parsed
+from shipid.logs.sentences import parse_sentence
 from tests.logs.test_nmea import sentence
 
 WHERE = "4807.038,N,01131.000,W"
@@ -35,7 +35,7 @@ PLACE = {"latitude": 48 + 7.038 / 60, "longitude": -(11 + 31 / 60)}
 )
 def test_what_a_sentence_says(body: str, values: dict[str, float]) -> None:
     """One of Garmin that begins with $PGRMC is no RMC."""
-    said = parsed(sentence(body)[1:], checked=True)
+    said = parse_sentence(sentence(body)[1:], checked=True)
     assert said is not None
     assert said.values() == pytest.approx(values)
 
@@ -43,7 +43,7 @@ def test_what_a_sentence_says(body: str, values: dict[str, float]) -> None:
 @pytest.mark.parametrize("fields", ["4860.000,N,01131.000,W", "4807.038,,01131.000,W", "4807.038,N,01131.000,N"])
 def test_a_position_that_is_none_is_refused(fields: str) -> None:
     """Before, a position without its side was at 0 deg."""
-    said = parsed(sentence(f"GPGLL,{fields},120000,A")[1:], checked=True)
+    said = parse_sentence(sentence(f"GPGLL,{fields},120000,A")[1:], checked=True)
     assert said is not None
     with pytest.raises(ValueError, match=r"is no (latitude|longitude)"):
         said.values()
@@ -54,18 +54,18 @@ def test_a_position_that_is_none_is_refused(fields: str) -> None:
     [(f"GPRMC,235960.5,A,{WHERE},5,84,271022", 86400.5), ("RATTM,01,2.3,45.0,T,,,T,,,N,A,T,,115957.00,A", None)],
 )
 def test_fixes_say_the_time_and_radar_targets_do_not(body: str, time: Any) -> None:
-    said = parsed(sentence(body)[1:], checked=True)
+    said = parse_sentence(sentence(body)[1:], checked=True)
     assert said is not None
     assert said.time() == time
 
 
 def test_a_checksum_is_the_exclusive_or_of_all_characters() -> None:
     good = "GPGLL,3751.65,S,14507.36,E*77"  # of the manual of a receiver
-    assert parsed(good, checked=True) is not None
-    assert parsed(good.replace("65", "66"), checked=False) is None
-    assert parsed(good.partition("*")[0], checked=True) is None
-    assert parsed(good.partition("*")[0], checked=False) is not None
-    assert math.isclose(parsed(good, checked=True).values()["latitude"], -(37 + 51.65 / 60))  # type: ignore[union-attr]
+    assert parse_sentence(good, checked=True) is not None
+    assert parse_sentence(good.replace("65", "66"), checked=False) is None
+    assert parse_sentence(good.partition("*")[0], checked=True) is None
+    assert parse_sentence(good.partition("*")[0], checked=False) is not None
+    assert math.isclose(parse_sentence(good, checked=True).values()["latitude"], -(37 + 51.65 / 60))  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -91,7 +91,7 @@ def test_sentences_say_what_another_implementation_reads(seed: int) -> None:
     }
     for body, names in read.items():
         text = sentence(f"{talker}{body}")
-        ours, theirs = parsed(text[1:], checked=True), pynmea2.parse(text, check=True)
+        ours, theirs = parse_sentence(text[1:], checked=True), pynmea2.parse(text, check=True)
         assert ours is not None
         values = ours.values()
         for name, other in names.items():
@@ -103,6 +103,6 @@ def test_sentences_say_what_another_implementation_reads(seed: int) -> None:
         if body.startswith("RMC"):
             assert ours.day() == theirs.datestamp.toordinal()
     damaged = text[:-1] + ("0" if text[-1] != "0" else "1")
-    assert parsed(damaged[1:], checked=True) is None
+    assert parse_sentence(damaged[1:], checked=True) is None
     with pytest.raises(pynmea2.ChecksumError):
         pynmea2.parse(damaged, check=True)

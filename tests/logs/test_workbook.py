@@ -17,10 +17,10 @@ from shipid.logs import workbook
 from shipid.logs.formats import SheetFormat, TextFormat
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_mapping
-from shipid.logs.guess.sniff import sniff
+from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.logs.readers import read_table
+from shipid.logs.readers import read_log_table
 from tests.logs.simulated import as_bridge, si_log
 
 BRIDGE = as_bridge(si_log()).round(4)
@@ -38,7 +38,7 @@ def saved(path: Path, cells: list[list[object]], title: str = "log") -> Path:
 
 
 def rows_of(file: Path, **keys: object) -> list[list[str]]:
-    return read_table(file, SheetFormat(kind="sheet", **keys), "time").to_numpy().tolist()
+    return read_log_table(file, SheetFormat(kind="sheet", **keys), "time").to_numpy().tolist()
 
 
 @pytest.mark.parametrize(("name", "left"), [("log.xlsx", 0), ("log.xlsx", 2), ("log.ods", 0)])
@@ -82,7 +82,7 @@ def test_cells_are_read_as_written(tmp_path: Path) -> None:
         [None, -4.0, None, None, None, " a "],
     ]
     file = saved(tmp_path / "log.xlsx", cells)
-    table = read_table(file, SheetFormat(kind="sheet"), "time")
+    table = read_log_table(file, SheetFormat(kind="sheet"), "time")
     assert list(table.columns) == ["time", "speed [kn]", "clock", "duration", "flag", "words"]
     assert rows_of(file) == [
         ["2024-05-01 12:00:00.500000", "0.3333333333333333", "01:02:03", "108000", "TRUE", "3,14"],
@@ -101,7 +101,7 @@ def test_the_log_is_found_beside_a_larger_sheet(hidden: bool, tmp_path: Path) ->
         other.append([float(row), *range(6)])
     other.sheet_state = "hidden" if hidden else "visible"
     book.save(tmp_path / "log.xlsx")
-    sniffed = sniff(tmp_path / "log.xlsx")
+    sniffed = recognise_log(tmp_path / "log.xlsx")
     assert sniffed.form["sheet"] == "log"
     assert sniffed.notes[0] == "of the workbook the sheet 'log' is read, not 'other'"
 
@@ -114,7 +114,7 @@ def test_times_of_day_go_on_after_midnight(tmp_path: Path) -> None:
     for row in range(2, 42):
         book["log"].cell(row, 1).number_format = "hh:mm:ss"
     book.save(file)
-    np.testing.assert_allclose(sniff(file).t, 86400 - 20 + np.arange(40))
+    np.testing.assert_allclose(recognise_log(file).t, 86400 - 20 + np.arange(40))
 
 
 def test_a_sheet_is_chosen_by_its_name(tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_an_error_names_the_row_of_the_sheet(tmp_path: Path) -> None:
 
 def test_a_decimal_comma_in_cells_of_text_is_drafted(tmp_path: Path) -> None:
     rows = [["time", "x"], *([str(k / 10).replace(".", ","), str(k / 7).replace(".", ",")] for k in range(40))]
-    sniffed = sniff(saved(tmp_path / "log.xlsx", rows))
+    sniffed = recognise_log(saved(tmp_path / "log.xlsx", rows))
     assert sniffed.form["decimal"] == ","
     np.testing.assert_allclose(sniffed.columns["x"], np.arange(40) / 7)
 
@@ -153,7 +153,7 @@ def test_a_workbook_is_known_by_its_content(tmp_path: Path) -> None:
 def test_a_text_reader_names_the_kind(tmp_path: Path) -> None:
     file = saved(tmp_path / "log.csv", [["time", "x"], [0, 1], [1, 2]])
     with pytest.raises(DataError, match=r"set \[format\] kind = 'sheet'"):
-        read_table(file, TextFormat(), "time")
+        read_log_table(file, TextFormat(), "time")
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -167,7 +167,7 @@ def test_a_damaged_workbook_is_no_traceback(seed: int, tmp_path: Path) -> None:
     for place in rng.integers(0, len(content), 20):
         content[place] = int(rng.integers(256))
     file.write_bytes(content)
-    for read in (sniff, rows_of):
+    for read in (recognise_log, rows_of):
         with suppress(DataError):
             read(file)
 
@@ -175,15 +175,15 @@ def test_a_damaged_workbook_is_no_traceback(seed: int, tmp_path: Path) -> None:
 def test_what_cannot_be_held_or_has_no_value_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = saved(tmp_path / "log.xlsx", [])
     with pytest.raises(DataError, match="no sheet of this workbook has a cell with a value"):
-        sniff(file)
+        recognise_log(file)
     monkeypatch.setattr(workbook, "LARGEST", 1000)
     with pytest.raises(DataError, match=r"GB once unpacked: save its sheet as CSV"):
-        sniff(file)
+        recognise_log(file)
 
 
 def test_a_sheet_wider_than_any_log_is_refused_at_once(tmp_path: Path) -> None:
     file = saved(tmp_path / "log.xlsx", [[f"c{k}" for k in range(10_001)], [*range(10_001)]])
-    for read in (sniff, rows_of):
+    for read in (recognise_log, rows_of):
         with pytest.raises(DataError, match="a line of more than 10000 cells"):
             read(file)
 
@@ -192,7 +192,7 @@ def test_the_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytes
     file = saved(tmp_path / "log.xlsx", [["time", "x"], [0, 1], [1, 2]])
     monkeypatch.setitem(sys.modules, "python_calamine", None)
     with pytest.raises(DataError, match=r"pip install 'shipid\[sheet\]', or save its sheet as CSV"):
-        sniff(file)
+        recognise_log(file)
 
 
 def test_a_formula_without_a_stored_value_is_no_missing_value(tmp_path: Path) -> None:
@@ -207,6 +207,6 @@ def test_a_formula_without_a_stored_value_is_no_missing_value(tmp_path: Path) ->
     assert sentence in draft
     assert workbook.NOT_CALCULATED in draft
     with pytest.raises(DataError, match="a formula without a stored value: open the workbook in a spreadsheet program"):
-        sniff(saved(tmp_path / "clock.xlsx", [["time", "x"], *([f"=A{k}", 1.0] for k in range(2, 9))]))
-    says = sniff(saved(tmp_path / "all.xlsx", [["time", "speed"], *([k, f"=A{k}"] for k in range(2, 9))])).notes
+        recognise_log(saved(tmp_path / "clock.xlsx", [["time", "x"], *([f"=A{k}", 1.0] for k in range(2, 9))]))
+    says = recognise_log(saved(tmp_path / "all.xlsx", [["time", "speed"], *([k, f"=A{k}"] for k in range(2, 9))])).notes
     assert any("column 'speed' holds words, not numbers: '=A2' is a formula" in note for note in says)

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
-from shipid.logs.guess.words import numbered, parts_of, side_of, words_of_side
+from shipid.logs.guess.words import name_parts, number_in_name, side_in_name, words_of_side
 from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of, signal_row
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
@@ -38,16 +38,16 @@ def name_commands(state: State, vessel: Vessel) -> None:
     for signal in dict.fromkeys(map(signal_of, controls.commands)):
         wanted = [name for name in controls.commands if signal_of(name) == signal]
         drafted = [one for one in state.suggestions if is_command(one.name) and signal_of(one.name) == signal]
-        for name, one in _pairs(state, wanted, drafted, idle, vessel):
+        for name, one in _command_pairs(state, wanted, drafted, idle, vessel):
             components.setdefault(one.name.partition(".")[0], name.partition(".")[0])
             named.append(_with_sign(state, replace(one, name=name), helm))
         missing = [name for name in wanted if name not in {one.name for one in named}]
-        named += [stopped for name in missing for stopped in _missing(state, name, idle, vessel)]
+        named += [stopped for name in missing for stopped in _missing_command(state, name, idle, vessel)]
     used = {one.source for one in named}
     kept = [one for one in state.suggestions if not is_command(one.name) or one.source not in used]
     order = [one.source for one in state.suggestions if is_command(one.name)]
     named.sort(key=lambda one: order.index(one.source) if one.source in order else len(order))
-    state.suggestions[:] = [_renamed(one, components) for one in kept]
+    state.suggestions[:] = [_rename_output(one, components) for one in kept]
     state.suggestions += named
 
 
@@ -63,7 +63,7 @@ def _drop_guesses(state: State, signals: set[str]) -> None:
         state.taken.discard(one.source)
 
 
-def _pairs(
+def _command_pairs(
     state: State, wanted: Sequence[str], drafted: Sequence[Suggestion], idle: set[str], vessel: Vessel
 ) -> Iterator[tuple[str, Suggestion]]:
     """Yield each command of the vessel with the column for it.
@@ -73,53 +73,53 @@ def _pairs(
     """
     found = {name: one for name in wanted for one in drafted if state.command_of(one.source) == name}
     said = list(found.values())
-    for group in _alike(wanted, idle, vessel):
+    for group in _command_groups(wanted, idle, vessel):
         left = [one for one in drafted if one not in said]
-        tunnel = group[0] in idle or _place(group[0]) in ("bow", "stern")
+        tunnel = group[0] in idle or _place_in_name(group[0]) in ("bow", "stern")
         missing = [name for name in group if name not in found]
-        found |= _of_group(state, missing, left, tunnel, vessel)
+        found |= _group_columns(state, missing, left, tunnel, vessel)
         if not tunnel:
             found |= _as_the_other_side(state, [name for name in group if name not in found], drafted, vessel)
     yield from ((name, found[name]) for name in wanted if name in found)
 
 
-def _alike(wanted: Sequence[str], idle: set[str], vessel: Vessel) -> list[list[str]]:
+def _command_groups(wanted: Sequence[str], idle: set[str], vessel: Vessel) -> list[list[str]]:
     """Commands of the screws that drive or the angles that turn; and those of the tunnels at each end."""
     groups: dict[str, list[str]] = {}
     for name in wanted:
-        place = _where(name, vessel)
+        place = _side_or_place(name, vessel)
         tunnel = name in idle or place in ("bow", "stern")
         groups.setdefault(f"tunnel {place}" if tunnel else "", []).append(name)
     return list(groups.values())
 
 
-def _of_group(
+def _group_columns(
     state: State, names: Sequence[str], drafted: Sequence[Suggestion], tunnel: bool, vessel: Vessel
 ) -> dict[str, Suggestion]:
     """Columns for the commands of a group, of those that are left."""
     if not names:
         return {}
-    places = {name: _where(name, vessel) for name in names}
+    places = {name: _side_or_place(name, vessel) for name in names}
     if tunnel:
-        columns = [one for one in drafted if places[names[0]] and _place(one.name) == places[names[0]]]
-        return _in_order(state, names, columns)
-    columns = [one for one in drafted if _place(one.name) not in ("bow", "stern")]
+        columns = [one for one in drafted if places[names[0]] and _place_in_name(one.name) == places[names[0]]]
+        return _match_in_order(state, names, columns)
+    columns = [one for one in drafted if _place_in_name(one.name) not in ("bow", "stern")]
     found: dict[str, Suggestion] = {}
     for side in OPPOSITE:
-        found |= _in_order(
+        found |= _match_in_order(
             state,
             [name for name in names if places[name] == side],
-            [one for one in columns if _place(one.name) == side],
+            [one for one in columns if _place_in_name(one.name) == side],
         )
-    left = [one for one in columns if not _place(one.name)]
+    left = [one for one in columns if not _place_in_name(one.name)]
     missing = [name for name in names if name not in found]
     if len(left) == 1 or len(missing) == 1:
-        found |= _in_order(state, missing, left)
+        found |= _match_in_order(state, missing, left)
     elif len(left) > 1:
         found |= _by_number(state, missing, left, vessel)
     alone = [name for name in names if name not in found and not places[name]]
     if alone and columns and (len(names) == 1 or len(columns) == 1):
-        found |= _in_order(state, alone, columns)
+        found |= _match_in_order(state, alone, columns)
     return found
 
 
@@ -129,15 +129,15 @@ def _as_the_other_side(
     """Columns of the other side for commands of a side that the log does not have, each with a question."""
     found: dict[str, Suggestion] = {}
     for name in names:
-        place = _where(name, vessel)
-        other = [one for one in drafted if _place(one.name) == OPPOSITE.get(place, "none")]
+        place = _side_or_place(name, vessel)
+        other = [one for one in drafted if _place_in_name(one.name) == OPPOSITE.get(place, "none")]
         if other:
             state.ask((signal_of(name),), f"is {name} as {other[0].source!r}? The log has no column of that side")
             found[name] = other[0]
     return found
 
 
-def _in_order(state: State, names: Sequence[str], columns: Sequence[Suggestion]) -> dict[str, Suggestion]:
+def _match_in_order(state: State, names: Sequence[str], columns: Sequence[Suggestion]) -> dict[str, Suggestion]:
     """One column for each command where there are as many; one column for all of them; else the first ones."""
     if not names or not columns:
         return {}
@@ -150,10 +150,12 @@ def _in_order(state: State, names: Sequence[str], columns: Sequence[Suggestion])
         state.find("several columns for one command", sources, 0.6, sentence)
         return {names[0]: columns[0]}
     by_number = _with_numbers(names, columns)
-    return by_number or _asked(state, names, columns, "Their names do not say which is which")
+    return by_number or _ask_about_commands(state, names, columns, "Their names do not say which is which")
 
 
-def _asked(state: State, names: Sequence[str], columns: Sequence[Suggestion], why: str) -> dict[str, Suggestion]:
+def _ask_about_commands(
+    state: State, names: Sequence[str], columns: Sequence[Suggestion], why: str
+) -> dict[str, Suggestion]:
     """Commands with columns one by one, as a guess, and the question whether it is so."""
     pairs = {
         name: replace(one, confidence=min(one.confidence, GUESSED)) for name, one in zip(names, columns, strict=False)
@@ -165,8 +167,8 @@ def _asked(state: State, names: Sequence[str], columns: Sequence[Suggestion], wh
 
 def _with_numbers(names: Sequence[str], columns: Sequence[Suggestion]) -> dict[str, Suggestion]:
     """Commands whose components have numbers with the columns of the same numbers; none where one lacks it."""
-    by_number = {numbered(one.source) or 1: one for one in reversed(columns)}
-    numbers = {name: numbered(name.partition(".")[0]) or 1 for name in names}
+    by_number = {number_in_name(one.source) or 1: one for one in reversed(columns)}
+    numbers = {name: number_in_name(name.partition(".")[0]) or 1 for name in names}
     told = len(set(numbers.values())) == len(names) and len(by_number) == len(columns)
     return (
         {name: by_number[n] for name, n in numbers.items()} if told and set(numbers.values()) <= set(by_number) else {}
@@ -180,14 +182,19 @@ def _by_number(
 
     IEC 61162-1 gives odd numbers to starboard, even ones to port.
     """
-    sides = [_where(name, vessel) for name in names]
+    sides = [_side_or_place(name, vessel) for name in names]
     if _with_numbers(names, columns) or not {"port", "starboard"} <= set(sides):
-        return _in_order(state, names, columns)
+        return _match_in_order(state, names, columns)
     across = sorted(
-        names, key=lambda name: -_y(name, vessel) if _y(name, vessel) else -1.0 * (_place(name) == "starboard")
+        names,
+        key=lambda name: (
+            -_lateral_position(name, vessel)
+            if _lateral_position(name, vessel)
+            else -1.0 * (_place_in_name(name) == "starboard")
+        ),
     )
-    ordered = sorted(columns, key=lambda one: numbered(one.source) or 1)
-    return _asked(state, across, ordered, "Numbers are taken from starboard to port")
+    ordered = sorted(columns, key=lambda one: number_in_name(one.source) or 1)
+    return _ask_about_commands(state, across, ordered, "Numbers are taken from starboard to port")
 
 
 def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Suggestion:
@@ -212,13 +219,13 @@ def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Sugg
 def _take_tunnels(state: State, names: Sequence[str]) -> None:
     """Suggest a column without a unit whose name says a tunnel thruster, in the unit of the other shafts."""
     for name in names:
-        place = _place(name)
-        if any(is_command(one.name) and _place(one.name) == place for one in state.suggestions):
+        place = _place_in_name(name)
+        if any(is_command(one.name) and _place_in_name(one.name) == place for one in state.suggestions):
             continue
         likely = [
             column
             for column in state.free()
-            if {"thruster", place} <= set(parts_of(column)) and unit_of_another(column, "n") is None
+            if {"thruster", place} <= set(name_parts(column)) and unit_of_another(column, "n") is None
         ]
         units = [one.unit for one in state.suggestions if is_command(one.name) and is_shaft(one.name)]
         if likely and units:
@@ -227,46 +234,46 @@ def _take_tunnels(state: State, names: Sequence[str]) -> None:
             state.suggest(name, likely[0], units[0], GUESSED, f"by its name; in {units[0]} as the other shafts")
 
 
-def _missing(state: State, name: str, idle: set[str], vessel: Vessel) -> Iterator[Suggestion]:
+def _missing_command(state: State, name: str, idle: set[str], vessel: Vessel) -> Iterator[Suggestion]:
     """Yield a column of zeros for a command that does not drive the vessel; ask for any other."""
     if name in idle and is_shaft(name) and state.suggestions:
         why = f"no column of the log is {name}: taken as stopped"
         state.find("command not logged", (), GUESSED, why)
-        yield Suggestion(name, state.suggestions[0].source, _shown(name), GUESSED, why, {"factor": 0.0})
+        yield Suggestion(name, state.suggestions[0].source, _quoted_command(name), GUESSED, why, {"factor": 0.0})
         return
     state.ask((signal_of(name),), f"which column is {name}? {vessel.name} needs it")
 
 
-def _renamed(one: Suggestion, components: dict[str, str]) -> Suggestion:
+def _rename_output(one: Suggestion, components: dict[str, str]) -> Suggestion:
     """An output of a component that has another name in the vessel."""
     component, dot, signal = one.name.partition(".")
     return replace(one, name=f"{components[component]}.{signal}") if dot and component in components else one
 
 
-def _place(name: str) -> str:
+def _place_in_name(name: str) -> str:
     """Side or end in the name of a command; empty where there is none."""
     component = name.partition(".")[0]
-    place = next((one for one in PLACES if component.lower() in words_of_side(one)), None) or side_of(component)
+    place = next((one for one in PLACES if component.lower() in words_of_side(one)), None) or side_in_name(component)
     return place if place in PLACES else ""
 
 
-def _y(name: str, vessel: Vessel) -> float:
+def _lateral_position(name: str, vessel: Vessel) -> float:
     """Distance [m] of the component of a command to starboard of the centre line, 0 where the document has none."""
     return vessel.parameters.get(f"thruster.{name.partition('.')[0]}.y", 0.0)
 
 
-def _where(name: str, vessel: Vessel) -> str:
+def _side_or_place(name: str, vessel: Vessel) -> str:
     """Side or end that the name of a command says, else the side on which the vessel has it; empty where neither."""
-    return _place(name) or _side(name, vessel)
+    return _place_in_name(name) or _side_of_component(name, vessel)
 
 
-def _side(name: str, vessel: Vessel) -> str:
+def _side_of_component(name: str, vessel: Vessel) -> str:
     """Side on which the vessel has the component of a command; empty on the centre line."""
-    y = _y(name, vessel)
+    y = _lateral_position(name, vessel)
     return "port" if y < 0 else "starboard" if y > 0 else ""
 
 
-def _shown(name: str) -> str:
+def _quoted_command(name: str) -> str:
     row = signal_row(name)
     assert row is not None
     return row.read_in

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Array
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.defects import when
+from shipid.logs.guess.defects import clock_text
 from shipid.logs.guess.evidence import Complex
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of
@@ -31,7 +31,7 @@ APART = 0.2  # of the logarithm of that ratio: how far revolutions over a metre 
 
 
 @dataclass(frozen=True)
-class Part:
+class ScalePart:
     """Windows from `first` until before `end`, and how many times the scale is there what it is elsewhere."""
 
     first: int
@@ -52,13 +52,15 @@ def ask_for_changes(state: State) -> None:
     pairs += [(("r",), "change of the heading", state.psi, state.columns[name]) for name in rates]
     for about, what, whole, rate in pairs:
         named = [sources[name] for name in about if name in sources] or rates
-        part = other_part(state.chosen.change(whole), state.chosen.change(evidence.integral(state.t, rate)))
+        part = other_part(state.chosen.change(whole), state.chosen.change(evidence.integrate_rate(state.t, rate)))
         if part is not None:
             middle = np.append((state.chosen.first + state.chosen.last) // 2, len(state.t))
             first, end = int(middle[part.first]) if part.first else 0, int(middle[part.end])
             columns = " and ".join(map(repr, named))
             how = f"the {what} is {part.ratio:.3g} times as much, beside its integral, as elsewhere"
-            _ask(state, about, f"has {columns} another unit or sign {_from_to(state, first, end)}? There {how}")
+            _ask_about_change(
+                state, about, f"has {columns} another unit or sign {_from_to(state, first, end)}? There {how}"
+            )
     for one in state.suggestions:
         if is_command(one.name) and is_steering(signal_of(one.name)):
             _ask_for_angle(state, one.name, one.source)
@@ -66,7 +68,7 @@ def ask_for_changes(state: State) -> None:
             _ask_for_shaft(state, one.name, one.source)
 
 
-def other_part(seen: Complex, ran: Complex) -> Part | None:
+def other_part(seen: Complex, ran: Complex) -> ScalePart | None:
     """Return the part of the windows in which seen = scale * ran has another scale than elsewhere; None if none has."""
     if len(seen) < 40:
         return None
@@ -89,23 +91,23 @@ def other_part(seen: Complex, ran: Complex) -> Part | None:
     ratio = float(inside[first, end] / outside[first, end]) if outside[first, end] else 0.0
     if not NOTHING < abs(ratio) < 1 / NOTHING or 1 / ALIKE < ratio < ALIKE:
         return None
-    return Part(int(nodes[first]), int(nodes[end]), ratio)
+    return ScalePart(int(nodes[first]), int(nodes[end]), ratio)
 
 
 def _ask_for_angle(state: State, name: str, source: str) -> None:
     """Ask where an angle turns the ship to the other side, or many times as fast, from some row on."""
     r = state.r if state.r is not None else np.gradient(np.asarray(state.psi), state.t)
-    rows, design, change = evidence.answer(state.t, r, state.columns[source], state.part)
+    rows, design, change = evidence.yaw_regression(state.t, r, state.columns[source], state.part)
     seen = state.chosen
     speed = np.abs(seen.change(np.asarray(state.position))) / (state.t[seen.last] - state.t[seen.first])
     makes_way = np.interp(rows, seen.first, speed) > MAKES_WAY * np.percentile(speed, 90)  # else thrust turns her
     rows, design, change = rows[makes_way], design[makes_way], change[makes_way]
-    whole = evidence.solved(design, change)[2]
+    whole = evidence.solve_least_squares(design, change)[2]
     least, start, ratio = MOST_LEFT * whole, 0, 1.0
     for row in np.unique(np.linspace(0, len(rows), SPLITS + 2).astype(int))[1:-1]:
         before = np.where(np.arange(len(rows)) < row, design[:, 0], 0.0)
         apart = np.column_stack([before, design[:, 0] - before, design[:, 1:]])
-        found, errors, left = evidence.solved(apart, change)
+        found, errors, left = evidence.solve_least_squares(apart, change)
         if left >= least or not np.all(np.abs(found[:2]) > CLEAR * errors[:2]):
             continue
         if not 1 / TIMES < found[1] / found[0] < TIMES:  # else the speed is another one
@@ -114,7 +116,7 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
         return
     how = "to the other side" if ratio < 0 else f"{ratio:.2g} times as fast"
     words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
-    _ask(state, (name,), f"{words} There its numbers turn the ship {how}")
+    _ask_about_change(state, (name,), f"{words} There its numbers turn the ship {how}")
 
 
 def _ask_for_shaft(state: State, name: str, source: str) -> None:
@@ -124,14 +126,14 @@ def _ask_for_shaft(state: State, name: str, source: str) -> None:
     """
     size = np.abs(state.columns[source])
     way = np.abs(state.chosen.change(np.asarray(state.position)))
-    turns = np.abs(state.chosen.change(evidence.integral(state.t, state.columns[source])))
+    turns = np.abs(state.chosen.change(evidence.integrate_rate(state.t, state.columns[source])))
     driven = np.flatnonzero((way > UNDER_WAY * np.median(way)) & (turns > 0.0))
     if len(driven) < SPLITS:
         return
     first, a_metre = state.chosen.first[driven], np.log(turns[driven] / way[driven])
     broken = np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))
     least, start, more = APART, 0, 0.0
-    for row in _steps(size, broken):
+    for row in _unit_change_rows(size, broken):
         before = first < row
         if not LEAST < np.mean(before) < 1 - LEAST:
             continue
@@ -147,10 +149,12 @@ def _ask_for_shaft(state: State, name: str, source: str) -> None:
             least, start, more = left, row, float(np.exp(change))
     if start:
         words = f"has {source!r} another unit or sign {_from_to(state, start, len(state.t))}?"
-        _ask(state, (name,), f"{words} There its numbers are {more:.2g} times as many for the same way of the ship")
+        _ask_about_change(
+            state, (name,), f"{words} There its numbers are {more:.2g} times as many for the same way of the ship"
+        )
 
 
-def _steps(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _unit_change_rows(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return rows (K,) whose numbers may be the first of another unit.
 
     The largest steps from row to row, `SPLITS` at most, and as many rows behind a pause of the clock.
@@ -166,13 +170,13 @@ def _from_to(state: State, first: int, end: int) -> str:
     """Words for the rows from `first` until before `end`."""
     if state.joined:
         return "in a part of the files"
-    begins, ends = (when(state, float(state.t[row])) for row in (first, min(end, len(state.t) - 1)))
+    begins, ends = (clock_text(state, float(state.t[row])) for row in (first, min(end, len(state.t) - 1)))
     if end >= len(state.t):
         return f"from {begins} on"
     return f"until {ends}" if first == 0 else f"from {begins} to {ends}"
 
 
-def _ask(state: State, about: tuple[str, ...], words: str) -> None:
+def _ask_about_change(state: State, about: tuple[str, ...], words: str) -> None:
     remedy = "Write the log in one unit, or cut it there, import the parts and join them (shipid data join)"
     state.changed |= {*about}
     state.ask(about, f"{words}. {remedy}")

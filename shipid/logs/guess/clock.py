@@ -24,23 +24,23 @@ from shipid.logs.dates import (
     NEXT_DAY,
     TIME_OF_DAY,
     ZONE_REMEDY,
-    date_of,
+    date_formats,
     date_texts,
-    dated,
-    days_by,
     days_with_marks,
+    format_date,
+    format_moment,
     hour_twice,
     in_one_number,
-    moment_of,
+    join_date_and_time,
     other_zone,
-    rolled_over,
-    seconds,
+    parse_dates,
+    parse_dates_as,
+    rollover_words,
     time_texts,
-    ways_of,
 )
-from shipid.logs.guess.words import NO_VALUE, is_run, parts_of, units_in
-from shipid.logs.instants import even_clock, repeated_rows, rounding_of
-from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, names_of, since_midnight, to_si
+from shipid.logs.guess.words import NO_VALUE, is_run, name_parts, units_in_name
+from shipid.logs.instants import clock_rounding, even_clock, rows_repeated
+from shipid.logs.mapping import AGAIN, EPOCHS, clock_seconds, since_midnight, source_columns, to_si
 from shipid.logs.workbook import NOT_CALCULATED
 
 Rows = NDArray[np.bool_]
@@ -105,7 +105,7 @@ def are_whole(values: Array, most: float) -> bool:
     return bool(len(known) and np.all(known % 1 == 0.0) and np.all(np.abs(known) <= most))
 
 
-def _fields(columns: dict[str, Array]) -> dict[str, str]:
+def _date_fields(columns: dict[str, Array]) -> dict[str, str]:
     """Field of a date or time -> column of whole numbers that is called so: year, month, day, hour, minute, second."""
     found: dict[str, str] = {}
     names, order = [*columns], [one for one in FIELDS if one != "day of the year"]
@@ -117,7 +117,7 @@ def _fields(columns: dict[str, Array]) -> dict[str, str]:
         if all(are_whole(part, limits[one][2]) and np.min(part) >= limits[one][1] for part, one in inside):
             return six
     for name, values in columns.items():
-        word = (parts_of(name) or ("",))[-1]
+        word = (name_parts(name) or ("",))[-1]
         called = [one for one, (words, _, _) in FIELDS.items() if word in words.split() and one not in found]
         one = "minute" if "minute" in called and "hour" in found else next(iter(called), "")
         if one and one in ("minute", "second") and "hour" not in found:
@@ -128,7 +128,7 @@ def _fields(columns: dict[str, Array]) -> dict[str, str]:
     return found
 
 
-def _day_in(fields: dict[str, str]) -> list[str]:
+def _day_columns(fields: dict[str, str]) -> list[str]:
     """Columns of year, month and day, or of year and day of the year; none where one is not there."""
     ways = (("year", "month", "day"), ("year", "day of the year"))
     return next(([fields[one] for one in way] for way in ways if {*way} <= fields.keys()), [])
@@ -138,33 +138,33 @@ def _in_columns(
     table: pd.DataFrame, columns: dict[str, Array], dates: str | None
 ) -> tuple[dict[str, Any], Array] | None:
     """Return the clock of a log with hour, minute and second in columns; `dates` is a column of dates."""
-    fields = _fields(columns)
-    times, days = [fields[one] for one in ("hour", "minute", "second") if one in fields], _day_in(fields)
+    fields = _date_fields(columns)
+    times, days = [fields[one] for one in ("hour", "minute", "second") if one in fields], _day_columns(fields)
     if not {"hour", "minute"} <= fields.keys():
         return None
     texts = time_texts([columns[name] for name in times])
     day: str | list[str] | None = dates or days or None
     if day is not None:
         written = column_called(table, day) if isinstance(day, str) else date_texts([columns[name] for name in day])
-        texts = dated(written, texts)
-    since = seconds(texts)
+        texts = join_date_and_time(written, texts)
+    since = parse_dates(texts)
     if not np.isfinite(since).all():
         return None
     keys = {"from": times, "unit": "date"} | ({"date": day} if day is not None else {})
     if np.all(np.diff(since) > 0):
         return keys, since
-    rate = _rate(since)
+    rate = _even_rate(since)
     return None if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
-def restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
+def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
     """Return the column that says the run with the number of runs, and the clock, where it begins again with each.
 
     The clock goes on from run to run then, after a time of `LONG` rows.
     """
     for name in filter(is_clock, columns):
         steps = np.diff(columns[name])
-        if not np.isfinite(columns[name]).all() or not np.any(steps < 0) or _again(columns[name]):
+        if not np.isfinite(columns[name]).all() or not np.any(steps < 0) or _wrapping_clock_unit(columns[name]):
             continue
         for run in (str(run) for run in table.columns if str(run) and is_run(str(run))):
             texts = column_called(table, run).astype(str).str.strip().to_numpy(dtype=object)
@@ -177,37 +177,37 @@ def restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, 
 
 def clock_once(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array, Rows]:
     """Return the clock, its times, and which rows it takes: all but a few that repeat the row before."""
-    again = repeated_rows(table)
+    again = rows_repeated(table)
     if 0 < again.sum() <= REPEATED * len(table):
         kept = {name: values[~again] for name, values in columns.items()}
-        clock, t = _clock(table.loc[~again].reset_index(drop=True), kept, file)
+        clock, t = _choose_clock(table.loc[~again].reset_index(drop=True), kept, file)
         return {**clock, "repeated": "drop"}, t, ~again
     try:
-        return *_clock(table, columns, file), np.ones(len(table), dtype=bool)
+        return *_choose_clock(table, columns, file), np.ones(len(table), dtype=bool)
     except DataError:
-        once = _once(table, columns)
+        once = _unrepeated_rows(table, columns)
         if once is None:
             raise
         kept = {name: values[once] for name, values in columns.items()}
-        clock, t = _clock(table.loc[once].reset_index(drop=True), kept, file)
+        clock, t = _choose_clock(table.loc[once].reset_index(drop=True), kept, file)
         if "every" in clock:  # a rounded clock has rows of one time that are not repeated
             raise
         return {**clock, "repeated": "drop"}, t, once
 
 
-def _once(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
+def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
     """Return the rows that do not say the time of the row before once more; None where no clock has a few of these."""
     for name in map(str, table.columns):
         if not is_clock(name):
             continue
-        times = columns[name] if name in columns else seconds(column_called(table, name))
+        times = columns[name] if name in columns else parse_dates(column_called(table, name))
         steps = np.diff(times, prepend=-np.inf)
         if np.isfinite(times).all() and np.all(steps >= 0) and 0 < np.sum(steps == 0) <= REPEATED * len(table):
             return np.asarray(steps > 0)
     return None
 
 
-def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
+def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
     """Return the clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
     finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
     rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
@@ -220,18 +220,18 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         whole = len(of_day) and of_day.all()
         if whole and (with_date := _with_date(table, columns, name)):
             return with_date
-        since = seconds(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
+        since = parse_dates(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         times[name] = since
         if not np.isfinite(since).all():
             called += [name] if is_clock(name) else []
             continue
         if np.all(np.diff(since) > 0):
             return {"from": name, "unit": "date"}, since
-        rate = _rate(since)
+        rate = _even_rate(since)
         if rate is not None:
             return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
         called.append(name)
-    in_columns = _in_columns(table, columns, _dates(table, columns))
+    in_columns = _in_columns(table, columns, _date_column(table, columns))
     if in_columns is not None:
         return in_columns
     if not any(name in called for name in rising):  # another column that happens to rise is no clock then
@@ -240,15 +240,15 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
                 twice = hour_twice(since)
                 if twice is not None:
                     raise DataError(twice[1], file=file, path=f"row {twice[0] + 1}")
-                raise DataError(f"no column can be the clock: {name!r} {_fault(since)}", file=file)
-        dates = _dates(table, columns)
+                raise DataError(f"no column can be the clock: {name!r} {_clock_fault(since)}", file=file)
+        dates = _date_column(table, columns)
         called = [name for name in called if name != dates] or called  # that repeat: the times beside them are at fault
         for name in called if dates is not None else ():
             if name in texts:
-                fault = _unread(table, name, times[name]) or _fault(times[name])
+                fault = _unreadable_time(table, name, times[name]) or _clock_fault(times[name])
                 raise DataError(f"no column can be the clock: {name!r} {fault}", file=file)
     faulty = [name for name in called if name not in rising and _nearly_rises({**times, **columns}[name])]
-    others = [] if faulty else [name for name in rising if not _counts(columns[name])]  # a total rises, too
+    others = [] if faulty else [name for name in rising if not _is_row_counter(columns[name])]  # a total rises, too
     candidates = [name for name in rising if name in called] or others
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
@@ -258,7 +258,7 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
         if within_day and (with_date := _with_date(table, columns, name)):
             return with_date
         rises = bool(np.all(np.diff(t) > 0))  # after midnight, too
-        rate = _rate(t) if not rises or _is_coarse(t) else None
+        rate = _even_rate(t) if not rises or _is_coarse(t) else None
         if rate is not None:
             return {"from": name, "unit": unit, "every": rate[0]}, rate[1]
         if rises:
@@ -270,16 +270,16 @@ def _clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[
     first = {**times, **columns}.get(called[0], np.empty(0)) if called else np.empty(0)
     if called and called[0] in finite:
         first = clock_seconds(first, _unit_of_clock(called[0], first))
-    counted = _counter(finite[called[0]]) if called and called[0] in finite else ""
+    counted = _counter_rollover(finite[called[0]]) if called and called[0] in finite else ""
     fault = "none rises from row to row"
     if called:
-        fault = f"{called[0]!r} {counted or _unread(table, called[0], first) or _fault(first)}"
+        fault = f"{called[0]!r} {counted or _unreadable_time(table, called[0], first) or _clock_fault(first)}"
     if called and called[0] in finite and _is_years(called[0], finite[called[0]]):
         fault = f"{called[0]!r} {OF_YEARS.format(finite[called[0]][0])}"
     raise DataError(f"no column can be the clock: {fault}", file=file)
 
 
-def zone_in(head: str, table: pd.DataFrame, clock: dict[str, Any]) -> Iterator[str]:
+def zone_questions(head: str, table: pd.DataFrame, clock: dict[str, Any]) -> Iterator[str]:
     """Yield a question where dates without a zone are read as UTC, and the head of a log or its clock says another."""
     if clock["unit"] != "date" or not isinstance(clock["from"], str):
         return
@@ -291,34 +291,34 @@ def zone_in(head: str, table: pd.DataFrame, clock: dict[str, Any]) -> Iterator[s
 def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[str]:
     """Yield questions on dates and times of day at t (N,) [s] that may mean another moment."""
     if clock["unit"] == "excel" and DATES["mjd"][0] < t[0] / DAY + EPOCHS["excel"]:
-        excel, other = (date_of(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
+        excel, other = (format_date(t[0] + days * DAY)[:10] for days in (0.0, EPOCHS["excel"] - EPOCHS["mjd"]))
         yield f"{clock['from']!r} is read as a day of Excel, {excel}: or is it a modified Julian date (mjd), {other}?"
     yield from _other_begin(clock, float(t[0]))
     if clock["unit"] not in ("date", "hhmmss") or {type(clock["from"]), type(clock.get("date", ""))} != {str}:
         return
     texts = column_called(table, clock["from"])
-    texts = dated(column_called(table, clock["date"]), texts) if "date" in clock else texts
+    texts = join_date_and_time(column_called(table, clock["date"]), texts) if "date" in clock else texts
     if pd.api.types.is_string_dtype(texts.dtype):
         texts = texts.astype(str).str.strip()
-        ways = ways_of(texts)
-        spans = {way: days_by(texts, way) for way in ways}
+        ways = date_formats(texts)
+        spans = {way: parse_dates_as(texts, way) for way in ways}
         least = min((since[-1] - since[0] for since in spans.values()), default=0.0)
         alike = [s for s in spans.values() if np.all(np.diff(s) >= 0) and s[-1] - s[0] == least]  # false where NaN
-        firsts = sorted({date_of(since[0])[:10] for since in alike} - {date_of(t[0])[:10]})
+        firsts = sorted({format_date(since[0])[:10] for since in alike} - {format_date(t[0])[:10]})
         if firsts and len(alike) > 1:
             others = " or ".join(firsts)
-            yield f"{texts.iloc[0]!r} is read as {date_of(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
+            yield f"{texts.iloc[0]!r} is read as {format_date(t[0])[:10]}: or is it {others}? Then write 2024-05-14"
     steps = np.diff(t)
     usual = float(np.median(steps))
     of_day = t % DAY
     late = np.flatnonzero((steps >= HALF_DAY) & (steps <= HALF_DAY + NEXT_DAY))
     if len(late) and t[-1] - t[0] < 3 * DAY and of_day.min() >= HOUR and of_day.max() < HOUR + HALF_DAY:
-        before, after = (date_of(of_day[late[0] + k])[11:] for k in (0, 1))
+        before, after = (format_date(of_day[late[0] + k])[11:] for k in (0, 1))
         words = f"after {before} comes {after}, read as 12 hours later: has the clock twelve hours without AM and PM?"
         yield f"{words} Then write 24 hours"
     for row in np.flatnonzero((steps >= HOUR) & (steps <= HOUR + 3 * usual)):
         if -t[row] % HOUR <= t[row + 1] - t[row] - HOUR:  # from one full hour to the next
-            before, after = date_of(t[row])[11:], date_of(t[row + 1])[11:]
+            before, after = format_date(t[row])[11:], format_date(t[row + 1])[11:]
             words = f"after {before} comes {after}: is it local time as daylight saving begins, and no pause?"
             yield f"{words} Then write UTC, or in every row the zone that holds there"
             return
@@ -333,15 +333,15 @@ def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
     now = datetime.now(UTC).timestamp()
     if clock["unit"] not in ("s", "ms", "us", "ns") or not FIRST_DATED_TIME < first < LAST_DATE:
         return
-    begins = f"{clock['from']!r} is read as seconds since 1970, {date_of(first)}: or does it count from"
+    begins = f"{clock['from']!r} is read as seconds since 1970, {format_date(first)}: or does it count from"
     of_gps, of_1904 = first + GPS - (LEAPS if first + GPS > LEAP else 0), first - OF_1904
-    parts = {*parts_of(clock["from"])}
+    parts = {*name_parts(clock["from"])}
     of_late = of_gps > LEAP and not parts & OF_1970
     if (OF_GPS & parts or of_late) and of_gps < now:
         ahead = f", less {LEAPS} s by which GPS is ahead" if of_gps > LEAP else ""
-        yield f"{begins} 6 January 1980, as GPS does? Then add {GPS} s{ahead}: {date_of(of_gps)} UTC"
+        yield f"{begins} 6 January 1980, as GPS does? Then add {GPS} s{ahead}: {format_date(of_gps)} UTC"
     elif first > now and of_1904 > FIRST_DATED_TIME:
-        yield f"{begins} 1904, as LabVIEW does? Then take {OF_1904} s off: {date_of(of_1904)}"
+        yield f"{begins} 1904, as LabVIEW does? Then take {OF_1904} s off: {format_date(of_1904)}"
 
 
 def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
@@ -349,11 +349,11 @@ def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str
 
     So it is where each channel has a time beside it, or where a second log is beside the first.
     """
-    of_rows = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}
+    of_rows = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
     for name in map(str, table.columns):
         if name in of_rows or not is_clock(name):
             continue
-        other = columns[name] if name in columns else seconds(column_called(table, name))
+        other = columns[name] if name in columns else parse_dates(column_called(table, name))
         known = np.isfinite(other)
         values, times = other[known], t[known]
         if len(values) < FEWEST_TIMES or not np.all(np.diff(values) > 0):
@@ -370,7 +370,7 @@ def column_called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
     return table.iloc[:, list(map(str, table.columns)).index(name)]
 
 
-def _dates(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
+def _date_column(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
     """Return the first column that holds a date in every row, without a time; one of numbers is called a clock."""
     for name in sorted(filter(None, map(str, table.columns)), key=lambda name: name in columns):
         if name in columns and not (is_clock(name) and len(np.unique(columns[name])) <= max(1, len(table) // ROWS)):
@@ -384,23 +384,23 @@ def _dates(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
 
 def _with_date(table: pd.DataFrame, columns: dict[str, Array], name: str) -> tuple[dict[str, Any], Array] | None:
     """Return the clock of a column of times of day beside dates; None where there are none, or it does not rise."""
-    day = _dates(table, columns) or _day_in(_fields(columns))
+    day = _date_column(table, columns) or _day_columns(_date_fields(columns))
     if not day:
         return None
     of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
-    t = seconds(dated(of_date, column_called(table, name)))
+    t = parse_dates(join_date_and_time(of_date, column_called(table, name)))
     keys = {"from": name, "unit": "date", "date": day}
     if not np.isfinite(t).all():
         return None
     if np.all(np.diff(t) > 0):
         return keys, t
-    rate = _rate(t)
+    rate = _even_rate(t)
     return None if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
 def is_clock(name: str) -> bool:
     """Whether a column has the name of a clock."""
-    parts = set(parts_of(name)) | {plain(name)}
+    parts = set(name_parts(name)) | {name_without_unit(name)}
     return bool(parts & CLOCK_WORDS) and not parts & NO_CLOCK_WORDS
 
 
@@ -413,7 +413,7 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tuple[str, Array]:
     """Return the unit of a clock of numbers, and its times [s]."""
     if in_one_number(values):
-        return "date", seconds(column_called(table, name))
+        return "date", parse_dates(column_called(table, name))
     if values.min() > 1e9 and _is_time_of_day(values % 1e6):
         message = f"{name!r} is a date and a time of day in one number, {values[0]:.15g}: write 2024-05-14 08:00:00"
         raise DataError(f"no column can be the clock: {message}", file=file)
@@ -431,23 +431,23 @@ def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tu
 def _is_years(name: str, values: Array) -> bool:
     """Whether a clock is in years with decimals: its name says so, or it says no unit and a minute is no step of it."""
     inside = YEARS[0] < values[0] < YEARS[1] and np.ptp(values) < 1.0 and np.any(values % 1)
-    said = {*FIELDS["year"][0].split(), "years"} & {*parts_of(name)}
-    return bool(inside and (said or (not units_in(name) and float(np.median(np.diff(values))) < SHORT_YEAR)))
+    said = {*FIELDS["year"][0].split(), "years"} & {*name_parts(name)}
+    return bool(inside and (said or (not units_in_name(name) and float(np.median(np.diff(values))) < SHORT_YEAR)))
 
 
 def _unit_of_clock(name: str, values: Array) -> str:
     """Return the unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
-    again = _again(values)
+    again = _wrapping_clock_unit(values)
     if again is not None and not _is_time_of_day(values):
         return again
-    inside = [text.strip().lower().replace("µ", "u").replace("μ", "u") for text in units_in(name)]
-    parts = parts_of(name)
+    inside = [text.strip().lower().replace("µ", "u").replace("μ", "u") for text in units_in_name(name)]
+    parts = name_parts(name)
     last = [] if "of" in parts else parts[-1:]  # seconds of the day
     written, ends = (next((one for one in WRITTEN if {*WRITTEN[one].split()} & {*said}), "") for said in (inside, last))
     steps = np.diff(values)
     rising = steps[steps > 0]  # a rounded clock often stands
     short = len(rising) > 0 and float(np.median(rising)) < SHORT_DAY
-    dates = next((unit for unit in _calendars(parts) if DATES[unit][0] < values[0] < DATES[unit][1]), "")
+    dates = next((unit for unit in _calendar_units(parts) if DATES[unit][0] < values[0] < DATES[unit][1]), "")
     if dates and (written == "d" if written else short and ends in ("", "d")):
         return dates
     if written or ends not in ("", "s"):
@@ -465,13 +465,13 @@ def _unit_of_clock(name: str, values: Array) -> str:
     return "s"
 
 
-def _calendars(parts: tuple[str, ...]) -> list[str]:
+def _calendar_units(parts: tuple[str, ...]) -> list[str]:
     """Units of clocks in days that count from a date, first the one that a name with these parts says."""
     said = "mjd" if {"mjd", "modified"} & {*parts} else ""
     return sorted(EPOCHS, key=lambda unit: unit != said)
 
 
-def _again(values: Array) -> str | None:
+def _wrapping_clock_unit(values: Array) -> str | None:
     """Return the unit of a clock that begins again after a day or a week; None where none does.
 
     A row may be missing there, so that a clock goes back by a little less than that, but not by an hour.
@@ -508,22 +508,22 @@ def _is_coarse(t: Array) -> bool:
     return len(np.unique(np.round(steps / usual, 6))) <= max(4, len(steps) // 50)
 
 
-def _rate(t: Array) -> tuple[float, Array] | None:
+def _even_rate(t: Array) -> tuple[float, Array] | None:
     """Return the step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
     if len(t) < 20 or np.any(np.diff(t) < 0) or len(np.unique(t)) < 10:
         return None
     _values, first = np.unique(t, return_index=True)
     early = float(np.median(np.diff(t[: max(3, int(first[min(len(first) - 1, 40)]))])))
-    rounding = rounding_of(t)
+    rounding = clock_rounding(t)
     steps = np.diff(t)
     going = steps <= PAUSE * max(float(np.median(steps)), float(np.median(rounding)))  # on, without a pause
     mean = float(steps[going].mean())
     slack = float(rounding[-1]) * (1 + np.sum(~going)) / going.sum()
     stretches = [  # whatever rows were lost, most short stretches are whole
-        _roundest(float(np.median(t[far:] - t[:-far])) / far, float(rounding[-1]) / far)
+        _roundest_number(float(np.median(t[far:] - t[:-far])) / far, float(rounding[-1]) / far)
         for far in (min(len(t) - 1, most) for most in (200, 60))
     ]
-    for step in (_roundest(mean, slack), *stretches, early, mean):
+    for step in (_roundest_number(mean, slack), *stretches, early, mean):
         if not step > 0:
             continue
         even, _ = even_clock(t, step)
@@ -536,7 +536,7 @@ def _rate(t: Array) -> tuple[float, Array] | None:
     return None
 
 
-def _roundest(value: float, slack: float) -> float:
+def _roundest_number(value: float, slack: float) -> float:
     """Return the number with the fewest digits within `slack` of a value, or one over such a number."""
     for digits in range(1, 7):
         near = float(f"{value:.{digits}g}")
@@ -548,12 +548,12 @@ def _roundest(value: float, slack: float) -> float:
     return value
 
 
-def _counts(values: Array) -> bool:
+def _is_row_counter(values: Array) -> bool:
     """Whether a column only counts rows."""
     return bool(np.all(np.diff(values) == 1.0) and values[0] in (0.0, 1.0))
 
 
-def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
+def _unreadable_time(table: pd.DataFrame, name: str, values: Array) -> str:
     """Say which text in a clock is no time, or that there is none; empty where all are."""
     wrong = ~np.isfinite(values)
     if not wrong.any():
@@ -576,7 +576,7 @@ def _unread(table: pd.DataFrame, name: str, values: Array) -> str:
         return f"{begin}, without the hour, as Excel shows times: show them as hh:mm:ss.000, and export again"
     if wrong.all():
         return f"{begin}, no number, date or time of day that can be read: write dates as 2024-05-14 08:00:00"
-    if np.isfinite(seconds(pd.Series([text]))[0]) and not np.isfinite(pd.to_numeric(text, errors="coerce")):
+    if np.isfinite(parse_dates(pd.Series([text]))[0]) and not np.isfinite(pd.to_numeric(text, errors="coerce")):
         return f"{begin}, and other rows are written otherwise: write all in one way, with a zone in each or in none"
     what = "a leap second" if re.search(r":60(\D|$)", text) else "a comment" if text[:1] in "#%/;" else "no time"
     lines = "the line" if wrong.sum() == 1 else f"the {wrong.sum()} such lines"
@@ -589,7 +589,7 @@ def _nearly_rises(values: Array) -> bool:
     return bool(len(steps) > FEWEST * len(values) and np.mean(steps > 0) > NEARLY)
 
 
-def _counter(values: Array) -> str:
+def _counter_rollover(values: Array) -> str:
     """Say where a counter of a few bits (N,) is full and begins again; empty where it is none."""
     steps = np.diff(values)
     back = np.flatnonzero(steps < 0)
@@ -601,19 +601,19 @@ def _counter(values: Array) -> str:
     return ""
 
 
-def _fault(values: Array) -> str:
+def _clock_fault(values: Array) -> str:
     if not np.isfinite(values).any():
         return "holds no numbers and no dates"
     if not np.isfinite(values).all():
         return f"has no value in row {int(np.argmax(~np.isfinite(values))) + 1}"
     row = int(np.argmax(np.diff(values) < 0)) + 1
     if values[row] < values[row - 1]:  # rows of one time alone may be a rounded clock
-        before, after = moment_of(values[row - 1]), moment_of(values[row])
-        back = f"goes back from {before} to {after}{rolled_over(values[row] - values[row - 1])} in row {row + 1}"
+        before, after = format_moment(values[row - 1]), format_moment(values[row])
+        back = f"goes back from {before} to {after}{rollover_words(values[row] - values[row - 1])} in row {row + 1}"
         return f"{back}: sort the log, or split it there, and join the parts"
     return f"repeats in row {int(np.argmax(np.diff(values) == 0)) + 2}"
 
 
-def plain(name: str) -> str:
+def name_without_unit(name: str) -> str:
     """Return a name in lower case without its unit in brackets."""
     return re.sub(r"[\[(].*", "", name).strip().lower().replace(" ", "_").replace("-", "_")

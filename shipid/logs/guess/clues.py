@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
-from shipid.logs.amounts import UNIT_WORDS, is_known, north_of, without_prefix
-from shipid.logs.guess.evidence import Complex, Windows, effect
+from shipid.logs.amounts import UNIT_WORDS, is_known, north_reference, without_prefix
+from shipid.logs.guess.evidence import Complex, RowWindows, order_effect
 from shipid.logs.guess.words import (
-    fits,
     how_much_says,
     is_note,
     is_order,
     may_be_measured,
-    parts_of,
+    meaning_scores,
+    name_parts,
     shaft_unit,
-    side_of,
-    units_in,
+    side_in_name,
+    units_in_name,
 )
 from shipid.logs.mapping import UNITS
 from shipid.logs.repairs import INPUTS
@@ -58,7 +58,7 @@ class Suggestion:
 
 
 @dataclass(frozen=True)
-class Finding:
+class Clue:
     """A defect of the log, or a sign or unit that is easily mistaken.
 
     kind : a few words, the same for all findings of this kind. columns : columns of the log that have it.
@@ -99,8 +99,8 @@ def unknown_unit(name: str) -> str:
 
     A single letter is the name of a channel, but for volts, and a known or a longer word is a note.
     """
-    for text in map(str.strip, units_in(name)):
-        known = is_known(without_prefix(text)[0]) or north_of(text) or is_note(text)
+    for text in map(str.strip, units_in_name(name)):
+        known = is_known(without_prefix(text)[0]) or north_reference(text) or is_note(text)
         short = len(text) <= LONGEST_UNIT and (text == "V" or len(re.findall(r"[^\W\d_]", text)) > 1)
         if not known and (short or re.search(r"\w[/^]\w", text)):
             return text
@@ -108,7 +108,7 @@ def unknown_unit(name: str) -> str:
 
 
 def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
-    inside = units_in(name)
+    inside = units_in_name(name)
     bare = re.sub(r"[\[(].*", "", name).strip()
     parts = [part for part in re.split(r"[_ ]|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", bare) if part]
     alone = len(parts) < 2 and si != "rev/s"
@@ -133,11 +133,11 @@ def unit_of_another(name: str, meaning: str) -> str | None:
     Only what is set off as a unit counts: in brackets, after a slash or a comma, or a unit of a shaft at the end. An
     angle that steers may be in per cent of its largest one.
     """
-    si = si_of(meaning)
+    si = si_unit(meaning)
     if si not in UNITS or unit_in_name(name, si) is not None:
         return None
     last = re.split(r"[_ ]", name.strip())[-1]
-    said = units_in(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or shaft_unit(name) else [])
+    said = units_in_name(name) or ([last] if last in ("kN", "kNm", "Nm", "kW") or shaft_unit(name) else [])
     for word in said:
         text = word.strip().lower()
         if meaning in SIGNALS and is_steering(meaning) and re.fullmatch(UNIT_WORDS["%"], text):
@@ -153,14 +153,14 @@ def unit_of_another(name: str, meaning: str) -> str | None:
 
 def names_another(name: str, meaning: str) -> bool:
     """Whether a word of a name, not a mere letter, says a quantity of another unit: a roll is no yaw rate."""
-    scores = fits(name)
+    scores = meaning_scores(name)
     best = max(scores, key=lambda one: scores[one], default=meaning)
-    word = max((len(part) for part in parts_of(name)), default=0) > 2
+    word = max((len(part) for part in name_parts(name)), default=0) > 2
     clear = scores.get(best, 0.0) >= 0.9 and scores.get(meaning, 0.0) < STRONG
-    return (word and clear and si_of(best) != si_of(meaning)) or unit_of_another(name, meaning) is not None
+    return (word and clear and si_unit(best) != si_unit(meaning)) or unit_of_another(name, meaning) is not None
 
 
-def si_of(meaning: str) -> str:
+def si_unit(meaning: str) -> str:
     """Return the SI unit of a meaning; empty for a quantity of no use."""
     if meaning in SIGNALS:
         return SIGNALS[meaning].unit
@@ -195,7 +195,7 @@ class State:
     t: Array
     clock_unit: str
     columns: dict[str, Array]
-    chosen: Windows
+    chosen: RowWindows
     joined: bool = False
     spikes: dict[str, tuple[NDArray[np.intp], float]] = field(default_factory=dict)
     scaled: dict[str, tuple[float, str]] = field(default_factory=dict)
@@ -206,7 +206,7 @@ class State:
     other: dict[str, str] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
     suggestions: list[Suggestion] = field(default_factory=list)
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[Clue] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)
     commands: tuple[str, ...] = ()
     turning: dict[str, float] = field(default_factory=dict)
@@ -220,7 +220,7 @@ class State:
 
     def effect(self, r: Array, order: Array) -> float:
         """Return the t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
-        return effect(self.t, r, order, self.part)
+        return order_effect(self.t, r, order, self.part)
 
     @property
     def part(self) -> float:
@@ -244,12 +244,12 @@ class State:
 
     def side_of(self, name: str) -> str | None:
         """Return the side or place in the name of a column; L and R are sides where the log has both."""
-        parts = parts_of(name)
+        parts = name_parts(name)
         for letter, other, side in (("l", "r", "port"), ("r", "l", "starboard")):
             twin = tuple(other if part == letter else part for part in parts)
-            if letter in parts and any(parts_of(column) == twin for column in self.columns):
+            if letter in parts and any(name_parts(column) == twin for column in self.columns):
                 return side
-        return side_of(name)
+        return side_in_name(name)
 
     def free(self) -> list[str]:
         """Return the columns that have no meaning yet."""
@@ -264,11 +264,13 @@ class State:
         return self._fitting(meaning, list(self.columns))
 
     def _fitting(self, meaning: str, names: list[str]) -> list[str]:
-        scores = {name: fits(name).get(meaning, 0.0) for name in names}
+        scores = {name: meaning_scores(name).get(meaning, 0.0) for name in names}
         scores = {name: 0.0 if score and unit_of_another(name, meaning) else score for name, score in scores.items()}
-        chosen = [name for name in names if scores[name] > 0 and scores[name] >= max(fits(name).values()) - NEARLY]
+        chosen = [
+            name for name in names if scores[name] > 0 and scores[name] >= max(meaning_scores(name).values()) - NEARLY
+        ]
         if not chosen and meaning in OF_POSE:
-            return [name for name in names if fits(may_be_measured(name)).get(meaning, 0.0) > STRONG]
+            return [name for name in names if meaning_scores(may_be_measured(name)).get(meaning, 0.0) > STRONG]
         return sorted(chosen, key=lambda name: -scores[name])
 
     def eligible(self, *meanings: str) -> list[str]:
@@ -278,13 +280,13 @@ class State:
         """
         free = [name for name in self.free() if np.ptp(self.columns[name]) > 0 and not is_order(name)]
         if not meanings:
-            return [name for name in free if fits(name).get("", 0.0) < STRONG]
+            return [name for name in free if meaning_scores(name).get("", 0.0) < STRONG]
         return [name for name in free if _may_be(self._united(name, meanings), meanings)]
 
     @staticmethod
     def _united(name: str, meanings: tuple[str, ...]) -> dict[str, float]:
         """How well a name fits each meaning; as a quantity of no use where its unit fits none of those asked."""
-        return {"": 1.0} if all(unit_of_another(name, meaning) for meaning in meanings) else fits(name)
+        return {"": 1.0} if all(unit_of_another(name, meaning) for meaning in meanings) else meaning_scores(name)
 
     @property
     def numbered(self) -> bool:
@@ -329,4 +331,4 @@ class State:
         repair: dict[str, Any] | None = None,
     ) -> None:
         """Add a finding."""
-        self.findings.append(Finding(kind, columns, round(confidence, 2), sentence, repair))
+        self.findings.append(Clue(kind, columns, round(confidence, 2), sentence, repair))

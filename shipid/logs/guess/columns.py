@@ -19,7 +19,7 @@ from shipid.logs.guess import evidence
 from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.changes import ask_for_changes
 from shipid.logs.guess.clock import is_clock
-from shipid.logs.guess.clues import Finding, Question, State, Suggestion
+from shipid.logs.guess.clues import Clue, Question, State, Suggestion
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from shipid.logs.guess.defects import (
     defects_of_motion,
@@ -35,9 +35,9 @@ from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.scales import take_scales
 from shipid.logs.guess.sniff import Sniffed
-from shipid.logs.guess.sources import Source, read_source
+from shipid.logs.guess.sources import GuessFiles, read_source
 from shipid.logs.guess.stuck import find_stuck
-from shipid.logs.guess.unused import reasons
+from shipid.logs.guess.unused import unused_reasons
 from shipid.logs.guess.wind import choose_wind
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import rows_of_role
@@ -57,9 +57,9 @@ class Guess:
     unused : column without a meaning -> why.
     """
 
-    source: Source
+    source: GuessFiles
     columns: tuple[Suggestion, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[Clue, ...]
     questions: tuple[Question, ...]
     unused: Mapping[str, str]
 
@@ -106,10 +106,10 @@ def guess(
         check_choice("frame", frame, get_args(Frame), DataError)
     source = read_source(as_path("path", path, DataError), names)
     sniffed = source.sniffed
-    columns = evidence.filled(sniffed.t, sniffed.columns.items())
+    columns = evidence.fill_columns(sniffed.t, sniffed.columns.items())
     spiky = take_spikes(sniffed.t, columns)
     joined = len(source.files) > 1 or bool(sniffed.runs)
-    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.windows(sniffed.t), joined, spiky)
+    state = State(sniffed.t, sniffed.clock["unit"], columns, evidence.row_windows(sniffed.t), joined, spiky)
     state.sides, state.words, state.other = sniffed.sides, sniffed.words, sniffed.other
     state.units |= {name: "quaternion" for name, parts in sniffed.in_parts.items() if len(parts) == 4}
     state.commands = () if vessel is None else vessel_dynamics(vessel).commands
@@ -118,7 +118,7 @@ def guess(
     )
     state.taken.update(numbering)
     if source.parts:
-        _runs(state, source)
+        _report_run_parts(state, source)
     take_scales(state)
     take_lost_fixes(state)
     take_zeros(state)
@@ -148,7 +148,7 @@ def guess(
     suggest_outputs(state, outputs)
     if vessel is not None:
         name_commands(state, vessel)
-    _others(state)
+    _choose_other_columns(state)
     choose_wind(state)
     defects_of_rows(state, sniffed)
     find_stuck(state)
@@ -156,7 +156,7 @@ def guess(
     defects_of_spikes(state)
     ask_for_changes(state)
     defects_of_motion(state)
-    left = reasons(state, numbering)
+    left = unused_reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
 
 
@@ -166,7 +166,7 @@ def _ask_for_clock(state: State, name: str) -> None:
         state.ask(("clock",), f"no column is called a clock: {name!r} rises from row to row. Is it the time?")
 
 
-def _runs(state: State, source: Source) -> None:
+def _report_run_parts(state: State, source: GuessFiles) -> None:
     """Report how files of several runs are parted."""
     column, pause = source.parts.get("from"), source.parts.get("pause")
     said = [f"column {column!r} says them"] if column else []
@@ -176,7 +176,7 @@ def _runs(state: State, source: Source) -> None:
     state.find("several runs in a file", (column,) if column else (), 0.9, sentence)
 
 
-def _others(state: State) -> None:
+def _choose_other_columns(state: State) -> None:
     """Choose roll, pitch and other environment columns by their names alone."""
     further = [name for name, row in rows_of_role("environment").items() if row.names and name not in ("V_w", "beta_w")]
     for meaning in ("phi", "theta", *further):
@@ -185,10 +185,10 @@ def _others(state: State) -> None:
             unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
             state.ask_for_unit(meaning, name, unit)
             state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
-    _ask_if_exchanged(state)
+    _ask_roll_and_pitch(state)
 
 
-def _ask_if_exchanged(state: State) -> None:
+def _ask_roll_and_pitch(state: State) -> None:
     """Ask where the pitch follows the turning to both sides, as a ship heels, and the roll does not."""
     source = {one.name: one.source for one in state.suggestions if one.name in ("phi", "theta")}
     if len(source) < 2 or state.psi is None:
@@ -199,7 +199,7 @@ def _ask_if_exchanged(state: State) -> None:
         return
     follows = {}
     for meaning, name in source.items():
-        held = state.chosen.change(evidence.integral(state.t, state.columns[name])).real
+        held = state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])).real
         size = float(np.std(held) * np.std(turning))
         follows[meaning] = abs(float(np.mean((held - held.mean()) * (turning - turning.mean())))) / max(size, 1e-12)
     if follows["theta"] > HEELS > LEVEL > follows["phi"]:

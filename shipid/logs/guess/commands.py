@@ -12,8 +12,16 @@ from shipid.data.dataset import Array
 from shipid.logs.frames import begins_again
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import SEEN, State, unit_in_name
-from shipid.logs.guess.twins import choose_twins, twins
-from shipid.logs.guess.words import fits, is_electrical, is_engine, is_order, numbered, parts_of, units_in
+from shipid.logs.guess.twins import choose_twins, twin_columns
+from shipid.logs.guess.words import (
+    is_electrical,
+    is_engine,
+    is_order,
+    meaning_scores,
+    name_parts,
+    number_in_name,
+    units_in_name,
+)
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, rows_of_role, signal_of
 
@@ -45,25 +53,25 @@ def choose_commands(state: State) -> None:
     """Choose angles that steer, then shafts and pitches; without any, throttles of two sides."""
     r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
     used: dict[str, int] = {}
-    azimuth = _steering(state, r, used)
-    _thrust(state, azimuth, used)
+    azimuth = _choose_steering(state, r, used)
+    _choose_thrust(state, azimuth, used)
     if not any(is_command(one.name) and is_shaft(one.name) for one in state.suggestions):
         choose_twins(state, r)
 
 
-def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
+def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
-    angles = _named(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
-    turned = {name for name, signal in angles if _centred(state, name, signal)}
+    angles = _columns_named_for(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
+    turned = {name for name, signal in angles if _centre_angle(state, name, signal)}
     power = {name: 0.0 if r is None else state.effect(r, state.columns[name]) for name in state.eligible()}
     by_name = bool(angles)
     if not angles and r is not None:
         # an order is held at its largest value; a response such as roll is not
-        screws = _screws(state)
+        screws = _screw_columns(state)
         strength = {
-            name: power[name] * _held(state.columns[name])
+            name: power[name] * _repeated_share(state.columns[name])
             for name in power
-            if _small(state.columns[name]) and name not in screws
+            if _is_small_angle(state.columns[name]) and name not in screws
         }
         likely = max(strength, key=lambda name: abs(strength[name]), default="")
         angles = [(likely, "delta")] if likely and abs(strength[likely]) > SEEN else []
@@ -77,7 +85,7 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
         confidence = 0.5 if by_name else 0.4
         if by_name and abs(effect) <= SEEN and r is not None:
             span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
-            followed = evidence.follows(state.t, r, state.columns[name], span)
+            followed = evidence.order_correlation(state.t, r, state.columns[name], span)
             if abs(followed) > FOLLOWED:
                 effect = float(1.01 * SEEN * np.sign(followed))
             else:
@@ -111,7 +119,9 @@ def _steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
         component = side or SIGNALS[signal].component
         if signal == "delta" and side:
             component = f"{side}_rudder"
-        state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+        state.suggest(
+            _command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra
+        )
     _ask_if_opposite(state)
     return azimuth
 
@@ -133,7 +143,7 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
     unit : a guess. Returned is what its name says of that, in words; empty where it says nothing.
     """
     top = float(np.abs(state.columns[name]).max())
-    said = {text.strip().lower() for text in units_in(name)} | {*parts_of(name)[-1:], *re.findall("[%‰]", name)}
+    said = {text.strip().lower() for text in units_in_name(name)} | {*name_parts(name)[-1:], *re.findall("[%‰]", name)}
     for words, full in SHARES.items():
         if said & set(words):
             remedy = f"Write factor = (deg at {full:g}) / {full:g}"
@@ -177,12 +187,12 @@ def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
     state.ask(("alpha",), f"{words} Then write {half}; here 0 is a thrust ahead")
 
 
-def _screws(state: State) -> set[str]:
+def _screw_columns(state: State) -> set[str]:
     """Columns that are no rudder: their names say a screw, or the two sides do not move together as twin rudders do."""
     columns = state.columns
     apart = {
         name
-        for pair in twins(state)
+        for pair in twin_columns(state)
         if np.ptp(columns[pair[0]] - columns[pair[1]]) > TOGETHER * max(np.ptp(columns[name]) for name in pair)
         for name in pair
     }
@@ -191,7 +201,7 @@ def _screws(state: State) -> set[str]:
     }
 
 
-def _centred(state: State, name: str, signal: str) -> bool:
+def _centre_angle(state: State, name: str, signal: str) -> bool:
     """Put an angle that jumps at a whole turn within half a turn of zero; return whether it does."""
     values = state.columns[name]
     size = to_si(likely_unit(state, name, signal), f"x.{signal}")
@@ -203,7 +213,7 @@ def _centred(state: State, name: str, signal: str) -> bool:
     return True
 
 
-def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
+def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]]:
     """Return the columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
     orders: dict[str, tuple[float, str]] = {}
     for signal in signals:
@@ -211,8 +221,10 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
         for name in said:
             orders[name] = (1.0, signal)
         for name in state.called(signal):
-            score = fits(name)[signal]
-            others = max((value for meaning, value in fits(name).items() if meaning not in signals), default=0.0)
+            score = meaning_scores(name)[signal]
+            others = max(
+                (value for meaning, value in meaning_scores(name).items() if meaning not in signals), default=0.0
+            )
             if (
                 not state.command_of(name)
                 and score >= others
@@ -224,7 +236,7 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
     sides = {name: state.side_of(name) for name in orders}
     still = {name: not np.ptp(state.columns[name]) for name in orders}  # a feedback that is not connected comes last
     for name in sorted(orders, key=lambda one: (still[one], is_order(one), -orders[one][0])):
-        side, number = sides[name], numbered(name)
+        side, number = sides[name], number_in_name(name)
         both = f"{side} {number}" if side and number and state.commands else side or number
         groups.setdefault((state.command_of(name) or both, orders[name][1]), []).append(name)
     chosen = []
@@ -243,18 +255,18 @@ def _named(state: State, signals: list[str]) -> list[tuple[str, str]]:
     return sorted(chosen, key=lambda entry: order.index(entry[0]))
 
 
-def _small(values: Array) -> bool:
+def _is_small_angle(values: Array) -> bool:
     return bool(0 < np.abs(values).max() < 95 and np.ptp(values) > 0)
 
 
-def _held(values: Array) -> float:
+def _repeated_share(values: Array) -> float:
     """Return the share of rows that repeat the value before (to 1/100 of the range), floored: orders are held."""
     return 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values)))
 
 
-def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
+def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
     for signal in (signal for signal in rows_of_role("command") if not is_steering(signal)):
-        for name, _ in sorted(_named(state, [signal]), key=lambda one: state.side_of(one[0]) in TUNNELS):
+        for name, _ in sorted(_columns_named_for(state, [signal]), key=lambda one: state.side_of(one[0]) in TUNNELS):
             usual = SIGNALS[signal].component
             fallback = AZIMUTH if azimuth and usual == SCREW else usual
             component = state.side_of(name) or fallback
@@ -270,7 +282,9 @@ def _thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
                 confidence = 0.3 if not written and state.ask_for_unit(signal, name, unit) else confidence
                 why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-            state.suggest(_command(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra)
+            state.suggest(
+                _command_of_column(state, name, f"{component}.{signal}", used), name, unit, confidence, why, **extra
+            )
 
 
 def _runs_astern(state: State, name: str) -> bool:
@@ -385,19 +399,19 @@ def likely_unit(state: State, name: str, signal: str) -> str:
     return row.read_in if large or (row.shaft and re.search(row.read_in, name.lower())) else row.unit
 
 
-def _command(state: State, column: str, usual: str, used: dict[str, int]) -> str:
+def _command_of_column(state: State, column: str, usual: str, used: dict[str, int]) -> str:
     """Return the command that a column orders: that of the vessel which its name says, else the usual one."""
     said = state.command_of(column)
     if said:
         return said
     for one in filter(None, map(state.command_of, state.columns)):
         used.setdefault(one, 1)
-    return unique(usual, used)
+    return unique_name(usual, used)
 
 
-def unique(name: str, used: dict[str, int]) -> str:
+def unique_name(name: str, used: dict[str, int]) -> str:
     """Return the name of a column, with a number after its component where it is used already."""
     used[name] = used.get(name, 0) + 1
     component, _, signal = name.partition(".")
     new = name if used[name] == 1 else f"{component}_{used[name]}.{signal}"
-    return unique(name, used) if new != name and new in used else new
+    return unique_name(name, used) if new != name and new in used else new

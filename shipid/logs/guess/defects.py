@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from shipid.data.checks import Delay, measure_delay
 from shipid.data.dataset import FIRST_DATED_TIME, Array
-from shipid.logs.dates import LAST_DATE, date_of, rolled_over
+from shipid.logs.dates import LAST_DATE, format_date, rollover_words
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
@@ -57,7 +57,7 @@ def _held_positions(state: State) -> None:
     steps, moves = (np.stack([np.diff(state.columns[name]) != 0 for name in names]) for names in (places, others))
     if np.mean(steps.all(axis=0)) < TOGETHER * np.mean(steps.any(axis=0)):
         return  # rounded: each repeats for itself
-    edges = evidence.spans_of(np.all(~steps, axis=0))
+    edges = evidence.row_spans(np.all(~steps, axis=0))
     lengths = edges[:, 1] - edges[:, 0]  # rows that repeat the one before
     moved = np.append(0, np.cumsum(moves.any(axis=0)))
     lengths = lengths[moved[edges[:, 1]] > moved[edges[:, 0]]]
@@ -82,7 +82,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
             state.find(
                 "frozen rows", tuple(moving), 0.9, f"{100 * same.mean():.2g} % of the rows repeat the row before"
             )
-        share = float(np.median([evidence.between_rows(state.columns[name]) for name in moving]))
+        share = float(np.median([evidence.interpolated_share(state.columns[name]) for name in moving]))
         if share > 0.2:
             sentence = (
                 f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
@@ -94,7 +94,7 @@ def defects_of_rows(state: State, sniffed: Sniffed) -> None:
         if is_shaft(column.name):
             top = float(np.mean(values == values.max()))
             ordered = len(np.unique(values)) <= ORDERED
-            if 0.05 < top < 0.9 and evidence.visits(values) >= VISITS and not ordered:
+            if 0.05 < top < 0.9 and evidence.maximum_visits(values) >= VISITS and not ordered:
                 rows = f"{100 * top:.0f} % of the rows of {column.source!r}"
                 sentence = f"{rows} have exactly the largest value, {values.max():g}"
                 state.find("clipped", (column.source,), 0.7, sentence)
@@ -129,7 +129,7 @@ def _piles_up(values: Array, limit: float) -> bool:
         return False
     at = near == 0
     beside = np.mean((near > 0) & (near <= levels[BESIDE]))
-    return bool(PILE < at.mean() < 0.9 and at.mean() > ABOVE * beside and evidence.visits(-near) >= RETURNS)
+    return bool(PILE < at.mean() < 0.9 and at.mean() > ABOVE * beside and evidence.maximum_visits(-near) >= RETURNS)
 
 
 def defects_of_motion(state: State) -> None:
@@ -138,7 +138,7 @@ def defects_of_motion(state: State) -> None:
         return
     course = _ask_if_course(state)
     if state.r is not None:
-        delay = None if course else _delay(state, state.psi, evidence.integral(state.t, state.r))
+        delay = None if course else _signal_delay(state, state.psi, evidence.integrate_rate(state.t, state.r))
         if delay is not None:
             _find_late(state, "heading", "yaw rate", delay)
             # or the tests below would report the same delay again
@@ -147,14 +147,14 @@ def defects_of_motion(state: State) -> None:
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
         _factor_of_rate(state)
     if state.position is not None and state.velocity is None:
-        _jumps(state, _own_path(state), spikes=False)
-        _heading_offset(state)
+        _report_position_jumps(state, _own_path(state), spikes=False)
+        _report_heading_offset(state)
     if state.velocity is None or state.position is None or state.body is None:
         return
     _ask_for_set_clock(state)
-    path = evidence.integral(state.t, state.velocity)
-    _jumps(state, _arm_or_delay(state, path))
-    _heading_offset(state)
+    path = evidence.integrate_rate(state.t, state.velocity)
+    _report_position_jumps(state, _arm_or_delay(state, path))
+    _report_heading_offset(state)
 
 
 def _ask_if_course(state: State) -> bool:
@@ -192,14 +192,14 @@ def _same_as(state: State, heading: str) -> tuple[str, float] | None:
             continue
         turn = to_si(units.get(name) or unit_in_name(name, "rad") or units[heading], "psi")
         apart = np.abs(np.angle(np.exp(1j * (state.psi[rows] - turn * state.columns[name][rows]))))
-        rounded = max(_quantum(state.columns[name]) * turn, _quantum(state.columns[heading]) * turn)
+        rounded = max(_value_step(state.columns[name]) * turn, _value_step(state.columns[heading]) * turn)
         share = float(np.mean(apart <= 0.51 * min(rounded, ROUND) + EQUAL))
         if share >= IDENTICAL:
             return name, share
     return None
 
 
-def _quantum(values: Array) -> float:
+def _value_step(values: Array) -> float:
     """The least step between two values of a column."""
     steps = np.diff(np.unique(values))
     return float(steps.min()) if len(steps) else 0.0
@@ -214,21 +214,21 @@ def _turns_with_track(state: State) -> bool:
     if state.r is None or state.position is None or state.psi is None:
         return False
     change = state.chosen.change
-    ran, rate = change(evidence.integral(state.t, state.r)).real, change(state.r).real
+    ran, rate = change(evidence.integrate_rate(state.t, state.r)).real, change(state.r).real
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    mean = change(evidence.integral(state.t, np.exp(1j * state.psi))) / span
+    mean = change(evidence.integrate_rate(state.t, np.exp(1j * state.psi))) / span
     track = change(state.position) / span
     speed = np.abs(track)
     moving = (speed > 0.3 * np.percentile(speed, 90)) & (np.abs(mean) > 0)
     if moving.sum() < SEVERAL:
         return False
     drift = np.angle(track * np.conj(mean))
-    lead = _slope(change(state.psi).real[moving] - ran[moving], rate[moving])
-    beside = _slope(drift[moving], ran[moving] / span[moving])
+    lead = _slope_with_error(change(state.psi).real[moving] - ran[moving], rate[moving])
+    beside = _slope_with_error(drift[moving], ran[moving] / span[moving])
     return -lead[0] > max(DELAYED, SURE * lead[1]) and abs(beside[0]) + 2 * beside[1] < WITH_TRACK * -lead[0]
 
 
-def _slope(values: Array, by: Array) -> tuple[float, float]:
+def _slope_with_error(values: Array, by: Array) -> tuple[float, float]:
     """Slope of values (N,) over others, and its standard error: the scatter between ten parts of the log."""
     parts = np.array_split(np.arange(len(by)), 10)
 
@@ -246,9 +246,9 @@ def _factor_of_rate(state: State) -> None:
     assert state.psi is not None
     assert state.r is not None
     source = next(one.source for one in state.suggestions if one.name == "r")
-    seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integral(state.t, state.r))
-    keep = evidence.robust(seen, ran)
-    fit = evidence.fit(seen[keep], ran[keep])
+    seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integrate_rate(state.t, state.r))
+    keep = evidence.windows_without_outliers(seen, ran)
+    fit = evidence.fit_scale(seen[keep], ran[keep])
     off = abs(fit.scale - 1.0)
     clipped = any(one.kind == "clipped" and source in one.columns for one in state.findings)
     if clipped or fit.left > RATE_LEFT or not off > max(OFF_RATE, 5 * fit.error):
@@ -280,8 +280,8 @@ def _ask_for_set_clock(state: State) -> None:
     speed = np.minimum(fast[:-1], fast[1:])
     near = float(np.percentile(way[steps < evidence.GAP * usual], 99))
     for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
-        times = " comes ".join(when(state, float(state.t[row + one])) for one in (0, 1))
-        times += rolled_over(steps[row])
+        times = " comes ".join(clock_text(state, float(state.t[row + one])) for one in (0, 1))
+        times += rollover_words(steps[row])
         words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
         state.ask(("clock", "t"), f"{words}Then split the log there")
 
@@ -301,11 +301,11 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
     assert state.psi is not None
     seen = state.chosen.change(state.position)
     ran = state.chosen.change(path)
-    keep = evidence.robust(seen, ran)
+    keep = evidence.windows_without_outliers(seen, ran)
     turned = state.chosen.change(np.asarray(np.exp(1j * state.psi)))
-    scale = evidence.fit(seen[keep], ran[keep]).scale
-    off, error, by_arm = evidence.arm(seen[keep], scale * ran[keep], turned[keep])
-    delay = _delay(state, state.position, path)
+    scale = evidence.fit_scale(seen[keep], ran[keep]).scale
+    off, error, by_arm = evidence.lever_arm(seen[keep], scale * ran[keep], turned[keep])
+    delay = _signal_delay(state, state.position, path)
     if delay is not None and delay.explained > by_arm:
         _find_late(state, "position", "velocity", delay)
         instants = state.t - delay.seconds
@@ -322,9 +322,9 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
         repair = {"kind": "lever_arm", "x": round(off.real, 2), "y": round(off.imag, 2), "moves": "position"}
         state.find("lever arm", (), float(np.clip(abs(off) / (10 * error), 0.5, 0.95)), sentence, repair)
         return np.asarray(path + off * np.exp(1j * state.psi))
-    if not state.changed & {"u", "speed"} and float(np.sqrt(evidence.fit(seen[keep], ran[keep]).left)) > JITTER:
+    if not state.changed & {"u", "speed"} and float(np.sqrt(evidence.fit_scale(seen[keep], ran[keep]).left)) > JITTER:
         far = float(np.sqrt(np.mean(np.abs(seen[keep] - scale * ran[keep]) ** 2)))
-        current, share = _stream(seen[keep], ran[keep])
+        current, share = _steady_current(seen[keep], ran[keep])
         if share > STREAM:
             towards = np.degrees(np.angle(current)) % 360.0
             flow = f"a current of {abs(current):.2g} m/s towards {towards:.0f} deg ({100 * share:.0f} % of the misfit)"
@@ -338,14 +338,14 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
     return path
 
 
-def _stream(seen: Complex, ran: Complex) -> tuple[complex, float]:
+def _steady_current(seen: Complex, ran: Complex) -> tuple[complex, float]:
     """The steady current [m/s], north + i east, that velocities lack, and its share of the misfit.
 
     seen, ran : changes (W,) [m] of position and of integrated velocities over each window. Velocities lack it whole, or
     a speed along the course over ground lacks what of it is along the course.
     """
     course = ran / np.maximum(np.abs(ran), 1e-9)
-    before = float(np.sum(np.abs(seen - evidence.fit(seen, ran).scale * ran) ** 2))
+    before = float(np.sum(np.abs(seen - evidence.fit_scale(seen, ran).scale * ran) ** 2))
     best = 0j, 0.0
     for along in (np.ones_like(ran), 1j * np.ones_like(ran)), (course.real * course, course.imag * course):
         columns = np.stack([ran, *(evidence.WINDOW * one for one in along)], axis=1)
@@ -357,7 +357,7 @@ def _stream(seen: Complex, ran: Complex) -> tuple[complex, float]:
     return best
 
 
-def _delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | None:
+def _signal_delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | None:
     """Delay of a signal (N,) behind the integral of its rate; None where none is sure."""
     holes = np.flatnonzero(np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))) + 1
     parts = [np.split(values, holes) for values in (state.t, np.asarray(seen, dtype=complex), integrated)]
@@ -372,14 +372,14 @@ def _find_late(state: State, what: str, against: str, delay: Delay) -> None:
     state.find(f"late {late}", (late,), float(np.clip(delay.explained, 0.2, 0.95)), sentence, repair)
 
 
-def _jumps(state: State, path: Complex, spikes: bool = True) -> None:
+def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> None:
     """Report where positions leave a path (N,) [m]; of velocities also where they come back: `spikes`."""
     assert state.position is not None
     unit = to_si(state.clock_unit, "t")
     lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
     places = [
         place
-        for place in evidence.jumps(state.t, state.position, path)
+        for place in evidence.position_jumps(state.t, state.position, path)
         if not any(unit * start <= place[1] and place[0] <= unit * end for start, end in lost)
     ]
     stay = [place for place in places if place[2] > 5.0]
@@ -390,21 +390,23 @@ def _jumps(state: State, path: Complex, spikes: bool = True) -> None:
         sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
         state.find("position jumps", (), 0.9, sentence)
     elif stay:
-        words = ", ".join(f"{when(state, start)} to {when(state, end)} ({far:.0f} m)" for start, end, far in stay[:6])
+        words = ", ".join(
+            f"{clock_text(state, start)} to {clock_text(state, end)} ({far:.0f} m)" for start, end, far in stay[:6]
+        )
         repair = {"kind": "break", "intervals": [[start / unit, end / unit] for start, end, _ in stay]}
         state.find("position jumps", (), 0.9, f"the position jumps and does not come back: {words}", repair)
     if back and not any(one.kind == "position spikes" for one in state.findings):  # one repair mends them all
-        words = ", ".join(when(state, (start + end) / 2) for start, end, _ in back[:6])
+        words = ", ".join(clock_text(state, (start + end) / 2) for start, end, _ in back[:6])
         words = f"at {len(back)} place{'s' * (len(back) > 1)} of the files" if state.joined else f"near {words}"
         state.find("position spikes", (), 0.8, f"the position leaves and comes back {words}", OF_POSITIONS)
 
 
-def when(state: State, t: float) -> str:
+def clock_text(state: State, t: float) -> str:
     """A time [s] as the clock of the log has it: a date, or a number."""
-    return date_of(t) if FIRST_DATED_TIME < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
+    return format_date(t) if FIRST_DATED_TIME < t < LAST_DATE else f"t = {t / to_si(state.clock_unit, 't'):.10g}"
 
 
-def _heading_offset(state: State) -> None:
+def _report_heading_offset(state: State) -> None:
     """Report a heading offset: by all courses, beside a steady current, or by the straightest runs."""
     assert state.psi is not None
     angle, error, current = _off_on_all_courses(state)
@@ -415,7 +417,7 @@ def _heading_offset(state: State) -> None:
         return
     else:
         r = state.r if state.r is not None else np.gradient(state.psi, state.t)
-        rows = evidence.straight(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
+        rows = evidence.straight_rows(r, state.t) & (np.abs(state.body) > 0.3 * np.percentile(np.abs(state.body), 90))
         if rows.mean() < 0.02:
             return
         # median of arg(u + i v), where a ship has no drift angle
@@ -438,12 +440,12 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
     assert state.psi is not None
     assert state.position is not None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    psi = state.chosen.change(evidence.integral(state.t, state.psi)).real / span
+    psi = state.chosen.change(evidence.integrate_rate(state.t, state.psi)).real / span
     north = np.exp(-1j * psi)
     if state.body is None:
         ran = state.chosen.change(state.position) / span * north
     else:
-        ran = state.chosen.change(evidence.integral(state.t, state.body)) / span
+        ran = state.chosen.change(evidence.integrate_rate(state.t, state.body)) / span
     ran = -ran if state.astern else ran
     columns = (ran.real, state.chosen.change(state.psi).real / span, north.imag, north.real)
     design = np.stack(columns, axis=1)
@@ -462,12 +464,12 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
     return off, error, complex(found[2], found[3]) * np.cos(off) * np.exp(1j * off)
 
 
-def _times(state: State, rows: NDArray[np.intp]) -> str:
+def _row_times(state: State, rows: NDArray[np.intp]) -> str:
     """Where some rows are, in words: the first times, or how many in the files."""
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
     if state.joined:
         return f"in {count} of the files"
-    words = ", ".join(when(state, float(state.t[row])) for row in rows[:FEW])
+    words = ", ".join(clock_text(state, float(state.t[row])) for row in rows[:FEW])
     return f"near {words}" if len(rows) <= FEW else f"in {count}, the first near {words}"
 
 
@@ -483,11 +485,11 @@ def take_lost_fixes(state: State) -> None:
         for name, hit in lost.items():
             if hit.any():
                 fills = " or ".join(f"{value:g}" for value in np.unique(state.columns[name][hit]))
-                said.append((name, fills, _times(state, evidence.spans_of(hit)[:, 0])))
+                said.append((name, fills, _row_times(state, evidence.row_spans(hit)[:, 0])))
                 state.columns[name] = np.interp(state.t, state.t[~hit], state.columns[name][~hit])
         step, unit = float(np.median(np.diff(state.t))), to_si(state.clock_unit, "t")
         t = np.concatenate([[state.t[0] - step], state.t, [state.t[-1] + step]])
-        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in evidence.spans_of(rows)]
+        breaks = [[t[first] / unit, t[end + 1] / unit] for first, end in evidence.row_spans(rows)]
         if len(said) > 1 and said[0][1:] == said[1][1:]:
             words = f"{north!r} and {east!r} are {said[0][1]} {said[0][2]}"
         else:
@@ -511,7 +513,7 @@ def lost_fixes(values: Array) -> NDArray[np.bool_]:
             continue
         steps = np.abs(np.diff(values[~hit]))
         least = max(NO_PLACE, FAR_STEPS * float(np.percentile(steps, 99))) if len(steps) else NO_PLACE
-        for first, end in evidence.spans_of(hit):
+        for first, end in evidence.row_spans(hit):
             about = [values[row] - value for row in (first - 1, end) if 0 <= row < len(values)]
             lost[first:end] |= min(map(abs, about)) > least and (about[0] > 0) == (about[-1] > 0)
     return lost
@@ -532,7 +534,7 @@ def take_zeros(state: State) -> None:
         turn = 360.0 if np.ptp(values) > 7.0 else 2 * np.pi
         size = np.abs(values if name in speeds else (values + turn / 2) % turn - turn / 2)
         least = HALF * float(np.percentile(size[known], 75)) if name in speeds else turn / AWAY
-        edges = evidence.spans_of(~known)
+        edges = evidence.row_spans(~known)
         inside = [(a, b) for a, b in edges if a > 0 and b < len(t) and t[b] - t[a - 1] < (b - a + 2) * step]
         inside = [(a, b) for a, b in inside if min(size[a - 1], size[b]) > least]
         if not inside:
@@ -548,7 +550,7 @@ def take_zeros(state: State) -> None:
             state.spikes[name] = np.union1d(rows, before), min(smallest, least)
             continue
         starts = np.array([a for a, _ in inside], dtype=np.intp)
-        sentence = f"{name!r} is 0 {_times(state, starts)} between values far from it: it was written for no value"
+        sentence = f"{name!r} is 0 {_row_times(state, starts)} between values far from it: it was written for no value"
         if state.joined:
             state.ask(("u", "v", "psi", "speed", "course"), f"{sentence}. Leave these cells empty, and draft again")
         breaks = [[t[a - 1] / unit, t[b] / unit] for a, b in inside]
@@ -559,7 +561,7 @@ def take_spikes(t: Array, columns: dict[str, Array]) -> dict[str, tuple[NDArray[
     """Interpolate spikes of columns (N,) in place; column -> their rows, and the least of their sizes."""
     found: dict[str, tuple[NDArray[np.intp], float]] = {}
     for name, values in columns.items():
-        wild = evidence.spikes(values)
+        wild = evidence.spike_rows(values)
         if wild.any():
             healed = np.interp(t, t[~wild], values[~wild])
             found[name] = np.flatnonzero(wild), float(np.abs(values - healed)[wild].min())
@@ -573,14 +575,14 @@ def defects_of_spikes(state: State) -> None:
     places = [one for one in state.suggestions if one.name in POSITIONS and one.source in state.spikes]
     if places:
         rows = np.unique(np.concatenate([state.spikes[one.source][0] for one in places]))
-        words = f"the position leaves and comes back {_times(state, rows)}"
+        words = f"the position leaves and comes back {_row_times(state, rows)}"
         state.find("position spikes", (), 0.9, words, OF_POSITIONS)
     for one in state.suggestions:
         if one.name in SPIKY and one.source in state.spikes:
             rows, size = state.spikes[one.source]
             threshold = float(f"{size / 2:.2g}")
             least = f"{size:.3g} {one.unit}{' or more' * (len(rows) > 1)}"
-            sentence = f"{one.source!r} leaves its course by {least} and comes back {_times(state, rows)}"
+            sentence = f"{one.source!r} leaves its course by {least} and comes back {_row_times(state, rows)}"
             longest = max(len(run) for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1))
             width = max(5, 2 * longest + 3) * step
             repair = {"kind": "despike", "columns": [one.name], "window": round(max(width, 1e-3), 3)}

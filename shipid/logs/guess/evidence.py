@@ -28,7 +28,7 @@ NEAR_TURN, NEIGHBOURS = 0.6, 9  # of a turn, that many steps together make when 
 
 
 @dataclass(frozen=True)
-class Windows:
+class RowWindows:
     """Index of the first and last row of every window, (W,)."""
 
     first: NDArray[np.intp]
@@ -49,7 +49,7 @@ class Fit:
     left: float
 
 
-def windows(t: Array, duration: float = WINDOW) -> Windows:
+def row_windows(t: Array, duration: float = WINDOW) -> RowWindows:
     """Return windows of about `duration` [s] without a hole: at least `STEPS` rows, at most a fifth of the log."""
     usual = float(np.median(np.diff(t)))
     duration = max(STEPS * usual, min(duration, (t[-1] - t[0]) / 5))
@@ -57,19 +57,19 @@ def windows(t: Array, duration: float = WINDOW) -> Windows:
     last = np.searchsorted(t, t + duration)
     inside = last < len(t)
     first, last = first[inside], last[inside]
-    stretch = _stretches(t)
+    stretch = _stretch_numbers(t)
     whole = (stretch[last] == stretch[first]) & (last - first >= STEPS)
     first, last = first[whole], last[whole]
     thin = max(1, len(first) // MOST)
-    return Windows(first[::thin], last[::thin])
+    return RowWindows(first[::thin], last[::thin])
 
 
-def integral(t: Array, rate: NDArray[np.generic]) -> Complex:
+def integrate_rate(t: Array, rate: NDArray[np.generic]) -> Complex:
     """Return the integral of a real or complex rate (N,) from t[0] to each t [s], (N,)."""
     return cumulative_integral(t, np.real(rate)) + 1j * cumulative_integral(t, np.imag(rate))
 
 
-def fit(seen: Complex, integrated: Complex) -> Fit:
+def fit_scale(seen: Complex, integrated: Complex) -> Fit:
     """Fit one real scale by least squares; its error is the scatter of the scale between twenty parts of the log."""
     power = float(np.sum(np.abs(integrated) ** 2))
     total = float(np.sum(np.abs(seen) ** 2))
@@ -89,25 +89,25 @@ def fit(seen: Complex, integrated: Complex) -> Fit:
     return Fit(scale, error, float(np.sum(np.abs(seen - scale * integrated) ** 2)) / total)
 
 
-def robust(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
+def windows_without_outliers(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
     """Return which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out.
 
     What is usual say those in which something changes: a rounded heading of a straight course fits anything.
     """
-    scale = fit(seen, integrated).scale
+    scale = fit_scale(seen, integrated).scale
     miss, size = np.abs(seen - scale * integrated), np.abs(integrated)
     moving = size >= LIVELY * np.percentile(size, 90)
     return np.asarray(miss <= 6.0 * np.median(miss[moving]) + 1e-9)
 
 
-def agreement(track: Complex, psi: Array) -> complex:
+def course_agreement(track: Complex, psi: Array) -> complex:
     """Return the mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
     turned = track * np.exp(-1j * psi)
     size = float(np.sum(np.abs(turned)))
     return complex(np.sum(turned)) / size if size > 0 else 0j
 
 
-def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
+def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Unwrap an angle that jumps at a whole turn; replace false samples within a jump.
 
     Returns the angle in the unit of the log, (N,), and a mask of the steps of more than 20 deg that are no jump of a
@@ -130,7 +130,7 @@ def heal(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]
     return np.interp(index, index[known], np.unwrap(values[known], period=turn)), false
 
 
-def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
+def lever_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
     """Return the arm x + i y [m] from the point of the velocities to that of the positions.
 
     Also its standard error [m], and the share of the misfit that it explains.
@@ -152,29 +152,29 @@ def arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, f
     return complex(whole), error, float(explained)
 
 
-def effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
+def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
     """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
 
     t, r, order : (N,), r [rad/s]. duration : of the windows over which changes are compared [s].
     """
-    rows, design, change = answer(t, r, order, duration)
+    rows, design, change = yaw_regression(t, r, order, duration)
     if len(rows) < 12 or np.ptp(order) == 0.0:
         return 0.0
-    solution, errors, _ = solved(design, change)
+    solution, errors, _ = solve_least_squares(design, change)
     return float(solution[0] / errors[0]) if 0.0 < errors[0] < np.inf else 0.0
 
 
-def answer(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
+def yaw_regression(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
     """Return first rows (W,), columns (W, 3) and left side (W,) of r' = a order + b r + c over windows.
 
     Without those in which the rate is far from all else: a heading that stood still jumps when it goes on.
     """
-    chosen = windows(t, duration)
+    chosen = row_windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
-    chosen = Windows(chosen.first[::thin], chosen.last[::thin])
+    chosen = RowWindows(chosen.first[::thin], chosen.last[::thin])
     width = max(1, round(duration / 2 / float(np.median(np.diff(t)))))
-    signals, stretch = (cumulative_integral(t, order), cumulative_integral(t, r), t, r), _stretches(t)
-    smooth = [_boxcar(x, width, stretch) for x in signals]
+    signals, stretch = (cumulative_integral(t, order), cumulative_integral(t, r), t, r), _stretch_numbers(t)
+    smooth = [_moving_mean(x, width, stretch) for x in signals]
     *columns, change = (chosen.change(x).real for x in smooth)  # the equation holds for means, too
     design = np.stack(columns, axis=1)
     wild = np.zeros(len(change), dtype=bool)
@@ -184,7 +184,7 @@ def answer(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[n
     return chosen.first[tame], design[tame], change[tame]
 
 
-def solved(design: Array, change: Array) -> tuple[Array, Array, float]:
+def solve_least_squares(design: Array, change: Array) -> tuple[Array, Array, float]:
     """Return the solution (K,) by least squares, its standard errors, and the sum of squares left, inf if none is."""
     sizes = np.linalg.norm(design, axis=0)
     none = np.zeros(len(sizes)), np.full(len(sizes), np.inf), np.inf
@@ -199,14 +199,14 @@ def solved(design: Array, change: Array) -> tuple[Array, Array, float]:
     return solution / sizes, np.sqrt(spread) / sizes, left
 
 
-def follows(t: Array, r: Array, order: Array, duration: float) -> float:
+def order_correlation(t: Array, r: Array, order: Array, duration: float) -> float:
     """Return the correlation of the yaw rate with an order some time before, at the delay where it is largest.
 
     The delay is at most `duration` [s]; the correlation is not centred, for helm amidships gives no yaw rate.
     """
     usual = float(np.median(np.diff(t)))
     width = max(1, round(duration / 4 / usual))
-    smooth_r, smooth_order = (_boxcar(values - np.median(values), width) for values in (r, order))
+    smooth_r, smooth_order = (_moving_mean(values - np.median(values), width) for values in (r, order))
     best = 0.0
     for rows in np.unique(np.linspace(0, max(1, round(duration / usual)), 9).astype(int)):
         a, b = smooth_r[rows:], smooth_order[: len(order) - rows]
@@ -216,19 +216,19 @@ def follows(t: Array, r: Array, order: Array, duration: float) -> float:
     return best
 
 
-def _boxcar(values: Array, width: int, stretch: NDArray[np.int_] | None = None) -> Array:
+def _moving_mean(values: Array, width: int, stretch: NDArray[np.int_] | None = None) -> Array:
     """Return the centred mean over `width` rows, of fewer at the ends of the log, or of each stretch (N,), (N,)."""
     series = pd.Series(values)
     rows = series if stretch is None else series.groupby(stretch)
     return np.asarray(rows.rolling(width, center=True, min_periods=1).mean())
 
 
-def _stretches(t: Array) -> NDArray[np.int_]:
+def _stretch_numbers(t: Array) -> NDArray[np.int_]:
     """Return the number of the stretch without a hole that each row at t (N,) [s] is in."""
     return np.append(0, np.cumsum(np.diff(t) > GAP * np.median(np.diff(t))))
 
 
-def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
+def position_jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
     """Return where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m]).
 
     Each lies between two holes of the clock: what a ship did in a hole, or between two files, is no jump.
@@ -240,7 +240,7 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
     drift = position - integrated
     miss = np.abs(drift[reach:] - drift[:-reach])
     limit = max(5.0 * float(np.percentile(miss, 98)), 2.0 * usual)
-    holes = _stretches(t)
+    holes = _stretch_numbers(t)
     wild = (miss > limit) & (holes[reach:] == holes[:-reach])
     if not wild.any() or wild.mean() > 0.05:
         return []
@@ -252,16 +252,16 @@ def jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float,
         start, end = max(first, group[0] - 1), min(last - 1, group[-1] + reach + 1)
         around = 3 * reach
         before, after = drift[max(first, start - around) : start + 1], drift[end : min(last, end + around + 1)]
-        stays = abs(_middle(after) - _middle(before))
+        stays = abs(_complex_median(after) - _complex_median(before))
         leaps.append((float(t[start]), float(t[end]), float(stays)))
     return leaps
 
 
-def _middle(points: Complex) -> complex:
+def _complex_median(points: Complex) -> complex:
     return complex(np.median(points.real), np.median(points.imag))
 
 
-def straight(r: Array, t: Array) -> NDArray[np.bool_]:
+def straight_rows(r: Array, t: Array) -> NDArray[np.bool_]:
     """Return the rows of the straightest parts, where the ship hardly turns for half a minute."""
     usual = float(np.median(np.diff(t)))
     width = max(3, round(30.0 / usual))
@@ -269,13 +269,13 @@ def straight(r: Array, t: Array) -> NDArray[np.bool_]:
     return np.asarray(calm < max(np.radians(0.3), 0.1 * float(np.percentile(np.abs(r), 95))))
 
 
-def visits(values: Array) -> int:
+def maximum_visits(values: Array) -> int:
     """Return how often a signal reaches its largest value."""
     top = values == values.max()
     return int(np.sum(np.diff(top.astype(int)) == 1))
 
 
-def between_rows(values: Array) -> float:
+def interpolated_share(values: Array) -> float:
     """Return the share of rows exactly on the line between their neighbours, among rows where a value changes."""
     first, second = np.diff(values), np.diff(values, 2)
     moving = (first[1:] != 0.0) & (first[:-1] != 0.0)
@@ -286,7 +286,7 @@ def between_rows(values: Array) -> float:
     return float(np.mean(np.abs(second[moving]) < 1e-9 * scale))
 
 
-def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
+def value_lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
     """Return the multiplier in [low, high] that makes values round, how well (0 to 1), and the number of values used.
 
     Instruments round, and the rounding survives a conversion: R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x
@@ -295,28 +295,28 @@ def lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
     """
     still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
     asked = still if len(still) >= FEW else np.unique(values)[:400]
-    if len(asked) < FEW or _roundness(asked, np.ones(1), 1e-4)[0] > 0.8:  # round already: nothing was converted
+    if len(asked) < FEW or _roundness_of(asked, np.ones(1), 1e-4)[0] > 0.8:  # round already: nothing was converted
         return 0.0, 0.0, len(asked)
     for quantum in (0.1, 0.01):
         if low * float(np.ptp(asked)) < 20 * quantum:
             continue  # too few multiples to be missed
         step = quantum / 8 / float(np.abs(asked).max())
         multipliers = np.arange(low, high, step)
-        best = multipliers[np.argmax(_roundness(asked[:: max(1, len(asked) // 60)], multipliers, quantum))]
+        best = multipliers[np.argmax(_roundness_of(asked[:: max(1, len(asked) // 60)], multipliers, quantum))]
         finer = best + np.linspace(-step, step, 101)
-        sizes = _roundness(asked, finer, quantum)
+        sizes = _roundness_of(asked, finer, quantum)
         if sizes.max() > 0.8:
             return float(finer[np.argmax(sizes)]), float(sizes.max()), len(asked)
     return 0.0, 0.0, len(asked)
 
 
-def _roundness(values: Array, multipliers: Array, quantum: float) -> Array:
+def _roundness_of(values: Array, multipliers: Array, quantum: float) -> Array:
     """Return R, the roundness from 0 to 1, for every multiplier, (K,)."""
     phases = np.multiply.outer(2 * np.pi / quantum * multipliers, values)
     return np.asarray(np.hypot(np.cos(phases).mean(axis=1), np.sin(phases).mean(axis=1)))
 
 
-def spikes(values: Array) -> NDArray[np.bool_]:
+def spike_rows(values: Array) -> NDArray[np.bool_]:
     """Return the rows (N,) of a signal that leave it and come back within two rows, as no ship and no order does.
 
     They leave the median of five rows by more than all else the signal ever does, or, of a signal that moves in most
@@ -324,14 +324,16 @@ def spikes(values: Array) -> NDArray[np.bool_]:
     than the signal steps there from row to row; the rows before and after agree. An angle that counts from 0 again, and
     a signal with more than one such row in fifty, has none, but where all have one value, as where it stands for none.
     """
-    result = _spikes(values, values)
+    result = _plain_spike_rows(values, values)
     for turn in TURNS:
         if result.any() and 0.9 * turn < np.ptp(values) and _may_be_angle(values, turn):
-            result &= _spikes(np.unwrap(values, period=turn), values)  # an angle that crosses its 0 for a row?
+            result &= _plain_spike_rows(
+                np.unwrap(values, period=turn), values
+            )  # an angle that crosses its 0 for a row?
     return result
 
 
-def _spikes(values: Array, written: Array) -> NDArray[np.bool_]:
+def _plain_spike_rows(values: Array, written: Array) -> NDArray[np.bool_]:
     """Rows (N,) that leave a signal, were it no angle; `written` is as it is in the log."""
     none = np.zeros(len(values), dtype=bool)
     low, high = np.percentile(values, [0.5, 99.5])
@@ -353,7 +355,7 @@ def _spikes(values: Array, written: Array) -> NDArray[np.bool_]:
     touching = wild | np.append(False, wild[:-1])
     usual = around(np.where(touching, 0.0, steps), 1.0)
     result = none.copy()
-    for first, end in spans_of(wild):
+    for first, end in row_spans(wild):
         before, after = max(first - 1, 0), min(end, len(values) - 1)
         size = float(off[first:end].min())
         agrees = abs(values[after] - values[before]) < 0.25 * size
@@ -368,21 +370,21 @@ def _may_be_angle(values: Array, turn: float) -> bool:
     return bool(any(low > -0.02 - below and high < 1.02 - below for below in (0.0, 0.25, 0.5, 0.75)))
 
 
-def spans_of(rows: NDArray[np.bool_]) -> NDArray[np.intp]:
+def row_spans(rows: NDArray[np.bool_]) -> NDArray[np.intp]:
     """First row of each stretch of chosen rows (N,), and the row after its last, (K, 2)."""
     return np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(int), [0]]))).reshape(-1, 2)
 
 
-def filled(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
+def fill_columns(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
     """Return the columns with missing values interpolated in time; good enough for these tests, not for a dataset."""
     result = {}
     for name, values in columns:
         known = np.isfinite(values)
-        result[name] = _filled(t, values, known) if known.any() and not known.all() else values.copy()
+        result[name] = _fill_column(t, values, known) if known.any() and not known.all() else values.copy()
     return result
 
 
-def _filled(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
+def _fill_column(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
     """Values (N,) interpolated in time where they are not known; an angle that jumps at a whole turn the short way."""
     held = values[known]
     spread, jump = float(np.ptp(held)), float(np.abs(np.diff(held)).max(initial=0.0))
@@ -394,7 +396,7 @@ def _filled(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
     return np.where(known, values, (between - least) % turn + least)
 
 
-def lively(t: Array, psi: Array, chosen: Windows) -> float:
+def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
     """Return the length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
 
     t (N,) [s], psi (N,) [rad].
@@ -416,7 +418,7 @@ def fit_with_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[F
     design = np.concatenate([columns.real, columns.imag])
     size = np.linalg.norm(design, axis=0)
     if total <= 0.0 or not np.all(size > 0):
-        return fit(seen, integrated), 0j
+        return fit_scale(seen, integrated), 0j
     both = np.concatenate([seen.real, seen.imag])
     solution = np.linalg.lstsq(design / size, both, rcond=None)[0] / size
     left = float(np.sum((both - design @ solution) ** 2)) / total

@@ -10,11 +10,11 @@ import pandas as pd
 from shipid.data.dataset import BREAK, Array
 from shipid.data.lapses import CommandFault, RowMask, find_command_faults
 from shipid.logs.guess.clues import State, Suggestion
-from shipid.logs.guess.defects import FEW, when
+from shipid.logs.guess.defects import FEW, clock_text
 from shipid.logs.guess.evidence import GAP
 from shipid.logs.guess.sniff import Sniffed
 from shipid.logs.mapping import to_si
-from shipid.logs.repairs import FLAGS, Despike, despike
+from shipid.logs.repairs import FLAGS, Despike, remove_spikes
 from shipid.physics.signals import is_command, is_shaft, is_steering, read_unit
 
 SHARES = (0.5, 0.75, 0.9)  # of the size of the smallest lapse, that may part lapses from all other rows
@@ -40,7 +40,7 @@ def find_lapses(state: State, sniffed: Sniffed) -> None:
         follows = np.diff(t) <= GAP * np.median(np.diff(t))
         found = find_command_faults(one.name, t, values, psi, follows)
         brief = [lapse for lapse in found if lapse.kind in ("zero", "spike")]
-        repair, mended = _despike(one.name, brief, t, values, follows) if brief else (None, [])
+        repair, mended = _despike_repair(one.name, brief, t, values, follows) if brief else (None, [])
         if mended:
             _report_brief(state, one, mended, t, repair)
         left = [lapse for lapse in brief if lapse not in mended]
@@ -63,18 +63,18 @@ def _report_brief(
             far = f"{min(lapse.size for lapse in some) * factor:.3g} {unit}{' or more' * (len(some) > 1)}"
             how = "is 0" if kind == "zero" else f"leaves its course by {far} and comes back"
             beside = f" between values of {far}" * (kind == "zero")
-            said.append(f"{how} {_places(state, some, t)}{beside}")
+            said.append(f"{how} {_lapse_places(state, some, t)}{beside}")
     what = "shaft" if is_shaft(one.name) else "rudder" if is_steering(one.name) else "gear"
     sentence = f"{one.source!r} {', and '.join(said).rstrip(',')}: faster than the {what} moves elsewhere"
     if repair is None and state.joined:
         state.ask((one.name,), f"{sentence}. Leave these cells empty, and draft again")
     elif repair is None:
-        repair = _breaks(state, found, t)
+        repair = _break_repair(state, found, t)
     state.find("lapses of a command", (one.source,), SURE, sentence, repair)
 
 
 def _report_pauses(state: State, one: Suggestion, found: list[CommandFault], t: Array) -> None:
-    sentence = f"{one.source!r} is 0 {_places(state, found, t)} with the same order before and after"
+    sentence = f"{one.source!r} is 0 {_lapse_places(state, found, t)} with the same order before and after"
     _report_unsure(state, one, "lapses of a command", found, t, f"{sentence}. Was that ordered?")
 
 
@@ -84,16 +84,16 @@ def _report_unsure(
     """Ask of what may be as it is in the log; the repair is there, switched off."""
     remedy = "leave these cells empty, and draft again" if state.joined else "switch the repair on"
     state.ask((one.name,), f"{sentence} If not, {remedy}")
-    state.find(kind, (one.source,), UNSURE, sentence, None if state.joined else _breaks(state, found, t))
+    state.find(kind, (one.source,), UNSURE, sentence, None if state.joined else _break_repair(state, found, t))
 
 
-def _places(state: State, some: list[CommandFault], t: Array) -> str:
+def _lapse_places(state: State, some: list[CommandFault], t: Array) -> str:
     """Where lapses are, in words: how many rows, how many places, and the first times."""
     count = sum(lapse.end - lapse.first for lapse in some)
     words = f"in {count} row{'s' * (count > 1)} at {len(some)} place{'s' * (len(some) > 1)}"
     if state.joined:
         return f"{words} of the files"
-    times = ", ".join(when(state, float(t[lapse.first])) for lapse in some[:FEW])
+    times = ", ".join(clock_text(state, float(t[lapse.first])) for lapse in some[:FEW])
     return f"{words}, {'the first ' * (len(some) > FEW)}near {times},"
 
 
@@ -101,7 +101,7 @@ def _report_still(state: State, one: Suggestion, found: list[CommandFault], t: A
     words = []
     for lapse in found[:FEW]:
         span = slice(lapse.first, lapse.end)
-        times = f"{when(state, float(t[lapse.first]))} to {when(state, float(t[lapse.end - 1]))}"
+        times = f"{clock_text(state, float(t[lapse.first]))} to {clock_text(state, float(t[lapse.end - 1]))}"
         words.append(f"{times} ({np.degrees(np.ptp(psi[span])):.0f} deg)")
     where = f"at {len(found)} places of the files" if state.joined else f"from {', '.join(words)}"
     sentence = (
@@ -110,13 +110,13 @@ def _report_still(state: State, one: Suggestion, found: list[CommandFault], t: A
     _report_unsure(state, one, "frozen sensor", found, t, f"{sentence}. Was it held so?")
 
 
-def _breaks(state: State, found: list[CommandFault], t: Array) -> dict[str, Any]:
+def _break_repair(state: State, found: list[CommandFault], t: Array) -> dict[str, Any]:
     unit, last = to_si(state.clock_unit, "t"), len(t) - 1
     intervals = [[t[max(one.first - 1, 0)] / unit, t[min(one.end, last)] / unit] for one in found]
     return {"kind": "break", "intervals": intervals}
 
 
-def _despike(
+def _despike_repair(
     name: str, found: list[CommandFault], t: Array, values: Array, follows: RowMask
 ) -> tuple[dict[str, Any] | None, list[CommandFault]]:
     """The repair that mends most lapses and changes no other row, and those that it mends; none where there is none."""
@@ -134,7 +134,7 @@ def _despike(
         repair = {"kind": "despike", "columns": [name], "window": window, "threshold": threshold, "unit": unit}
         size = threshold / factor
         trial = Despike(kind="despike", reason="of a draft", columns=(name,), window=window, threshold=size)
-        outcome = despike(rows, trial)
+        outcome = remove_spikes(rows, trial)
         mended = [one for one in found if outcome.touched[one.first : one.end].all()]
         changed = np.abs(outcome.rows[name].to_numpy() - values)[others].max(initial=0.0)
         if changed < SAME * least and 2 * len(mended) > len(found):

@@ -16,14 +16,14 @@ import numpy as np
 from shipid.errors import DataError
 from shipid.logs.amounts import is_amount
 from shipid.logs.dates import DAY_OF, TIME_OF_DAY
-from shipid.logs.foreign import foreign
+from shipid.logs.foreign import foreign_format
 from shipid.logs.formats import LOOKED_AT, SheetFormat, TextFormat
 from shipid.logs.guess.clock import is_clock
-from shipid.logs.guess.words import NO_VALUE, fits, known_words
+from shipid.logs.guess.words import NO_VALUE, known_words, meaning_scores
 from shipid.logs.mapping import is_position
 from shipid.logs.nmea import is_nmea
-from shipid.logs.readers import READERS, grouped_by, refuse_power_cut
-from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_of
+from shipid.logs.readers import READERS, grouped_number, refuse_power_cut
+from shipid.logs.workbook import SEPARATOR, check_width, sheet_text, sheets_with_values
 
 ELSEWHERE = ("cp932", "gb18030", "cp949", "cp1251")  # encodings of texts whose words no other one shows
 SEPARATORS = (",", ";", "\t", "|", "whitespace")
@@ -44,21 +44,21 @@ _UNIT = re.compile(
 )
 
 
-def format_of(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
+def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
     """Return the keys of [format] of a log by its first bytes; `names` are its columns if it is text without a header.
 
     Raises
     ------
     DataError : it is of a kind that no reader reads, or no table.
     """
-    other = foreign(head)
+    other = foreign_format(head)
     if other is not None:
         raise DataError(other.sentence, file=file)
     for reader in READERS.values():
         form = reader.detect(file, head) if reader.detect else None
         if form is not None:
             return form
-    encoding = _encoding(head, file)
+    encoding = _guess_encoding(head, file)
     text = head.decode(encoding, "ignore")
     if is_nmea(file, text.encode("latin-1", "replace")) is not None:
         raise DataError(f"NMEA 0183 in {encoding}: save it in utf-8", file=file)
@@ -67,7 +67,7 @@ def format_of(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]
 
 def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], str, tuple[str, ...]]:
     """Keys of [format] of a workbook, the lines of its largest sheet with a clock, and what is said of the others."""
-    found = sheets_of(file)
+    found = sheets_with_values(file)
     sheet, lines = found[0], sheet_text(file, found[0])
     for other in found[1:] if not _has_clock(lines) else ():
         text = sheet_text(file, other)
@@ -85,10 +85,12 @@ def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any],
 def _has_clock(lines: str) -> bool:
     """Whether one of the first lines of a sheet has the name of a clock in a cell."""
     first = lines.split("\n", LOOKED_AT)[:LOOKED_AT]
-    return any(is_clock(cell) for line in first for cell in cells(line, SEPARATOR) if cell and not _is_number(cell))
+    return any(
+        is_clock(cell) for line in first for cell in split_cells(line, SEPARATOR) if cell and not _is_number(cell)
+    )
 
 
-def _encoding(head: bytes, file: Path) -> str:
+def _guess_encoding(head: bytes, file: Path) -> str:
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     for order, zeros, others in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
@@ -118,11 +120,11 @@ def _text_format(
     """Return the keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
     for line, sign in itertools.product(lines, separators):
         check_width(len(line.split()) if sign == "whitespace" else line.count(sign) + 1, file)
-    score, separator, decimal, mark = _marks(lines, separators)
-    _refuse_long([cells(line, separator) for line in lines if line.strip()] if separator else [], file)
+    score, separator, decimal, mark = _guess_marks(lines, separators)
+    _refuse_long([split_cells(line, separator) for line in lines if line.strip()] if separator else [], file)
     if score < NUMERIC / 2:
         raise DataError("no table of numbers with any separator: export it as CSV", file=file)
-    rows = [cells(line, separator) for line in lines]
+    rows = [split_cells(line, separator) for line in lines]
     width = Counter(len(row) for row in rows if any(row)).most_common(1)[0][0]
     places = _places_of_numbers([row for row in rows if len(row) == width], decimal, mark)
     shares = [_number_share([row[k] for k in places if k < len(row)], decimal, mark) for row in rows]
@@ -144,34 +146,39 @@ def _text_format(
     sums = [i for i in range(data) if shares[i] > 0.0 and STATISTICS.fullmatch(rows[i][0])]
     above = [i for i in range(data - 1, -1, -1) if any(rows[i]) and i not in sums][:MOST_HEADS]
     if above and separator == "whitespace" and len(rows[above[0]]) > width:
-        joined = cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
+        joined = split_cells(re.sub(r"\s+(?=[\[(])", "", lines[above[0]]), separator)[above[0] in marked :]
         if len(joined) == width:  # blanks before units
-            return form | {"skip_rows": data, "names": _distinct(joined)}
+            return form | {"skip_rows": data, "names": _distinct_columns(joined)}
     heads = [i for i in above if width - 1 <= len(rows[i]) <= width]
     dated_at = _date_and_time(rows[data]) if separator == "whitespace" else None
     if dated_at is not None and heads and len(rows[heads[0]]) == width - 1:  # one name for date and time
         wide = [[*rows[i][:dated_at], "date", *rows[i][dated_at:]] for i in heads if len(rows[i]) == width - 1]
         if len(wide) > 1 and _is_units(rows[heads[0]]):
             pairs = zip(wide[1], ["" if k == dated_at else unit for k, unit in enumerate(wide[0])], strict=True)
-            return form | {"skip_rows": data, "names": _distinct([_with_unit(*pair) for pair in pairs])}
-        return form | {"skip_rows": data, "names": _distinct(wide[0])}
-    called = _called_in([[*rows[i], ""][:width] for i in heads])
+            return form | {"skip_rows": data, "names": _distinct_columns([_with_unit(*pair) for pair in pairs])}
+        return form | {"skip_rows": data, "names": _distinct_columns(wide[0])}
+    called = _header_above([[*rows[i], ""][:width] for i in heads])
     if called:
-        return form | {"skip_rows": data, "names": _distinct(called)}
-    if heads and heads[0] == above[0] and heads[0] in marked and rows[heads[0]] != cells(lines[heads[0]], separator):
-        return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
+        return form | {"skip_rows": data, "names": _distinct_columns(called)}
+    if (
+        heads
+        and heads[0] == above[0]
+        and heads[0] in marked
+        and rows[heads[0]] != split_cells(lines[heads[0]], separator)
+    ):
+        return form | {"skip_rows": data, "names": _distinct_columns([*rows[heads[0]], ""][:width])}
     if heads and heads[0] == above[0] and sums and sums[-1] > heads[0]:
-        return form | {"skip_rows": data, "names": _distinct([*rows[heads[0]], ""][:width])}
+        return form | {"skip_rows": data, "names": _distinct_columns([*rows[heads[0]], ""][:width])}
     if heads and heads[0] == above[0]:
         return form | {"skip_rows": heads[0]}
     longer = [i for i in range(data) if len(rows[i]) > width and all(rows[i][:width]) and not shares[i]]
     if longer and not heads:  # a table beside the log ends above this line
         beside = [""] * (max(len(row) for row in rows[longer[-1] + 1 :]) - width)
-        return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct(rows[longer[-1]][:width]), *beside]}
+        return form | {"skip_rows": longer[-1] + 1, "names": [*_distinct_columns(rows[longer[-1]][:width]), *beside]}
     return form | {"skip_rows": data, "header": False}
 
 
-def _marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, str, str | None]:
+def _guess_marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, str, str | None]:
     """Return the separator, decimal sign and mark of thousands that give most numbers in lines of equal length.
 
     Before them stands their share of numbers, less for lines of another length; 0 where there are none.
@@ -180,12 +187,12 @@ def _marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, s
     alike = 0  # lines of one length with the best
     quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
     for separator in separators:
-        rows = [cells(line, separator) for line in lines if line.strip()]
+        rows = [split_cells(line, separator) for line in lines if line.strip()]
         width, count = Counter(len(row) for row in rows).most_common(1)[0]
         if separator == "whitespace" and best[1] == "\t" and best[0] >= NUMERIC / 2 and count < alike:
             continue  # the header, too, has as many cells between tabs as the data: blanks are in cells
         for decimal in (".", ",") if separator != "," or quoted else (".",):
-            mark = _thousands(rows, decimal)
+            mark = _thousands_mark(rows, decimal)
             share = float(np.mean([_number_share(row, decimal, mark) for row in rows if len(row) == width]))
             score = share * count / len(rows) * (width > 1) * (1 + width / 1000)
             score *= 0.97 if separator == "whitespace" else 1.0  # names may have blanks
@@ -202,7 +209,7 @@ def _refuse_long(rows: list[list[str]], file: Path) -> None:
         column = [row[place] for row in held]
         if len({*column}) > len(column) / 2 or any(map(_is_number, column)):
             continue
-        quantities = {next(filter(None, fits(cell)), "") for cell in {*column}} - {""}
+        quantities = {next(filter(None, meaning_scores(cell)), "") for cell in {*column}} - {""}
         if len(quantities) < 3:
             continue
         if np.mean([one != other for one, other in itertools.pairwise(column)]) > 0.5:  # the tags take turns
@@ -212,7 +219,7 @@ def _refuse_long(rows: list[list[str]], file: Path) -> None:
             raise DataError(f"{message}, {how}", file=file)
 
 
-def _called_in(heads: list[list[str]]) -> list[str]:
+def _header_above(heads: list[list[str]]) -> list[str]:
     """Return the names that lines above the data give the columns, the nearest line first; none where that one has all.
 
     A line of units goes behind the names. Of two others the line is taken that names most quantities, or both: the
@@ -227,7 +234,7 @@ def _called_in(heads: list[list[str]]) -> list[str]:
         group = ""
         upper = [group := cell or group for cell in lines[1]]
         ways.append([" ".join(filter(None, pair)) for pair in zip(upper, lines[0], strict=True)])
-    sense = [_sense(way) for way in ways]
+    sense = [_header_meaning(way) for way in ways]
     best = ways[int(np.argmax(sense))] if max(sense) > sense[0] + 0.5 else ways[0]
     if len(ways) == 3 and len({*ways[2]}) == len(ways[2]):  # Wind and Wind over Speed and Direction
         twice = {name for name, count in Counter(best).items() if count > 1}
@@ -240,10 +247,13 @@ def _called_in(heads: list[list[str]]) -> list[str]:
     return named
 
 
-def _sense(names: list[str]) -> float:
+def _header_meaning(names: list[str]) -> float:
     """How much the names of columns say: the sum of how well they fit a quantity, or a clock."""
     known = {name for name in names if name}
-    return sum(1.0 if is_clock(name) else max([0.0, *(fits(name)[one] for one in fits(name) if one)]) for name in known)
+    return sum(
+        1.0 if is_clock(name) else max([0.0, *(meaning_scores(name)[one] for one in meaning_scores(name) if one)])
+        for name in known
+    )
 
 
 def _with_unit(name: str, unit: str) -> str:
@@ -259,7 +269,7 @@ def _date_and_time(row: list[str]) -> int | None:
     )
 
 
-def _distinct(names: list[str]) -> list[str]:
+def _distinct_columns(names: list[str]) -> list[str]:
     """Return the names with a number added to those that are there already or empty."""
     result: list[str] = []
     for index, name in enumerate(names):
@@ -277,7 +287,7 @@ def _is_units(row: list[str]) -> bool:
     return len(words) >= 2 and fitting >= 0.7 * len(words)
 
 
-def cells(line: str, separator: str) -> list[str]:
+def split_cells(line: str, separator: str) -> list[str]:
     """Split a line of text into cells; a separator between quotes is part of a cell."""
     if separator == "whitespace":
         return line.split()
@@ -288,7 +298,7 @@ def cells(line: str, separator: str) -> list[str]:
     return [cell.strip().strip('"') for cell in row]
 
 
-def _thousands(rows: list[list[str]], decimal: str) -> str | None:
+def _thousands_mark(rows: list[list[str]], decimal: str) -> str | None:
     """Return the mark of thousands in the cells of lines, where all cells with that mark are numbers in groups.
 
     1,800 alone may be 1.8: it is 1800 where another number has a decimal point.
@@ -298,7 +308,7 @@ def _thousands(rows: list[list[str]], decimal: str) -> str | None:
     whole = any(re.fullmatch(rf"[+-]?\d+{re.escape(decimal)}(\d{{1,2}}|\d{{4,}})", cell) for cell in held)
     for mark in GROUPS:
         cells = [cell for cell in held if mark in cell]
-        if mark == decimal or not cells or not all(re.fullmatch(grouped_by(decimal, mark), cell) for cell in cells):
+        if mark == decimal or not cells or not all(re.fullmatch(grouped_number(decimal, mark), cell) for cell in cells):
             continue
         if mark not in ".," or whole or any(decimal in cell or cell.count(mark) > 1 for cell in cells):
             return mark
@@ -321,7 +331,7 @@ def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | Non
 def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
     """Return the share of cells that are numbers, with a unit or without, or positions; empty ones are not counted."""
     cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
-    grouped = re.compile(grouped_by(decimal, thousands)) if thousands is not None else None
+    grouped = re.compile(grouped_number(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
     cells = [cell.replace(",", ".") if decimal == "," else cell for cell in cells]
     known = [_is_number(cell) or is_amount(cell) or is_position(cell) for cell in cells]
@@ -345,7 +355,7 @@ def table_below(lines: str, form: TextFormat, missing: Iterable[str]) -> tuple[i
     empty, rows, header = False, 0, [""]
     last: tuple[int, list[str]] = 0, []
     for number, line in enumerate(lines.splitlines(), 1):
-        row = [cell for cell in cells(line, form.separator) if cell and cell not in missing]
+        row = [cell for cell in split_cells(line, form.separator) if cell and cell not in missing]
         if number > form.skip_rows and not row:
             empty = True
         elif number > form.skip_rows:

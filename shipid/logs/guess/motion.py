@@ -13,7 +13,7 @@ from shipid.logs.dates import DAY
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, names_another, unit_in_name
 from shipid.logs.guess.evidence import Complex, Fit
-from shipid.logs.guess.words import fits, is_order
+from shipid.logs.guess.words import is_order, meaning_scores
 from shipid.logs.mapping import UNITS, is_dated, rate_of_ais, to_si
 from shipid.physics.signals import rows_of_role
 from shipid.units import GRAVITY
@@ -58,10 +58,10 @@ def choose_velocities(state: State) -> None:
     assert state.position is not None
     assert state.psi is not None
     seen = state.chosen.change(state.position)
-    ranked = sorted(_hypotheses(state, seen), key=lambda entry: entry.cost)
+    ranked = sorted(_velocity_hypotheses(state, seen), key=lambda entry: entry.cost)
     named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
     bound = min(LEFT, 0.7 * min((entry.fit.left for entry in ranked), default=1.0)) if state.numbered else 0.2
-    if not named and _speed_and_course(state, seen, bound):
+    if not named and _choose_speed_and_course(state, seen, bound):
         return
     least = min((entry.fit.left for entry in ranked), default=1.0)
     best = next(iter(ranked), None)
@@ -79,30 +79,30 @@ def choose_velocities(state: State) -> None:
     _take_velocities(state, _side_of_sway(state, best, ranked, seen), ranked)
 
 
-def _hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
+def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
     """Yield every ordered pair of columns as earth-fixed, as body-fixed, and as body-fixed with v to port."""
     assert state.psi is not None
     words = ("u", "v", "velocity_north", "velocity_east")
     named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
     free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:20]
     turn = np.exp(1j * state.psi)
-    earth = {name: evidence.integral(state.t, state.columns[name]) for name in free}
-    body = {name: evidence.integral(state.t, state.columns[name] * turn) for name in free}
+    earth = {name: evidence.integrate_rate(state.t, state.columns[name]) for name in free}
+    body = {name: evidence.integrate_rate(state.t, state.columns[name] * turn) for name in free}
     for first in free:
         for second in free:
             if first == second:
                 continue
-            ahead, north = ((fits(first).get(word, 0.0)) for word in ("u", "velocity_north"))
-            abeam, east = ((fits(second).get(word, 0.0)) for word in ("v", "velocity_east"))
+            ahead, north = ((meaning_scores(first).get(word, 0.0)) for word in ("u", "velocity_north"))
+            abeam, east = ((meaning_scores(second).get(word, 0.0)) for word in ("v", "velocity_east"))
             for frame, path, score in (
                 ("earth", earth[first] + 1j * earth[second], max(min(north, east), 0.5 * min(ahead, abeam))),
                 ("body", body[first] + 1j * body[second], min(ahead, abeam)),
                 ("mirrored", body[first] - 1j * body[second], 0.9 * min(ahead, abeam)),
             ):
                 change = state.chosen.change(path)
-                keep = evidence.robust(seen, change)
-                result = evidence.fit(seen[keep], change[keep])
-                known = _is_unit(result.scale)
+                keep = evidence.windows_without_outliers(seen, change)
+                result = evidence.fit_scale(seen[keep], change[keep])
+                known = _is_speed_unit(result.scale)
                 if result.scale > 0 and (score >= 0.45 or known):
                     yield Velocities(result, first, second, frame, score, path)
 
@@ -130,12 +130,12 @@ def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen
     left = {}
     for entry in (best, other):
         change = state.chosen.change(entry.path)
-        keep = evidence.robust(seen, change)
+        keep = evidence.windows_without_outliers(seen, change)
         left[entry.frame] = evidence.fit_with_arm(seen[keep], change[keep], turned[keep])[0].left
     by_track = min((best, other), key=lambda entry: left[entry.frame])
     ratio = min(left.values()) / max(max(left.values()), 1e-12)
     r = np.gradient(state.psi, state.t)
-    drift = float(np.mean(_calmed(state, state.columns[best.second]) * _calmed(state, r)))
+    drift = float(np.mean(_window_means(state, state.columns[best.second]) * _window_means(state, r)))
     by_drift = {"body": drift < 0, "mirrored": drift > 0}
     if ratio < SAME and by_drift[by_track.frame]:
         return by_track
@@ -152,10 +152,10 @@ def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen
     return likely
 
 
-def _calmed(state: State, values: Array) -> Array:
+def _window_means(state: State, values: Array) -> Array:
     """Return a signal as means over the windows, less its mean, (W,)."""
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
-    means = state.chosen.change(evidence.integral(state.t, values)).real / span
+    means = state.chosen.change(evidence.integrate_rate(state.t, values)).real / span
     return np.asarray(means - np.mean(means))
 
 
@@ -168,7 +168,7 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
         key=lambda one: one.left,
         default=None,
     )
-    unit, rest = _speed_unit(fit, (first, second), state)
+    unit, rest = _fitted_speed_unit(fit, (first, second), state)
     factor = to_si(unit, "u")
     contrast = 1.0 - fit.left / runner.left if runner is not None and runner.left > 0 else 1.0
     confidence = float(np.clip(0.6 + 0.4 * contrast, 0.0, 0.99)) * (1 - min(0.5, fit.left))
@@ -186,7 +186,9 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     extra_v: dict[str, Any] = {}
     if frame == "earth":
         extra = {"frame": "earth"}
-        if fits(first).get("u", 0.0) > fits(first).get("velocity_north", 0.0) and first in state.all_called("u"):
+        if meaning_scores(first).get("u", 0.0) > meaning_scores(first).get(
+            "velocity_north", 0.0
+        ) and first in state.all_called("u"):
             sentence = (
                 f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
             )
@@ -210,10 +212,10 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
     along = "" if frame == "earth" else next((one.source for one in state.suggestions if one.name == "psi"), "psi")
     ground = velocity if frame == "earth" else velocity * turn
     fit, state.velocity = _as_track(state, fit, np.asarray(ground), (first, second), along=along)
-    _factor(state, rest, fit, (first, second), unit)
+    _report_factor(state, rest, fit, (first, second), unit)
 
 
-def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
+def _fitted_speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
     """Return the unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
     units = UNITS["m/s"]
     unit = min(PLAIN, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
@@ -247,7 +249,7 @@ def _speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = 
     return unit, abs(fit.scale / units[unit] - 1) > 0.004
 
 
-def _is_unit(scale: float) -> bool:
+def _is_speed_unit(scale: float) -> bool:
     """Whether a scale is nearly that of a unit of speed."""
     away = {unit: abs(scale / factor - 1) for unit, factor in UNITS["m/s"].items()}
     return any(distance < (OFF_UNIT if unit in PLAIN else OFF_RARE) for unit, distance in away.items())
@@ -262,7 +264,7 @@ def _clock_unit(state: State, ratio: float) -> str | None:
     return next((unit for unit, factor in others.items() if abs(ratio / factor - 1) < OFF_RARE), None)
 
 
-def _factor(
+def _report_factor(
     state: State, remains: bool, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...] = ("u", "v")
 ) -> None:
     """Report a factor that remains after the unit: shown by the rounding of the values, or larger than its error."""
@@ -279,7 +281,7 @@ def _factor(
         state.ask(("t", *columns), f"are the units of the clock, of the positions and of {pair} right? {begins}")
         return
     per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
-    rounds = [evidence.lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
+    rounds = [evidence.value_lattice(state.columns[source], 0.85 * per_knot, 1.15 * per_knot) for source in sources]
     near = [entry for entry in rounds if entry[1] > 0.9]
     if near and unit != "kn":
         multiplier, _, count = max(near, key=lambda entry: entry[2])
@@ -301,7 +303,7 @@ def _factor(
     state.find("factor", sources, sure, sentence, repair)
 
 
-def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
+def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     """Take speed and course over ground, if the log has them, instead of velocities.
 
     bound : unexplained share of the track, at most.
@@ -313,22 +315,22 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     best: tuple[float, str, str, str, Fit, Complex] | None = None
     for course in courses:
         for turn in ("deg", "rad"):
-            angle, _ = evidence.heal(state.columns[course], 2 * np.pi / to_si(turn, "psi"), state.t)
+            angle, _ = evidence.heal_angle(state.columns[course], 2 * np.pi / to_si(turn, "psi"), state.t)
             way = np.exp(1j * to_si(turn, "psi") * angle)
             for speed in speeds:
                 if speed == course:
                     continue
-                path = evidence.integral(state.t, state.columns[speed] * way)
+                path = evidence.integrate_rate(state.t, state.columns[speed] * way)
                 change = state.chosen.change(path)
-                keep = evidence.robust(seen, change)
-                fit = evidence.fit(seen[keep], change[keep])
-                score = 0.0 if state.numbered else fits(speed)["speed"] + fits(course)["course"]
+                keep = evidence.windows_without_outliers(seen, change)
+                fit = evidence.fit_scale(seen[keep], change[keep])
+                score = 0.0 if state.numbered else meaning_scores(speed)["speed"] + meaning_scores(course)["course"]
                 cost = (
                     (fit.left + 0.003)
                     / (0.3 + score)
                     * (0.7 if turn == (unit_in_name(course, "rad") or "deg") else 1.0)
                 )
-                known = _is_unit(fit.scale)
+                known = _is_speed_unit(fit.scale)
                 if (
                     (known or (score >= 1.5 and fit.scale > 0))
                     and fit.left < bound
@@ -338,7 +340,7 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     if best is None:
         return False
     _, speed, course, turn, fit, way = best
-    unit, rest = _speed_unit(fit, (speed, course), state, quiet=True)
+    unit, rest = _fitted_speed_unit(fit, (speed, course), state, quiet=True)
     factor = to_si(unit, "u")
     why = f"along the course [{turn}] it leaves {100 * fit.left:.2g} % of the track unexplained"
     state.suggest("speed", speed, unit, 0.9, why)
@@ -346,13 +348,13 @@ def _speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     state.velocity = np.asarray(to_si(unit, "u") * state.columns[speed] * way)
     state.body = np.asarray(state.velocity * np.exp(-1j * state.psi))
     fit = Fit(fit.scale / factor, fit.error / factor, fit.left)
-    if not _ask_if_exchanged(state, seen, speed, course, fit):
+    if not _ask_heading_and_course(state, seen, speed, course, fit):
         fit, state.velocity = _as_track(state, fit, state.velocity, (course,), turn)
-    _factor(state, rest, fit, (speed,), unit, ("speed",))
+    _report_factor(state, rest, fit, (speed,), unit, ("speed",))
     return True
 
 
-def _ask_if_exchanged(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
+def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
     """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course.
 
     fit : of the track (W,) `seen` with the course. A ship drifts out of her turn, and so a course that is late does not
@@ -360,12 +362,12 @@ def _ask_if_exchanged(state: State, seen: Complex, speed: str, course: str, fit:
     """
     assert state.psi is not None
     assert state.body is not None
-    change = state.chosen.change(evidence.integral(state.t, state.columns[speed] * np.exp(1j * state.psi)))
-    keep = evidence.robust(seen, change)
-    if evidence.fit(seen[keep], change[keep]).left > EXCHANGED * fit.left:
+    change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * state.psi)))
+    keep = evidence.windows_without_outliers(seen, change)
+    if evidence.fit_scale(seen[keep], change[keep]).left > EXCHANGED * fit.left:
         return False
     r = np.gradient(state.psi, state.t)
-    inward = np.corrcoef(_calmed(state, state.body.imag), _calmed(state, r))[0, 1]
+    inward = np.corrcoef(_window_means(state, state.body.imag), _window_means(state, r))[0, 1]
     if not inward > INWARD:
         return False
     heading = next((one.source for one in state.suggestions if one.name == "psi"), "psi")
@@ -385,8 +387,8 @@ def _as_track(
     """
     assert state.position is not None
     assert state.psi is not None
-    seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integral(state.t, velocity)))
-    keep = evidence.robust(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
+    seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, velocity)))
+    keep = evidence.windows_without_outliers(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
     if keep.sum() < 20 or abs(complex(np.mean(ran[keep] / np.abs(ran[keep])))) > ONE_WAY:
         return fit, velocity
     angles = np.angle(seen[keep] * np.conj(ran[keep]))
@@ -404,16 +406,16 @@ def _as_track(
         words += f" along {along!r}: is the heading off, or the north of the positions another? Then write "
         state.ask(("psi", "u", "v"), f"{words}offset = {angle / to_si(heading, 'psi'):.4g} ({heading}) for psi")
         turn = np.exp(1j * angle)
-        return evidence.fit(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
+        return evidence.fit_scale(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
     words += ": is their north another than that of the positions, as that of a map or of a compass?"
     remedy = f"offset = {angle / to_si(unit, 'psi'):.4g} ({unit}) for course, and for psi, too, if it counts so"
     remedy = f"Then write {remedy}" if len(sources) == 1 else "Then turn the positions, or these"
     state.ask(("psi", "course", "u", "v"), f"{words} {remedy}")
     turn = np.exp(1j * angle)
-    return evidence.fit(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
+    return evidence.fit_scale(seen[keep], ran[keep] * turn), np.asarray(velocity * turn)
 
 
-def pace(state: State) -> tuple[float, float]:
+def ship_pace(state: State) -> tuple[float, float]:
     """Return how fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
     assert state.position is not None
     assert state.psi is not None
@@ -425,7 +427,7 @@ def pace(state: State) -> tuple[float, float]:
 
 def is_possible(state: State, length: float = np.inf) -> bool:
     """Whether a ship of this length [m] may go and turn as this one does by the drafted clock."""
-    speed, across = pace(state)
+    speed, across = ship_pace(state)
     return SLOWEST < speed < min(FASTEST, FROUDE * np.sqrt(GRAVITY * length)) and across < HARDEST
 
 
@@ -434,23 +436,23 @@ def check_clock(state: State, length: float = np.inf) -> None:
 
     length : of the ship [m], where it is known. A slow model whose clock is in minutes goes as a fast ship does.
     """
-    if any("t" in question.about for question in state.questions) or _asked_by_speed(state):
+    if any("t" in question.about for question in state.questions) or _ask_clock_by_speed(state):
         return
     if is_possible(state, length):
         return
-    speed, across = pace(state)
+    speed, across = ship_pace(state)
     goes = f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
     state.ask(("t", "north", "east"), f"{goes}: are the units of the clock and of the positions right?")
 
 
-def _asked_by_speed(state: State) -> bool:
+def _ask_clock_by_speed(state: State) -> bool:
     """Ask where a recorded speed along the heading gives the track only with a clock in another unit, as in minutes."""
     assert state.psi is not None
     assert state.position is not None
     seen, way = state.chosen.change(state.position), np.exp(1j * state.psi)
     for name in state.called("speed"):
         written = unit_in_name(name, "m/s")
-        fit = evidence.fit(seen, state.chosen.change(evidence.integral(state.t, state.columns[name] * way)))
+        fit = evidence.fit_scale(seen, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name] * way)))
         if fit.left > ALONG:
             continue
         for unit in (written,) if written is not None else PLAIN:
@@ -479,8 +481,10 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
         _take_ais(state, change, name)
     candidates = [
         entry
-        for entry in _rates(state, change, state.eligible("r"))
-        if entry[1] in called or entry[0].left < MISLED or not fits(entry[1]).keys() & rows_of_role("command").keys()
+        for entry in _rate_candidates(state, change, state.eligible("r"))
+        if entry[1] in called
+        or entry[0].left < MISLED
+        or not meaning_scores(entry[1]).keys() & rows_of_role("command").keys()
     ]  # a large ship may turn by as many deg/min as her rudder has degrees
     by_name = [
         entry for entry in candidates if entry[1] in called and entry[0].left < CLEAR * candidates[0][0].left + 0.1
@@ -488,7 +492,9 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
     if not state.numbered and (not candidates or (not by_name and candidates[0][0].left > most)):
         # a name that says something else misleads, if the integral of its column is the heading to within little
         others = [name for name in state.free() if np.ptp(state.columns[name]) > 0 and not names_another(name, "r")]
-        candidates = [entry for entry in _rates(state, change, others) if entry[0].left < MISLED and entry[3] < MISLED]
+        candidates = [
+            entry for entry in _rate_candidates(state, change, others) if entry[0].left < MISLED and entry[3] < MISLED
+        ]
     if not candidates or (not by_name and candidates[0][0].left > most):
         if called and not state.numbered and called[0] in state.free():
             sentence = f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
@@ -524,7 +530,9 @@ def _take_ais(state: State, change: Complex, name: str) -> None:
     if known.sum() < 2:
         return
     rates = np.interp(state.t, state.t[known], rates[known])
-    fits_ = [evidence.fit(change, state.chosen.change(evidence.integral(state.t, one))) for one in (coded, rates)]
+    fits_ = [
+        evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, one))) for one in (coded, rates)
+    ]
     off = abs(abs(fits_[1].scale) / to_si("ais", "r") - 1)
     if fits_[1].left > min(NAMED_LEFT, fits_[0].left) or off > OFF_AIS:
         return
@@ -537,14 +545,14 @@ def _take_ais(state: State, change: Complex, name: str) -> None:
         state.find("missing values", (name,), 0.95, without)
 
 
-def _rates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:
+def _rate_candidates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:
     """Return the columns whose integral resembles the heading, the best first: fit, name, unit, how far off the unit.
 
     change : of the heading over the windows [rad], (W,). The distance from the unit is relative.
     """
     rates = []
     for name in names:
-        fit = evidence.fit(change, state.chosen.change(evidence.integral(state.t, state.columns[name])))
+        fit = evidence.fit_scale(change, state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])))
         scale = max(abs(fit.scale), 1e-12)
         unit, factor = min(UNITS["rad/s"].items(), key=lambda entry: abs(np.log(scale / entry[1])))
         off = abs(scale / factor - 1)

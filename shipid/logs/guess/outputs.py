@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.logs.guess.clues import STRONG, State, unit_in_name, unit_of_another
-from shipid.logs.guess.commands import unique
-from shipid.logs.guess.words import fits, is_order, side_of
+from shipid.logs.guess.commands import unique_name
+from shipid.logs.guess.words import is_order, meaning_scores, side_in_name
 from shipid.physics.signals import SIGNALS, is_shaft, rows_of_role, signal_of, signal_row
 
 
@@ -15,7 +15,7 @@ def reserve_outputs(state: State) -> dict[str, str]:
     chosen: dict[str, str] = {}
     for signal, row in rows_of_role("output").items():
         for name in state.called(signal):
-            scores, unit = fits(name), unit_in_name(name, row.unit)
+            scores, unit = meaning_scores(name), unit_in_name(name, row.unit)
             rivals = [score for meaning, score in scores.items() if meaning != signal]
             clear = unit not in (None, "%") or max(rivals, default=0.0) < scores[signal]
             clear = clear and scores[signal] >= STRONG and unit_of_another(name, signal) is None
@@ -30,16 +30,16 @@ def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
     used: dict[str, int] = {}
     for name, signal in chosen.items():
         row = SIGNALS[signal]
-        component = side_of(name) or _component(state, signal)
+        component = side_in_name(name) or _output_component(state, signal)
         unit = unit_in_name(name, row.unit)
         if unit is None:
             largest = float(np.abs(state.columns[name]).max())
             state.ask((signal,), f"in which unit is {name!r}, up to {largest:.4g}? {row.unit} is a guess")
         why = f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
-        state.suggest(unique(f"{component}.{signal}", used), name, unit or row.unit, 0.8 if unit else 0.4, why)
+        state.suggest(unique_name(f"{component}.{signal}", used), name, unit or row.unit, 0.8 if unit else 0.4, why)
 
 
-def _component(state: State, signal: str) -> str:
+def _output_component(state: State, signal: str) -> str:
     """Component of the only shaft, or of the only angle, in the draft; else that of the signal."""
     usual = SIGNALS[signal].component
     commands = [

@@ -15,11 +15,11 @@ from pymap3d import geodetic2ned
 from shipid.data.dataset import Array
 from shipid.errors import DataError
 from shipid.logs.amounts import is_amount
-from shipid.logs.frames import PARALLEL, convergence
+from shipid.logs.frames import PARALLEL, meridian_convergence
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.words import fits, is_magnetic, is_order, may_be_measured, parts_of
+from shipid.logs.guess.words import is_magnetic, is_order, may_be_measured, meaning_scores, name_parts
 from shipid.logs.mapping import to_si
 
 POOR = 0.2  # misfit of a course and a heading: 1 - agreement
@@ -79,15 +79,15 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
     column can be a position or a heading, or if the ship does not move as in that frame.
     """
     _refuse_ecef(state, file)
-    pairs = list(_named_pairs(state))
+    pairs = list(_position_pairs(state))
     headings = [name for name in state.all_called("psi") if not is_order(name) or may_be_measured(name)]
     headings = [name for name in headings if not is_magnetic(name)] or headings  # beside a true one it is a second one
     if not headings:  # of a plane x, y, theta
         headings = [name for name in state.called("theta") if _all_round(state, name)]
-    sure = [name for name in headings if fits(name).get("psi", 0.0) > fits(name).get("course", 0.0)]
-    best = _best(state, pairs, sure or headings)
+    sure = [name for name in headings if meaning_scores(name).get("psi", 0.0) > meaning_scores(name).get("course", 0.0)]
+    best = _best_pose(state, pairs, sure or headings)
     if best is None or best.misfit > POOR:
-        wide = _search(state, pairs, headings)
+        wide = _search_pose(state, pairs, headings)
         if wide is not None and np.ptp(state.columns[wide.heading]) * to_si(wide.unit, "psi") < TURNED:
             wide = None  # anything that hardly changes keeps to a straight course
         if wide is not None and (best is None or wide.misfit < 0.5 * best.misfit) and wide.misfit < POOR:
@@ -101,7 +101,7 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         missing = "position (north and east, or latitude and longitude)" if not pairs else "heading"
         asked = ("latitude", "longitude", "north", "east", "x", "y") if not pairs else ("psi",)
         numeric = [name for name, text in state.words.items() if re.search(r"\d", text)]
-        name = next((name for name in numeric if any(fits(name).get(one, 0.0) > 0.9 for one in asked)), None)
+        name = next((name for name in numeric if any(meaning_scores(name).get(one, 0.0) > 0.9 for one in asked)), None)
         remedy = "name the columns with --names, or map by hand"
         if name is not None:
             remedy = f"{name!r} holds {state.words[name][:40]!r}, no number: write it as a number with a sign"
@@ -110,7 +110,9 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
         both = [one for one, text in state.words.items() if re.search(r"\d.*[NS].*\d.*[EWO]|[NS].*\d.*[EWO].*\d", text)]
         if both and not pairs:
             remedy = f"{both[0]!r} holds {state.words[both[0]][:40]!r}: write latitude and longitude in two columns"
-        lost = next((one for one in state.other if any(fits(one).get(meant, 0.0) > 0.6 for meant in asked)), None)
+        lost = next(
+            (one for one in state.other if any(meaning_scores(one).get(meant, 0.0) > 0.6 for meant in asked)), None
+        )
         if lost is not None:
             remedy = f"{lost!r} is {state.other[lost]}"
         raise DataError(f"no column can be the {missing}: {remedy}", file=file)
@@ -142,7 +144,7 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
             f"is {said} measured, or a set point? By the name it may be either",
         )
     _ask_for_second(state, best, [name for name in sure if not is_magnetic(name)])
-    _take(state, best, sure)
+    _accept_pose(state, best, sure)
 
 
 def _refuse_ecef(state: State, file: Path) -> None:
@@ -212,15 +214,19 @@ def _by_course(state: State, best: Pose) -> Pose:
 
     A track in x and y and a yaw angle have a mirror image of the same motion; a logged course has none.
     """
-    track = state.chosen.change(plane(state, best.north, best.east, on_globe=False))
+    track = state.chosen.change(local_plane(state, best.north, best.east, on_globe=False))
     size = float(np.sum(np.abs(track)))
     middle = (state.chosen.first + state.chosen.last) // 2
     for name in state.all_called("course"):
-        if name == best.heading or is_order(name) or fits(name).get("psi", 0.0) >= fits(name)["course"]:
+        if (
+            name == best.heading
+            or is_order(name)
+            or meaning_scores(name).get("psi", 0.0) >= meaning_scores(name)["course"]
+        ):
             continue
         unit = unit_in_name(name, "rad") or best.unit
         unit = unit if float(np.ptp(state.columns[name])) <= 1.01 * 2 * np.pi / to_si(unit, "psi") else "deg"
-        course, _ = evidence.heal(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
+        course, _ = evidence.heal_angle(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
         turned = np.exp(1j * to_si(unit, "psi") * course[middle])
         spread = 1.0 - abs(complex(np.mean(turned)))
         same, mirrored = (complex(np.sum(track * way)) / size for way in (np.conj(turned), turned))
@@ -243,14 +249,17 @@ def _by_velocities(state: State, best: Pose) -> Pose:
         (north, east)
         for north in state.called("velocity_north")
         for east in state.called("velocity_east")
-        if not _lettered(north) and not _lettered(east) and _lettered(best.north) and _lettered(best.east)
+        if not _is_letter_axis(north)
+        and not _is_letter_axis(east)
+        and _is_letter_axis(best.north)
+        and _is_letter_axis(best.east)
     ]
-    track = state.chosen.change(plane(state, best.north, best.east, on_globe=False))
+    track = state.chosen.change(local_plane(state, best.north, best.east, on_globe=False))
     for north, east in pairs:
-        path = evidence.integral(state.t, state.columns[north] + 1j * state.columns[east])
+        path = evidence.integrate_rate(state.t, state.columns[north] + 1j * state.columns[east])
         change = state.chosen.change(path)
         frames = {"as it is": track, "east": 1j * np.conj(track), "west": np.conj(track)}
-        left = {way: _left(seen, change) for way, seen in frames.items()}
+        left = {way: _unexplained_share(seen, change) for way, seen in frames.items()}
         likely = min(left, key=left.__getitem__)
         if left[likely] > POOR or left["as it is"] < MIRROR * POOR:
             continue
@@ -258,16 +267,16 @@ def _by_velocities(state: State, best: Pose) -> Pose:
     return best
 
 
-def _lettered(name: str) -> bool:
+def _is_letter_axis(name: str) -> bool:
     """Whether a name says x or y, which each hand lays in another direction, and no word for north or east."""
-    parts = parts_of(name)
+    parts = name_parts(name)
     return any(part.rstrip("0123456789") in ("x", "y") for part in parts) and not DIRECTIONS & {*parts}
 
 
-def _left(seen: Complex, integrated: Complex) -> float:
+def _unexplained_share(seen: Complex, integrated: Complex) -> float:
     """Unexplained share of a track, outliers apart; 1 where the scale is negative."""
-    keep = evidence.robust(seen, integrated)
-    fit = evidence.fit(seen[keep], integrated[keep])
+    keep = evidence.windows_without_outliers(seen, integrated)
+    fit = evidence.fit_scale(seen[keep], integrated[keep])
     return fit.left if fit.scale > 0 else 1.0
 
 
@@ -281,21 +290,21 @@ def _y_is_west(best: Pose, settled: str) -> Pose:
     return replace(best, east_sign=-1, settled=settled, **turn)
 
 
-def _named_pairs(state: State) -> Iterator[tuple[str, str, bool, float]]:
+def _position_pairs(state: State) -> Iterator[tuple[str, str, bool, float]]:
     """Yield north, east, whether they are angles on the globe, and how well the names fit (0 to 1)."""
     for first, second, on_globe in (("latitude", "longitude", True), ("north", "east", False), ("x", "y", False)):
         for north in state.called(first):
             for east in state.called(second):
-                score = (fits(north).get(first, 0.0) + fits(east).get(second, 0.0)) / 2
-                if north != east and (not on_globe or _on_globe(state, north, east)):
+                score = (meaning_scores(north).get(first, 0.0) + meaning_scores(east).get(second, 0.0)) / 2
+                if north != east and (not on_globe or _named_as_latitude(state, north, east)):
                     yield north, east, on_globe, score
 
 
-def _on_globe(state: State, north: str, east: str) -> bool:
+def _named_as_latitude(state: State, north: str, east: str) -> bool:
     return bool(np.abs(state.columns[north]).max() <= 90 and np.abs(state.columns[east]).max() <= 360)
 
 
-def _best(
+def _best_pose(
     state: State,
     pairs: list[tuple[str, str, bool, float]],
     headings: list[str],
@@ -313,12 +322,12 @@ def _best(
     for heading in headings:
         for unit in ("deg",) if _is_in_deg(heading, state.columns[heading]) else ("deg", "rad"):
             turn = 2 * np.pi / to_si(unit, "psi")
-            psi, _ = evidence.heal(state.columns[heading], turn, state.t)
+            psi, _ = evidence.heal_angle(state.columns[heading], turn, state.t)
             turned = np.exp(-1j * to_si(unit, "psi") * psi[middle][::thin])
             angles[heading, unit] = turned, 1.0 - abs(complex(np.mean(turned)))
     best: Pose | None = None
     for north, east, on_globe, score in pairs:
-        track = state.chosen.change(plane(state, north, east, on_globe))[::thin]
+        track = state.chosen.change(local_plane(state, north, east, on_globe))[::thin]
         size = float(np.sum(np.abs(track)))
         if size <= 0:
             continue
@@ -328,7 +337,7 @@ def _best(
             same = complex(np.sum(track * turned)) / size
             mirrored = complex(np.sum(track * np.conj(turned))) / size
             written = unit_in_name(heading, "rad")
-            named = fits(heading).get("psi", 0.0)
+            named = meaning_scores(heading).get("psi", 0.0)
             misfit = 1 - max(abs(same), abs(mirrored))
             quarter = abs(same) >= abs(mirrored) and abs(np.angle(same)) > np.pi / 4  # an acceleration looks like that
             cost = (misfit + 0.003 + 0.1 * quarter) / (spread + 0.01) / (0.3 + score) / (0.3 + named)
@@ -347,11 +356,11 @@ def _is_in_deg(name: str, values: Array) -> bool:
     return whole and _is_compass(name) and unit_in_name(name, "rad") is None
 
 
-def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:
+def _search_pose(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:
     """Return the best hypothesis among all columns, names apart; a heading is rather one whose rate is a column."""
     meanings = ("north", "east", "x", "y", "latitude", "longitude", "psi")
     free = [name for name in state.eligible(*meanings) if len(np.unique(state.columns[name][:2000])) > 10][:SEARCHED]
-    rated = _differentiated(state, free)
+    rated = _columns_with_rate(state, free)
     named = [name for name in headings if name in state.free()]
     places = list(rated) if len(rated) > 2 and state.numbered else free
     angles = list(rated) if rated and state.numbered else free
@@ -361,12 +370,14 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
         return [(a, b, False, 0.3) for a, b in combinations(names, 2) if not {(a, b), (b, a)} & {*globe}]
 
     wide = [*on_plane(places), *((a, b, True, 0.3) for a, b in globe)]
-    best = _best(state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None)
+    best = _best_pose(
+        state, [*pairs, *wide], list(dict.fromkeys([*named, *angles])), 150, rated if state.numbered else None
+    )
     if best is None or (best.misfit > POOR and places is not free):
-        best = _best(state, on_plane(free), free, 150)
+        best = _best_pose(state, on_plane(free), free, 150)
     if best is not None and state.numbered:
         rivals = [name for name in angles if name not in (best.north, best.east, best.heading)]
-        other = _best(state, [(best.north, best.east, best.on_globe, 0.3)], rivals, 150)
+        other = _best_pose(state, [(best.north, best.east, best.on_globe, 0.3)], rivals, 150)
         close = other is not None and other.misfit < 2 * best.misfit + 0.02
         if close and other is not None and rated.get(other.heading, 1.0) < 2 * rated.get(best.heading, 1.0) + 1e-3:
             best, course = (other, best) if other.misfit > best.misfit else (best, other)  # a ship drifts in a turn
@@ -380,34 +391,41 @@ def _search(state: State, pairs: list[tuple[str, str, bool, float]], headings: l
 def _may_be_globe(state: State, north: str, east: str) -> bool:
     """Whether two columns without names may be latitude and longitude: small changes about a place on the Earth."""
     a, b = state.columns[north], state.columns[east]
-    if not _on_globe(state, north, east) or max(np.ptp(a), np.ptp(b)) > 1.0 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+    if (
+        not _named_as_latitude(state, north, east)
+        or max(np.ptp(a), np.ptp(b)) > 1.0
+        or np.ptp(a) == 0.0
+        or np.ptp(b) == 0.0
+    ):
         return False
     return bool(abs(a.mean()) > 20 * np.ptp(a) and abs(b.mean()) > 20 * np.ptp(b))
 
 
-def _differentiated(state: State, names: list[str]) -> dict[str, float]:
+def _columns_with_rate(state: State, names: list[str]) -> dict[str, float]:
     """Return the columns whose rate is another column, with the share of their change that it leaves unexplained."""
     integrated = {}
     others = state.eligible()
-    integrals = {name: state.chosen.change(evidence.integral(state.t, state.columns[name])) for name in others}
+    integrals = {name: state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])) for name in others}
     for name in names:
-        change = state.chosen.change(_unwrapped(state.columns[name], state.t))
-        left = min((evidence.fit(change, integrals[other]).left for other in others if other != name), default=1.0)
+        change = state.chosen.change(_unwrap_column(state.columns[name], state.t))
+        left = min(
+            (evidence.fit_scale(change, integrals[other]).left for other in others if other != name), default=1.0
+        )
         if left < 0.05:
             integrated[name] = left
     return integrated
 
 
-def _unwrapped(values: Array, t: Array) -> Array:
+def _unwrap_column(values: Array, t: Array) -> Array:
     """Return a column that jumps at a whole turn, in degrees or radians, without its jumps; others as they are."""
     steps = np.abs(np.diff(values))
     for turn in (360.0, 2 * np.pi):
         if np.ptp(values) <= 1.01 * turn and np.any(steps > 0.8 * turn) and np.median(steps) < 0.1 * turn:
-            return evidence.heal(values, turn, t)[0]
+            return evidence.heal_angle(values, turn, t)[0]
     return values
 
 
-def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
+def local_plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
     """Return a position as north + i east [m], in the plane that touches the Earth at the first one.
 
     Where the meridians are not parallel to its own, the way from row to row is along them.
@@ -416,7 +434,7 @@ def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
     if not on_globe:
         return np.asarray(a + 1j * b)
     origin = float(a[0]), float(b[0])
-    turn = np.unwrap(convergence(a, b, *origin))
+    turn = np.unwrap(meridian_convergence(a, b, *origin))
     a, b, _ = geodetic2ned(a, b, 0.0, origin[0], origin[1], 0.0)
     place = np.asarray(a + 1j * b)
     if np.max(np.abs(turn)) <= PARALLEL:
@@ -424,25 +442,25 @@ def plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
     return np.append(0.0, np.cumsum(np.diff(place) * np.exp(-0.5j * (turn[1:] + turn[:-1]))))
 
 
-def _take(state: State, best: Pose, sure: list[str]) -> None:
+def _accept_pose(state: State, best: Pose, sure: list[str]) -> None:
     """Take a hypothesis: decide sign, origin and frame of the heading, and ask where nothing decides."""
-    best = _unseen(state, best) if best.misfit > UNSEEN else _other_way(state, _signed(state, best))
+    best = _pose_by_names(state, best) if best.misfit > UNSEEN else _other_way(state, _sign_by_compass(state, best))
     heading, unit = best.heading, best.unit
     turn = 2 * np.pi / to_si(unit, "psi")
-    psi, false = evidence.heal(state.columns[heading], turn, state.t)
+    psi, false = evidence.heal_angle(state.columns[heading], turn, state.t)
     angle = psi * to_si(unit, "psi")
-    mirrored, undecided = _mirrored(best, angle)
+    mirrored, undecided = _heading_mirrored(best, angle)
     compass = _is_compass(heading)
     clear = best.on_globe or all(
-        fits(name).get(meaning, 0.0) > 0.9 and (compass or not _lettered(name))
+        meaning_scores(name).get(meaning, 0.0) > 0.9 and (compass or not _is_letter_axis(name))
         for name, meaning in ((best.north, "north"), (best.east, "east"))
     )
-    reading = _read(state, best, -angle if mirrored else angle, mirrored, clear)
+    reading = _read_heading(state, best, -angle if mirrored else angle, mirrored, clear)
     sign, offset, confidence = reading.sign, reading.offset, reading.confidence
     north, east = (best.east, best.north) if reading.swap else (best.north, best.east)
     agreement = max(abs(best.same), abs(best.mirrored))
     misnamed = not best.on_globe and best.settled in state.columns
-    if misnamed and all(fits(one).get(way, 0.0) > 0.9 for one, way in ((north, "east"), (east, "north"))):
+    if misnamed and all(meaning_scores(one).get(way, 0.0) > 0.9 for one, way in ((north, "east"), (east, "north"))):
         sentence = f"{best.settled!r} agrees with the track only with {north!r} as north and {east!r} as east"
         state.find("north and east swapped", (north, east), agreement, sentence)
     _ask_frame(state, best, clear, compass, undecided, heading not in sure and not state.numbered)
@@ -453,7 +471,7 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
         more = {"sign": -1} if way < 0 else {}
         state.suggest(name, source, length, confidence, why, **more)
     if best.settled in state.columns and (best.east_sign < 0 or sign < 0):
-        words = "counts clockwise from north" if fits(best.settled).get("course") else "is a speed to north"
+        words = "counts clockwise from north" if meaning_scores(best.settled).get("course") else "is a speed to north"
         sentence = f"{best.settled!r} {words}, and agrees with the track only with {north!r} as north"
         state.find("frame by course or velocity", (north, east), 0.9, sentence)
     if false.any():
@@ -467,10 +485,10 @@ def _take(state: State, best: Pose, sure: list[str]) -> None:
     if heading not in sure and not state.numbered:
         confidence = min(confidence, 0.5)
     state.suggest("psi", heading, unit, confidence, f"{why}; in {unit} rather than another unit", **extra)
-    place = plane(state, north, east, best.on_globe) * (1.0 if best.on_globe else to_si(length, "north"))
+    place = local_plane(state, north, east, best.on_globe) * (1.0 if best.on_globe else to_si(length, "north"))
     state.position = np.conj(place) if best.east_sign < 0 else place
     state.psi = sign * angle + np.radians(offset)
-    state.chosen = evidence.windows(state.t, evidence.lively(state.t, state.psi, state.chosen))
+    state.chosen = evidence.row_windows(state.t, evidence.window_length(state.t, state.psi, state.chosen))
 
 
 @dataclass(frozen=True)
@@ -483,7 +501,7 @@ class _Reading:
     swap: bool = False
 
 
-def _mirrored(best: Pose, angle: Array) -> tuple[bool, bool]:
+def _heading_mirrored(best: Pose, angle: Array) -> tuple[bool, bool]:
     """Whether a heading (N,) [rad] counts to port, or east is west, and whether the motion leaves that open."""
     if best.counts:
         return best.counts < 0, False
@@ -494,7 +512,7 @@ def _mirrored(best: Pose, angle: Array) -> tuple[bool, bool]:
     return better or mirrored * MIRROR < same, undecided
 
 
-def _read(state: State, best: Pose, psi: Array, mirrored: bool, clear: bool) -> _Reading:
+def _read_heading(state: State, best: Pose, psi: Array, mirrored: bool, clear: bool) -> _Reading:
     """Decide from where the heading counts, psi (N,) [rad] in the way of the course, and note what is not as usual.
 
     clear : whether the names say what is north and what is east.
@@ -528,7 +546,7 @@ def _read(state: State, best: Pose, psi: Array, mirrored: bool, clear: bool) -> 
     return _Reading(confidence * min(1.0, agreement + 0.1), offset=90.0 * quarter)
 
 
-def _unseen(state: State, best: Pose) -> Pose:
+def _pose_by_names(state: State, best: Pose) -> Pose:
     """Return a hypothesis whose track says nothing of the heading, as of a moored ship, as the names have it."""
     if state.numbered or best.settled:
         return best
@@ -541,7 +559,7 @@ def _of_astern(state: State, best: Pose, psi: Array, quarter: int) -> int:
     """Quarters of a turn from a heading psi (N,) [rad] to the course; 0 where the ship goes astern, which is asked."""
     if abs(quarter) != 2:
         return quarter
-    why = _astern(state, best, psi)
+    why = _astern_reason(state, best, psi)
     if why:
         state.astern = True
         sentence = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
@@ -552,15 +570,18 @@ def _of_astern(state: State, best: Pose, psi: Array, quarter: int) -> int:
     return quarter
 
 
-def _astern(state: State, best: Pose, psi: Array) -> str:
+def _astern_reason(state: State, best: Pose, psi: Array) -> str:
     """Why a ship whose heading psi (N,) [rad] points against her track goes astern; empty where nothing says so.
 
     The speed along the heading gives the track as it is; or the shaft turns astern when she moves.
     """
-    track = state.chosen.change(plane(state, best.north, best.east, best.on_globe))
+    track = state.chosen.change(local_plane(state, best.north, best.east, best.on_globe))
     for name in state.called("u"):
-        change = state.chosen.change(evidence.integral(state.t, state.columns[name] * np.exp(1j * psi)))
-        if fits(name)["u"] > fits(name).get("velocity_north", 0.0) and _left(track, change) < POOR:
+        change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[name] * np.exp(1j * psi)))
+        if (
+            meaning_scores(name)["u"] > meaning_scores(name).get("velocity_north", 0.0)
+            and _unexplained_share(track, change) < POOR
+        ):
             return f"{name!r} along the heading gives the track"
     for name in state.called("n"):
         turns = state.columns[name][state.columns[name] != 0.0]
@@ -571,20 +592,24 @@ def _astern(state: State, best: Pose, psi: Array) -> str:
 
 def _follows_course(state: State, best: Pose) -> bool:
     """Whether a logged course over ground agrees with the track, so that the signs of the positions are right."""
-    track = state.chosen.change(plane(state, best.north, best.east, best.on_globe))
+    track = state.chosen.change(local_plane(state, best.north, best.east, best.on_globe))
     middle = (state.chosen.first + state.chosen.last) // 2
     for name in state.all_called("course"):
-        if name == best.heading or is_order(name) or fits(name).get("psi", 0.0) >= fits(name)["course"]:
+        if (
+            name == best.heading
+            or is_order(name)
+            or meaning_scores(name).get("psi", 0.0) >= meaning_scores(name)["course"]
+        ):
             continue
         for unit in ("deg", "rad"):
-            course, _ = evidence.heal(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
-            same = evidence.agreement(track, to_si(unit, "psi") * course[middle])
+            course, _ = evidence.heal_angle(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
+            same = evidence.course_agreement(track, to_si(unit, "psi") * course[middle])
             if abs(same) > 1.0 - POOR and abs(np.angle(same)) < np.pi / 4:
                 return True
     return False
 
 
-def _signed(state: State, best: Pose) -> Pose:
+def _sign_by_compass(state: State, best: Pose) -> Pose:
     """Return the hypothesis with the sign of latitude and longitude with which a compass agrees with the track.
 
     A ship in the west whose longitude has no sign seems to turn the other way, and one in the south goes astern, too.
@@ -599,10 +624,10 @@ def _signed(state: State, best: Pose) -> Pose:
     if mirrored:
         turned = (best.east,) if phase < np.pi / 4 else (best.north,) if phase > 3 * np.pi / 4 else ()
     elif phase > 3 * np.pi / 4:
-        psi, _ = evidence.heal(state.columns[best.heading], 2 * np.pi / to_si(best.unit, "psi"), state.t)
-        turned = () if _astern(state, best, psi * to_si(best.unit, "psi")) else (best.north, best.east)
+        psi, _ = evidence.heal_angle(state.columns[best.heading], 2 * np.pi / to_si(best.unit, "psi"), state.t)
+        turned = () if _astern_reason(state, best, psi * to_si(best.unit, "psi")) else (best.north, best.east)
     unsigned = all(
-        state.columns[name].min() >= 0 or name in state.negated or OTHER_WAY & {*parts_of(name)} for name in turned
+        state.columns[name].min() >= 0 or name in state.negated or OTHER_WAY & {*name_parts(name)} for name in turned
     )
     agreements = sorted((abs(best.same), abs(best.mirrored)))
     if not turned or not unsigned or (mirrored and (1.0 - agreements[1]) * MIRROR > 1.0 - agreements[0]):
@@ -625,9 +650,9 @@ def _other_way(state: State, best: Pose) -> Pose:
     """Return the hypothesis with latitude and longitude changed round where only so a compass agrees with the track."""
     if not best.on_globe or not _is_compass(best.heading) or abs(best.mirrored) <= abs(best.same):
         return best
-    if not _on_globe(state, best.east, best.north):
+    if not _named_as_latitude(state, best.east, best.north):
         return best
-    other = _best(state, [(best.east, best.north, True, 0.3)], [best.heading])
+    other = _best_pose(state, [(best.east, best.north, True, 0.3)], [best.heading])
     if other is None or other.misfit > POOR or abs(other.mirrored) > abs(other.same):
         return best
     if other.misfit > 0.7 * best.misfit:
@@ -649,7 +674,7 @@ def _length_unit(north: str, east: str) -> str:
 
 
 def _is_compass(name: str) -> bool:
-    parts = set(parts_of(name))
+    parts = set(name_parts(name))
     return bool(parts & COMPASS) and not parts & YAW
 
 
@@ -665,8 +690,8 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
             "answer with --frame ned, enu, zup or ros",
         )
     mirrored = best.misfit < POOR and abs(best.mirrored) > abs(best.same)
-    unnamed = not compass and not set(parts_of(best.heading)) & YAW
-    lettered = _lettered(best.north) and _lettered(best.east)
+    unnamed = not compass and not set(name_parts(best.heading)) & YAW
+    lettered = _is_letter_axis(best.north) and _is_letter_axis(best.east)
     if (
         not best.on_globe
         and clear

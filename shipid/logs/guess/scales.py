@@ -15,8 +15,8 @@ from pymap3d import geodetic2ned
 from shipid.data.dataset import Array
 from shipid.logs.guess.clues import State, factor_in_name, unit_in_name
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.words import fits, units_in
-from shipid.logs.mapping import UNITS, degrees_of
+from shipid.logs.guess.words import meaning_scores, units_in_name
+from shipid.logs.mapping import UNITS, degrees_and_minutes
 from shipid.units import DEGREE
 
 TURNS = {400.0: "gon", 3600.0: "tenths of a degree", 36000.0: "hundredths of a degree", 6400.0: "mils"}
@@ -52,14 +52,14 @@ def take_scales(state: State) -> None:
     """Put into degrees, in place, what is in other numbers; `state.scaled` and `state.unit_of` say so to the draft."""
     for name, values in state.columns.items():
         if (factor := factor_in_name(name)) != 1.0:
-            _scale(state, name, factor, f"its unit has a prefix: times {factor:g}")
+            _set_scale(state, name, factor, f"its unit has a prefix: times {factor:g}")
             continue
-        scores = fits(name)
+        scores = meaning_scores(name)
         best = max(scores, key=lambda one: scores[one], default="")
         if best in ANGLES or best in ("delta", "phi", "theta"):
-            turn = _written(name) or (_turn(values) if best in ANGLES else None)
+            turn = _turn_in_name(name) or (_whole_turn(values) if best in ANGLES else None)
             if turn is not None:
-                _scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
+                _set_scale(state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}")
     _take_positions(state)
     _take_speeds(state)
     _by_track(state)
@@ -71,7 +71,7 @@ def _take_positions(state: State) -> None:
         written = {unit_in_name(name, "rad") for name in (north, east)}
         if written == {"rad"} or (written == {None} and _in_radians(state, north, east)):
             for name in (north, east):
-                _scale(state, name, 1.0 / DEGREE, "")
+                _set_scale(state, name, 1.0 / DEGREE, "")
                 state.scaled.pop(name)  # the unit says it
                 state.units[name] = "rad"
         both = np.abs(state.columns[north]), np.abs(state.columns[east])
@@ -79,16 +79,16 @@ def _take_positions(state: State) -> None:
             _take_sides(state, north, east)
             continue
         arc = next((part for part, words in ARC.items() if all(_has_unit(one, words) for one in (north, east))), None)
-        if arc is not None and _on_globe(both, arc):
+        if arc is not None and _within_globe(both, arc):
             for name in (north, east):
-                _scale(state, name, arc, f"{'minutes' if arc == 1 / 60 else 'seconds'} of arc, as its name says")
-        elif all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _on_globe(both, FINE):
-            fine = _fine(state, north, east)
+                _set_scale(state, name, arc, f"{'minutes' if arc == 1 / 60 else 'seconds'} of arc, as its name says")
+        elif all(np.mean(one % 1 == 0) > WHOLE and one.max() > 1e6 for one in both) and _within_globe(both, FINE):
+            fine = _angle_fraction(state, north, east)
             for name in (north, east):
-                _scale(state, name, fine, f"whole numbers of {PARTS[fine]}")
+                _set_scale(state, name, fine, f"whole numbers of {PARTS[fine]}")
         elif all(_is_ddmm(one) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
             for name in (north, east):
-                state.columns[name] = degrees_of(state.columns[name])
+                state.columns[name] = degrees_and_minutes(state.columns[name])
                 state.spikes.pop(name, None)
                 state.units[name] = "ddmm"
             _take_sides(state, north, east)
@@ -100,7 +100,7 @@ def _take_positions(state: State) -> None:
 
 def _has_unit(name: str, words: str) -> bool:
     """Whether a name has a unit that is one of these words, a regular expression."""
-    return any(re.fullmatch(words, unit.strip().lower()) for unit in units_in(name))
+    return any(re.fullmatch(words, unit.strip().lower()) for unit in units_in_name(name))
 
 
 def _in_radians(state: State, north: str, east: str) -> bool:
@@ -116,12 +116,12 @@ def _in_radians(state: State, north: str, east: str) -> bool:
     return told[1] != 1.0 and told[3] < DOUBTED
 
 
-def _fine(state: State, north: str, east: str) -> float:
+def _angle_fraction(state: State, north: str, east: str) -> float:
     """Part of a degree [deg] that whole numbers count, as their names or the speed show; else asked."""
-    if all(any(OF_AIS.fullmatch(unit.strip().lower()) for unit in units_in(name)) for name in (north, east)):
+    if all(any(OF_AIS.fullmatch(unit.strip().lower()) for unit in units_in_name(name)) for name in (north, east)):
         return AIS
     both = np.abs(state.columns[north]), np.abs(state.columns[east])
-    parts = [fine for fine in PARTS if _on_globe(both, fine)]
+    parts = [fine for fine in PARTS if _within_globe(both, fine)]
     if len(parts) == 1:
         return parts[0]
     names = f"{north!r} and {east!r}"
@@ -143,7 +143,7 @@ def _told_by_speed(state: State, north: str, east: str, parts: list[float]) -> t
 
     Returned are the column of the speed, the best and the next one, and how far off the best is, in parts of the next.
     """
-    way = {fine: _way(state, *(fine * state.columns[name] for name in (north, east))) for fine in parts}
+    way = {fine: _distance_run(state, *(fine * state.columns[name] for name in (north, east))) for fine in parts}
     for name in [*state.called("speed"), *state.called("u")]:
         ran = state.chosen.change(np.cumsum(np.abs(state.columns[name]) * np.gradient(state.t)))
         length, written = float(np.sum(np.abs(ran))), unit_in_name(name, "m/s")
@@ -152,7 +152,7 @@ def _told_by_speed(state: State, north: str, east: str, parts: list[float]) -> t
         off = {
             fine: min(
                 abs(np.log(max(way[fine], 1e-12) / (length * unit)))
-                for unit in ([UNITS["m/s"][written]] if written else _speeds_of(state, name))
+                for unit in ([UNITS["m/s"][written]] if written else _speed_units(state, name))
             )
             for fine in parts
         }
@@ -161,7 +161,7 @@ def _told_by_speed(state: State, north: str, east: str, parts: list[float]) -> t
     return None
 
 
-def _speeds_of(state: State, name: str) -> list[float]:
+def _speed_units(state: State, name: str) -> list[float]:
     """Units [m/s] that a speed without one in its name may have: whole numbers may be parts of a knot."""
     whole = np.mean(state.columns[name] % 1 == 0) > WHOLE
     parts = [part * UNITS["m/s"]["kn"] for part in KNOTS] if whole else []
@@ -170,10 +170,10 @@ def _speeds_of(state: State, name: str) -> list[float]:
 
 def _take_speeds(state: State) -> None:
     """Put into knots a speed in whole parts of a knot, as its name or the track says."""
-    track = _track(state)
+    track = _track_changes(state)
     for name in [*state.called("speed")]:
         values = state.columns[name]
-        said = [unit.strip().lower() for unit in units_in(name)]
+        said = [unit.strip().lower() for unit in units_in_name(name)]
         part = next((part for part, words in OF_KNOTS.items() if any(re.fullmatch(words, one) for one in said)), None)
         if part is None and track is not None and unit_in_name(name, "m/s") is None:
             length = float(np.sum(np.abs(state.chosen.change(np.cumsum(np.abs(values) * np.gradient(state.t))))))
@@ -181,10 +181,10 @@ def _take_speeds(state: State) -> None:
             whole = np.mean(values % 1 == 0) > WHOLE
             part = next((part for part in KNOTS if whole and abs(found / part - 1.0) < OFF_KNOT), None)
         if part is not None:
-            _scale(state, name, part, f"whole numbers of {KNOTS[part]}")
+            _set_scale(state, name, part, f"whole numbers of {KNOTS[part]}")
 
 
-def _way(state: State, latitude: Array, longitude: Array) -> float:
+def _distance_run(state: State, latitude: Array, longitude: Array) -> float:
     """Way [m] over the windows, of positions (N,) [deg]."""
     north, east, _ = geodetic2ned(latitude, longitude, 0.0, float(latitude[0]), float(longitude[0]), 0.0)
     return float(np.sum(np.abs(state.chosen.change(np.asarray(north + 1j * east)))))
@@ -195,17 +195,17 @@ def _by_track(state: State) -> None:
 
     What a compass in degrees cannot show is decided so; below that it is asked.
     """
-    track = _track(state)
+    track = _track_changes(state)
     for name, values in state.columns.items():
-        scores = fits(name)
+        scores = meaning_scores(name)
         best = max(scores, key=lambda one: scores[one], default="")
         if best not in ("psi", "course") or name in state.scaled or unit_in_name(name, "rad") or track is None:
             continue
         top, low = float(values.max()), float(values.min())
-        if top <= 2.2 * np.pi or _jumps(values):
+        if top <= 2.2 * np.pi or _angle_jumps(values):
             continue
         left = {
-            turn: _misfits(state, track, values, turn)
+            turn: _heading_misfits(state, track, values, turn)
             for turn in (360.0, *TURNS)
             if top <= 1.01 * turn or turn == 360.0
         }
@@ -215,7 +215,7 @@ def _by_track(state: State) -> None:
         better = degrees[0] > OFF and left[turn][0] * BETTER < degrees[0] and left[turn][0] < AGREES
         offset = 2.0 * degrees[1] < left[turn][1]  # degrees with another zero
         if better and not offset and top > BEYOND and low >= 0.0:
-            _scale(
+            _set_scale(
                 state, name, 360.0 / turn, f"a whole turn is {turn:g}: {TURNS[turn]}, with which it keeps to the track"
             )
         elif (better and not offset) or (top > TWICE and degrees[0] > AGREES):
@@ -226,7 +226,7 @@ def _by_track(state: State) -> None:
             state.ask(about, f"{words} = 0.9, 0.1, 0.01)? deg is a guess{why}")
 
 
-def _track(state: State) -> Complex | None:
+def _track_changes(state: State) -> Complex | None:
     """Changes (W,) of the position over the windows, north + i east; None where no names say a position."""
     for meanings in (("latitude", "longitude"), ("north", "east"), ("x", "y")):
         for north, east in product(*(state.called(one) for one in meanings)):
@@ -241,7 +241,7 @@ def _track(state: State) -> Complex | None:
     return None
 
 
-def _misfits(state: State, track: Complex, values: Array, turn: float) -> tuple[float, float]:
+def _heading_misfits(state: State, track: Complex, values: Array, turn: float) -> tuple[float, float]:
     """1 - cos of the angle between a track and a heading in parts of a whole turn: as it is, and with any other zero.
 
     It may count from any side of the world and to both sides.
@@ -254,7 +254,7 @@ def _misfits(state: State, track: Complex, values: Array, turn: float) -> tuple[
     return 1.0 - max(zeros), 1.0 - max(map(abs, both))
 
 
-def _jumps(values: Array) -> bool:
+def _angle_jumps(values: Array) -> bool:
     """Whether an angle jumps by most of its range, at the end of a turn."""
     return bool(np.any(np.abs(np.diff(values)) > 0.8 * float(np.ptp(values))))
 
@@ -272,7 +272,7 @@ def _take_sides(state: State, north: str, east: str) -> None:
         state.find("sign of a position", (name,), 0.95, f"{name!r} has no sign, and a column of letters says {minus}")
 
 
-def _scale(state: State, name: str, factor: float, why: str) -> None:
+def _set_scale(state: State, name: str, factor: float, why: str) -> None:
     state.columns[name] = state.columns[name] * factor
     state.scaled[name] = factor, why
     if name in state.spikes:
@@ -280,24 +280,24 @@ def _scale(state: State, name: str, factor: float, why: str) -> None:
         state.spikes[name] = rows, size * factor
 
 
-def _written(name: str) -> float | None:
+def _turn_in_name(name: str) -> float | None:
     """Whole turn in the unit that a name has in brackets or at its end."""
     last = re.split(r"[_ ]", name.strip())[-1]
-    said = [*units_in(name), *([last] if last != name.strip() else [])]
+    said = [*units_in_name(name), *([last] if last != name.strip() else [])]
     return next(
         (turn for turn, words in WRITTEN.items() if any(re.fullmatch(words, one.strip().lower()) for one in said)), None
     )
 
 
-def _turn(values: Array) -> float | None:
+def _whole_turn(values: Array) -> float | None:
     """Whole turn of an angle that jumps, where it is none of degrees or radians."""
     span = float(np.ptp(values))
-    if not span > 0 or not _jumps(values):
+    if not span > 0 or not _angle_jumps(values):
         return None
     return next((turn for turn in TURNS if CLOSE * turn < span <= turn), None)
 
 
-def _on_globe(both: Iterable[Array], factor: float) -> bool:
+def _within_globe(both: Iterable[Array], factor: float) -> bool:
     return all(float(one.max()) * factor <= most for one, most in zip(both, (90.0, 360.0), strict=True))
 
 

@@ -14,33 +14,41 @@ import pandas as pd
 
 from shipid.data.dataset import Array
 from shipid.errors import DataError
-from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, parted
+from shipid.logs.amounts import UNIT_WORDS, are_one, is_amount, split_amounts
 from shipid.logs.cells import OFF_ONE
 from shipid.logs.formats import LOOKED_AT, SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
     are_whole,
     clock_once,
+    clock_restarts,
     column_called,
     doubts_on,
     is_clock,
     other_clocks,
-    restarts,
-    zone_in,
+    zone_questions,
 )
-from shipid.logs.guess.layout import format_of, format_of_sheet, table_below
-from shipid.logs.guess.words import NO_VALUE, fits, is_run, parts_of, units_in
-from shipid.logs.mapping import SIDES, degrees_in_parts, degrees_in_text, degrees_to_sides, names_of, size_of, yaw_of
+from shipid.logs.guess.layout import format_of_sheet, guess_format, table_below
+from shipid.logs.guess.words import NO_VALUE, is_run, meaning_scores, name_parts, units_in_name
+from shipid.logs.mapping import (
+    SIDES,
+    degrees_in_parts,
+    degrees_in_text,
+    degrees_to_sides,
+    quaternion_size,
+    quaternion_yaw,
+    source_columns,
+)
 from shipid.logs.readers import (
     LONGEST_LINE,
     READERS,
+    check_line_width,
     has_nul,
     in_points,
     parse_text,
-    read_table,
+    read_log_table,
     refuse_power_cut,
     require_file,
-    widest,
 )
 from shipid.logs.workbook import NOT_CALCULATED
 
@@ -107,7 +115,7 @@ class Sniffed:
         return READERS[self.form.get("kind", "text")].scattered
 
 
-def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
+def recognise_log(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     """Recognise the format of a log and read it; `names` are the columns of a text log without a header.
 
     Raises
@@ -122,7 +130,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
     if not head[:200_000].strip():
         raise DataError("the file is empty", file=file)
-    form = format_of(head[:200_000], file, names)
+    form = guess_format(head[:200_000], file, names)
     notes: tuple[str, ...] = ()
     sampled = False
     if form.get("kind") == "sheet":
@@ -131,9 +139,9 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     if isinstance(model, TextFormat):
         if has_nul(head, model):
             refuse_power_cut(head, file)
-        widest(head, model.separator, file)
+        check_line_width(head, model.separator, file)
         sampled = size > SAMPLE
-        lines = _sample(file, model.encoding, size)
+        lines = _text_sample(file, model.encoding, size)
     if isinstance(model, TableFormat):
         table = parse_text(io.StringIO(lines), model.text().model_copy(update={"ragged": "drop"}), file)
         if sampled:
@@ -148,32 +156,32 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         if len(table) < 2:
             raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
     else:
-        table = read_table(file, model, "time")
+        table = read_log_table(file, model, "time")
         notes = tuple(table.attrs.get("notes", ()))
         if READERS[form["kind"]].scattered:  # a time alone, before the first fix, is no row
             table = table.loc[table.drop(columns="time").notna().any(axis=1)].reset_index(drop=True)
     other: dict[str, str] = table.attrs.get("other", {})
     _refuse_ships(table, file)
     table, in_units, mixed = _without_units(table)
-    columns, words = _numbers(table, form.get("decimal", "."), form.get("thousands"))
-    in_parts = _degrees(columns)
-    turned = _quaternions(columns)
+    columns, words = _number_columns(table, form.get("decimal", "."), form.get("thousands"))
+    in_parts = _degree_columns(columns)
+    turned = _quaternion_columns(columns)
     rarely = [name for name, values in columns.items() if np.isnan(values).mean() > 0.5]
     in_text, letters = _in_text(table, [*words, *rarely], form.get("decimal", "."))
     columns |= dict(in_text.values()) | _to_sides(table, [*words, *rarely], form.get("decimal", "."))
     notes += (f"{form['thousands']!r} is read as a mark of thousands",) if "thousands" in form else ()
     if isinstance(model, TableFormat):
-        missing = [*_words_for_nothing(table, columns, model), *_sentinels(table, columns)]
+        missing = [*_words_for_nothing(table, columns, model), *_missing_value_texts(table, columns)]
         if missing:
             form["missing"] = [*model.missing, *missing]
             notes += (f"{', '.join(map(repr, missing))} stand{'s' * (len(missing) == 1)} for a value that is missing",)
     made = {name: degrees_in_parts([columns[part] for part in parts]) for name, parts in in_parts.items()}
-    made |= {name: yaw_of([columns[part] for part in parts]) for name, parts in turned.items()}
+    made |= {name: quaternion_yaw([columns[part] for part in parts]) for name, parts in turned.items()}
     made |= {name: values for name, (source, values) in in_text.items() if name != source}
     in_parts |= turned | in_units
     in_parts |= {name: (in_text[name][0],) for name in made.keys() & in_text.keys()}
     words = [name for name in words if name not in columns]
-    runs, since = restarts(table, columns)
+    runs, since = clock_restarts(table, columns)
     try:
         clock, t, once = clock_once(table, columns if since is None else columns | since, file)
     except DataError:
@@ -190,7 +198,7 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
         message += "can be joined to these ([file.<name>] of a mapping), and other runs can be files of one folder"
         raise DataError(message, file=file, path=f"{place} {below[0]}") from None
     columns = {name: values[once] for name, values in (columns | made).items()}
-    named = {one for key in ("from", "date") if key in clock for one in names_of(clock[key])}
+    named = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
     named |= {part for parts in in_parts.values() for part in parts}
     texts = {name: column_called(table, name).dropna().astype(str).str.strip() for name in words}
     says = {name: next(filter(None, column), "") for name, column in texts.items()}
@@ -210,11 +218,22 @@ def sniff(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     seams = BLOCKS if sampled else sum(runs.values()) - len(runs)
     doubts = tuple(doubts_on(table.loc[once], clock, t))
     above = "\n".join(lines.splitlines()[: model.skip_rows]) if isinstance(model, TableFormat) else ""
-    doubts += tuple(zone_in(above, table, clock))
+    doubts += tuple(zone_questions(above, table, clock))
     doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(other_clocks(table.loc[once], columns, clock, t))
     return Sniffed(
-        form, clock, t, kept, notes + empty, seams, runs, letters | _sides(table, words), says, other, doubts, in_parts
+        form,
+        clock,
+        t,
+        kept,
+        notes + empty,
+        seams,
+        runs,
+        letters | _side_columns(table, words),
+        says,
+        other,
+        doubts,
+        in_parts,
     )
 
 
@@ -222,12 +241,12 @@ def _as_number(name: str, text: str) -> str:
     """What to do with a column of words whose name says a quantity and whose texts have a number, such as P12.5."""
     if text.startswith("="):
         return f": {text[:40]!r} is {NOT_CALCULATED}"
-    quantity = any(meaning and score > 0.6 for meaning, score in fits(name).items())
+    quantity = any(meaning and score > 0.6 for meaning, score in meaning_scores(name).items())
     remedy = f", such as {text[:40]!r}: write it as a number with a sign"
     return remedy if quantity and re.search(r"\d", text) else ""
 
 
-def _sample(file: Path, encoding: str, size: int) -> str:
+def _text_sample(file: Path, encoding: str, size: int) -> str:
     """Return the text of a log; of a large one its head, and whole lines from places spread over it."""
     with file.open("rb") as stream:
         if size <= SAMPLE:
@@ -265,7 +284,7 @@ def _refuse_ships(table: pd.DataFrame, file: Path) -> None:
 
 def _says_ship(name: str) -> bool:
     """Whether the name of a column says a ship, or its name or number, and nothing else of it."""
-    parts = {*parts_of(name)}
+    parts = {*name_parts(name)}
     return bool(parts & SHIP) and parts <= SHIP | NAMES
 
 
@@ -285,27 +304,27 @@ def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[s
     mixed: dict[str, str] = {}
     for place, name in enumerate(names):
         column = table.iloc[:, place]
-        other = not name or {*SIDES} & fits(name).keys() or is_clock(name)
+        other = not name or {*SIDES} & meaning_scores(name).keys() or is_clock(name)
         if other or not (column.dtype == object or pd.api.types.is_string_dtype(column.dtype)):
             continue
         first = column.dropna().head(LOOKED_AT).astype(str)
         if not first.map(lambda cell: is_amount(cell.strip())).any():
             continue
-        bare, units = parted(column.fillna("").astype(str).str.strip())
+        bare, units = split_amounts(column.fillna("").astype(str).str.strip())
         said = [*units[units.ne("")].value_counts().index]
         if not any(are_one(said, unit) for unit in UNIT_WORDS):
             mixed[name] = " and ".join(map(repr, said[:3]))
             continue
         result.isetitem(place, bare.to_numpy(dtype=object))
-        if not units_in(name):
-            north = said[0] == "M" and {"psi", "course"} & fits(name).keys()
+        if not units_in_name(name):
+            north = said[0] == "M" and {"psi", "course"} & meaning_scores(name).keys()
             names[place] = f"{name} [{'deg M' if north else said[0]}]"
             renamed[names[place]] = (name,)
     result.columns = pd.Index(names)
     return result, renamed, mixed
 
 
-def _numbers(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:
+def _number_columns(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:
     """Return the columns that are mostly numbers, and the names of the columns of words."""
     columns: dict[str, Array] = {}
     words = []
@@ -331,19 +350,19 @@ def _numbers(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[
     return columns, words
 
 
-def _degrees(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
+def _degree_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
     """Latitudes and longitudes in columns of whole degrees, minutes and perhaps seconds, by the names of all."""
     found: dict[str, tuple[str, ...]] = {}
     names = list(columns)
     for place, name in enumerate(names[:-1]):
-        meant = next((one for one in ("latitude", "longitude") if fits(name).get(one, 0.0) > 0.5), None)
+        meant = next((one for one in ("latitude", "longitude") if meaning_scores(name).get(one, 0.0) > 0.5), None)
         if meant is None or any(name in parts for parts in found.values()) or not are_whole(columns[name], 180.0):
             continue
         parts = [name]
         for other in names[place + 1 : place + 3]:
-            last = parts_of(other)[-1:] + tuple(units_in(other))
-            of_angle = meant in fits(other) or bool(MINUTES & {*last})
-            if not of_angle or (meant != "longitude" and "longitude" in fits(other)):
+            last = name_parts(other)[-1:] + tuple(units_in_name(other))
+            of_angle = meant in meaning_scores(other) or bool(MINUTES & {*last})
+            if not of_angle or (meant != "longitude" and "longitude" in meaning_scores(other)):
                 break
             if not np.nanmax(np.abs(columns[other]), initial=0.0) < 60.0:
                 break
@@ -355,14 +374,14 @@ def _degrees(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _quaternions(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
+def _quaternion_columns(columns: dict[str, Array]) -> dict[str, tuple[str, ...]]:
     """Yaw angle -> columns x, y, z, w of a quaternion: names that differ by these letters alone, and its size is 1."""
     found: dict[str, tuple[str, ...]] = {}
     for name in columns:
         place = name.lower().rfind("w")
         four = tuple(f"{name[:place]}{letter}{name[place + 1 :]}" for letter in ("XYZW" if "W" in name else "xyzw"))
         if place >= 0 and {*four} <= columns.keys():
-            size = size_of([columns[one] for one in four])
+            size = quaternion_size([columns[one] for one in four])
             known = np.isfinite(size) & (size > 0)
             if known.any() and np.all(np.abs(size[known] - 1.0) < OFF_ONE):
                 found[f"{name[:place].rstrip('._/ [(')} yaw".strip()] = four
@@ -380,7 +399,7 @@ def _in_text(
     letters: set[str] = set()
     for name in filter(None, names):
         texts = in_points(column_called(table, name).astype(str).str.strip(), decimal, None)
-        meant = [one for one in SIDES if fits(name).get(one, 0.0) > 0.5]
+        meant = [one for one in SIDES if meaning_scores(name).get(one, 0.0) > 0.5]
         read = {one: degrees_in_text(texts, SIDES[one]) for one in meant or SIDES}
         known = {one: values for one, values in read.items() if np.mean(np.isfinite(values)) > 0.5}
         # a time of day may be both: then they are equal
@@ -397,14 +416,14 @@ def _to_sides(table: pd.DataFrame, names: list[str], decimal: str) -> dict[str, 
     """Name -> degrees (N,) of each column of angles to the sides of the ship, such as P12.5; those to starboard > 0."""
     found = {}
     for name in names:
-        if max(fits(name).get(one, 0.0) for one in ("delta", "alpha", "phi")) > 0.5:
+        if max(meaning_scores(name).get(one, 0.0) for one in ("delta", "alpha", "phi")) > 0.5:
             angles = degrees_to_sides(in_points(column_called(table, name).astype(str).str.strip(), decimal, None))
             if np.mean(np.isfinite(angles)) > 0.5:
                 found[name] = angles
     return found
 
 
-def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
+def _side_columns(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
     """Return the letters of the columns that hold a side of the Earth alone: N or S, E or W.
 
     Such a column is beside that of a position, or is called so: the letters of another say a status.
@@ -418,7 +437,7 @@ def _sides(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
             else {*column_called(table, name).dropna().astype(str).str.strip().str.upper()} - {""}
         )
         for meaning, both in (("latitude", "NS"), ("longitude", "EW")):
-            near = any(meaning in fits(one) for one in names[max(0, index - 1) : index + 2])
+            near = any(meaning in meaning_scores(one) for one in names[max(0, index - 1) : index + 2])
             if held and held <= set(both) and (near or both.lower() in re.sub("[^a-z]", "", name.lower())):
                 letters |= held
     return frozenset(letters)
@@ -434,7 +453,7 @@ def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: Tab
     return [text for text in texts if text not in form.missing and NO_VALUE.fullmatch(text.lower())]
 
 
-def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
+def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
     """Return the texts that stand for a missing value, and set them to NaN: far beyond all other values of a column.
 
     A shaft that makes 98 and 99 rpm, or stands and then makes 99, has no missing value: such a number must be twice as
@@ -442,7 +461,7 @@ def _sentinels(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
     """
     texts: dict[str, None] = {}
     for name, values in columns.items():
-        never = {value: most for one in fits(name) for value, most in NOT_AVAILABLE.get(one, {}).items()}
+        never = {value: most for one in meaning_scores(name) for value, most in NOT_AVAILABLE.get(one, {}).items()}
         finite = values[np.isfinite(values)]
         ends = {float(finite.max()), float(finite.min())} if len(finite) else set()
         for value in dict.fromkeys([*SENTINELS, *never, *ends]):
@@ -500,7 +519,7 @@ def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
         others = values[~hit & np.isfinite(values)]
         if not hit.any() or len(others) < 2 or others.min() < 0.0:
             continue
-        meant = fits(name).keys()
+        meant = meaning_scores(name).keys()
         lost = bool({"speed", "V_w"} & meant and np.any(others % 1))  # whole knots may be one astern
         lost |= bool({"psi", "course", "beta_w"} & meant and others.max() > 180.0)
         lost |= "n" in meant and others.min() > 10.0

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import DataError, ShipidError
-from shipid.logs.guess.sniff import SAMPLE, Sniffed, sniff
+from shipid.logs.guess.sniff import SAMPLE, Sniffed, recognise_log
 from shipid.logs.guess.words import is_run
-from shipid.logs.importing import run_of
-from shipid.logs.kinds import declared_kind
+from shipid.logs.importing import run_name
+from shipid.logs.kinds import kind_in_name
 
 ENDINGS = (".csv", ".txt", ".dat", ".log", ".tsv", ".asc", ".xlsx", ".ods", ".parquet", ".mat", ".nmea")
 PAUSE, MOST = 1e4, 24  # s between two files; files that decide, spread over all
@@ -24,7 +24,7 @@ STOPPED, FEWEST, HELD = 20.0, 10.0, 10  # usual steps, and s, of a pause between
 
 
 @dataclass(frozen=True)
-class Source:
+class GuessFiles:
     """The files of a guess.
 
     path : the file, or the folder. pattern : key `runs` of [source]; None for a single file. files : run -> file.
@@ -43,24 +43,24 @@ class Source:
     sniffed: Sniffed
 
 
-def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
+def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
     """Read a file, a folder or a glob (`trials/*/ZZ*.csv`); `names` are the columns of files without a header.
 
     Raises
     ------
     DataError : the file, or every file of a folder, cannot be read as a log; each is named with its reason.
     """
-    folder, patterns = _patterns(path)
+    folder, patterns = _file_patterns(path)
     if not patterns:
-        log = sniff(path, names)
-        parts, held = _parts({path: log}, by_pause=False)
-        return Source(path, None, {path.stem: path}, {}, {}, parts, held, log)
+        log = recognise_log(path, names)
+        parts, held = _run_parts({path: log}, by_pause=False)
+        return GuessFiles(path, None, {path.stem: path}, {}, {}, parts, held, log)
     sniffed: dict[Path, Sniffed] = {}
     skipped: dict[str, str] = {}
     for pattern in patterns:  # a folder of one log and a readme has two endings: that of the log is taken
         for file in sorted(file for file in folder.glob(pattern) if file.is_file()):
             try:
-                sniffed[file] = sniff(file, names)
+                sniffed[file] = recognise_log(file, names)
             except ShipidError as error:
                 skipped[file.relative_to(folder).as_posix()] = error.message
         if sniffed:
@@ -74,14 +74,14 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> Source:
         first = next(iter(skipped))
         more = f"; so are {len(skipped) - 1} others" if len(skipped) > 1 else ""
         raise DataError(f"no file can be read: {first}: {skipped[first]}{more}", file=folder)
-    kept = _alike(sniffed, folder, skipped)
-    runs = {run_of(file, folder, pattern): file for file in kept}
-    kinds = {run: kind for run, file in runs.items() if (kind := declared_kind(file.stem))}
-    parts, held = _parts(kept, by_pause=True)
-    return Source(folder, pattern, runs, skipped, kinds, parts, held, _joined(list(kept.values())))
+    kept = _files_alike(sniffed, folder, skipped)
+    runs = {run_name(file, folder, pattern): file for file in kept}
+    kinds = {run: kind for run, file in runs.items() if (kind := kind_in_name(file.stem))}
+    parts, held = _run_parts(kept, by_pause=True)
+    return GuessFiles(folder, pattern, runs, skipped, kinds, parts, held, _join_files(list(kept.values())))
 
 
-def _parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, Any], int]:
+def _run_parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, Any], int]:
     """Return the keys of [parts] for files of several runs, and the number of runs; nothing, 0 where each holds one.
 
     A column that says the run is taken if its values are held; pauses of the clock that are long beside all other
@@ -104,7 +104,7 @@ def _parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, Any]
         keys["pause"] = max(keys["pause"], float(f"{rest:.2g}") + usual)
     if not keys:
         return {}, 0
-    return keys, sum(_count(log, column, keys.get("pause", np.inf)) for log in logs.values())
+    return keys, sum(_count_runs(log, column, keys.get("pause", np.inf)) for log in logs.values())
 
 
 def _is_held(name: str, log: Sniffed) -> bool:
@@ -116,12 +116,12 @@ def _is_held(name: str, log: Sniffed) -> bool:
     return bool(np.median(stretches) >= HELD)
 
 
-def _count(log: Sniffed, column: str | None, pause: float) -> int:
+def _count_runs(log: Sniffed, column: str | None, pause: float) -> int:
     new = np.diff(log.t) > pause
     return 1 + int(np.sum(new | (np.diff(log.columns[column]) != 0) if column is not None else new))
 
 
-def _patterns(path: Path) -> tuple[Path, list[str]]:
+def _file_patterns(path: Path) -> tuple[Path, list[str]]:
     """Return folder and patterns of a folder or glob, that of most files first; a file has no pattern."""
     text = path.as_posix()
     if "*" in text and not path.exists():
@@ -141,7 +141,7 @@ def _patterns(path: Path) -> tuple[Path, list[str]]:
     return path, [f"{deep[ending]}*{ending}" for ending in sorted(files, key=lambda ending: size[ending], reverse=True)]
 
 
-def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) -> dict[Path, Sniffed]:
+def _files_alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) -> dict[Path, Sniffed]:
     """Return the files of the commonest columns and format; the others are skipped with a reason."""
 
     def written(log: Sniffed) -> tuple[object, ...]:
@@ -168,7 +168,7 @@ def _alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) 
     return kept
 
 
-def _joined(logs: list[Sniffed]) -> Sniffed:
+def _join_files(logs: list[Sniffed]) -> Sniffed:
     """Return the rows of several files one after another, `PAUSE` s apart; those of one file by its clock."""
     first = logs[0]
     if len(logs) == 1:

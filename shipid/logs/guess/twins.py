@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from shipid.logs.guess.clues import LIKELY, SEEN, STRONG, State, unit_in_name, unit_of_another
-from shipid.logs.guess.words import fits, is_order, parts_of, side_of, words_of_side
+from shipid.logs.guess.words import is_order, meaning_scores, name_parts, side_in_name, words_of_side
 from shipid.logs.mapping import UNITS
 
 OF_THROTTLES = frozenset("throttle throttles thrust thruster motor motors engine esc pwm power gas".split())
@@ -25,7 +25,7 @@ def choose_twins(state: State, r: np.ndarray | None) -> None:
         return
     found = {
         pair: state.effect(r, state.columns[pair[0]] - state.columns[pair[1]])
-        for pair in twins(state)
+        for pair in twin_columns(state)
         if all(_may_be_a_throttle(name) for name in pair)
     }
     pair = max(found, key=lambda one: abs(found[one]), default=None)
@@ -61,13 +61,13 @@ def _say_sides(state: State, pair: tuple[str, str], effect: float) -> None:
         state.find("sides of the screws", pair, 0.6, sentence)
 
 
-def twins(state: State) -> list[tuple[str, str]]:
+def twin_columns(state: State) -> list[tuple[str, str]]:
     """Return the pairs of free columns, port and starboard, whose names are equal but for the side."""
     sides: dict[tuple[str, ...], dict[str, str]] = {}
     for name in state.free():
-        side = side_of(name)
+        side = side_in_name(name)
         if side in ("port", "starboard"):
-            key = tuple(part for part in parts_of(name) if part not in words_of_side(side))
+            key = tuple(part for part in name_parts(name) if part not in words_of_side(side))
             sides.setdefault(key, {}).setdefault(side, name)
     return [
         (pair["port"], pair["starboard"])
@@ -78,8 +78,8 @@ def twins(state: State) -> list[tuple[str, str]]:
 
 def _may_be_a_throttle(name: str) -> bool:
     """Whether a name says an order, a throttle or per cent, or nothing at all; and no unit of another quantity."""
-    said = is_order(name) or bool(OF_THROTTLES & set(parts_of(name))) or unit_in_name(name, "rev/s") == "%"
-    fit = fits(name)
+    said = is_order(name) or bool(OF_THROTTLES & set(name_parts(name))) or unit_in_name(name, "rev/s") == "%"
+    fit = meaning_scores(name)
     foreign = unit_of_another(name, "n") is not None or (fit.get("", 0.0) >= STRONG and not said)
     return not foreign and (said or not fit)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from shipid.logs.guess.clock import is_clock
 from shipid.logs.guess.clues import State, unit_of_another
-from shipid.logs.guess.words import fits, is_order, parts_of
+from shipid.logs.guess.words import is_order, meaning_scores, name_parts
 from shipid.logs.repairs import INPUTS
 from shipid.physics.signals import SIGNALS
 
@@ -33,18 +33,18 @@ REMEDIES = {
 """Word of a name that says no known quantity -> what the column may be, and what to do."""
 
 
-def reasons(state: State, numbering: tuple[str, ...] = ()) -> dict[str, str]:
+def unused_reasons(state: State, numbering: tuple[str, ...] = ()) -> dict[str, str]:
     """Column of the log without a meaning -> why: no known quantity, its values, its unit, or a better candidate.
 
     numbering : columns that hold the numbers of the rows.
     """
-    return {name: _reason(state, name, name in numbering) for name in [*numbering, *state.free()]}
+    return {name: _unused_reason(state, name, name in numbering) for name in [*numbering, *state.free()]}
 
 
-def _reason(state: State, name: str, numbers: bool) -> str:
+def _unused_reason(state: State, name: str, numbers: bool) -> str:
     if numbers:
         return "it holds the numbers of the rows"
-    meanings = sorted((scores := fits(name)), key=lambda meaning: -scores[meaning])
+    meanings = sorted((scores := meaning_scores(name)), key=lambda meaning: -scores[meaning])
     if not meanings:
         if is_clock(name) and np.all(np.diff(state.columns[name]) > 0):
             rate = float(np.ptp(state.columns[name]) / np.ptp(state.t))
@@ -54,7 +54,7 @@ def _reason(state: State, name: str, numbers: bool) -> str:
                 else ""
             )
             return f"it is another clock{goes}"
-        remedy = next((REMEDIES[part] for part in parts_of(name) if part in REMEDIES), None)
+        remedy = next((REMEDIES[part] for part in name_parts(name) if part in REMEDIES), None)
         if remedy is not None:
             return remedy
         return "its name says no known quantity, and no other column is like it"
@@ -62,21 +62,21 @@ def _reason(state: State, name: str, numbers: bool) -> str:
     if not meaning or meaning not in {*SIGNALS, *INPUTS, "x", "y", "velocity_north", "velocity_east"}:
         return "it is a quantity that a dataset does not take"
     if (unit := unit_of_another(name, meaning)) is not None:
-        return f"its unit {unit} does not fit {_word(meaning)}"
+        return f"its unit {unit} does not fit {_meaning_in_words(meaning)}"
     group = next((alike for alike in ALIKE if meaning in alike), {meaning})
     better = [one.source for one in state.suggestions if one.name.rsplit(".", 1)[-1] in group]
     if better:
         what = "an order, and the measured " if is_order(name) else ""
-        return f"{what}{_word(meaning)} is read from {' and '.join(map(repr, better))}"
+        return f"{what}{_meaning_in_words(meaning)} is read from {' and '.join(map(repr, better))}"
     if np.ptp(state.columns[name]) == 0:
-        return f"it may be {_word(meaning)}, but it is the same in every row"
+        return f"it may be {_meaning_in_words(meaning)}, but it is the same in every row"
     partner = PARTNERS.get(meaning)
-    if partner and not any(partner in fits(other) for other in state.free() if other != name):
-        return f"it may be {_word(meaning)}, which says something together with a {partner} alone: there is none"
-    return f"it may be {_word(meaning)}, but the motion in the log does not bear that out"
+    if partner and not any(partner in meaning_scores(other) for other in state.free() if other != name):
+        return f"it may be {_meaning_in_words(meaning)}, which says something together with a {partner} alone: there is none"
+    return f"it may be {_meaning_in_words(meaning)}, but the motion in the log does not bear that out"
 
 
-def _word(meaning: str) -> str:
+def _meaning_in_words(meaning: str) -> str:
     return {"x": "the position", "y": "the position"}.get(meaning) or (
         SIGNALS[meaning].word if meaning in SIGNALS else meaning.replace("_", " ")
     )

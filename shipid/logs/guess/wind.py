@@ -16,7 +16,7 @@ from shipid.data.dataset import Array
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.commands import likely_unit
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.words import parts_of, wind_kind
+from shipid.logs.guess.words import name_parts, wind_kind
 from shipid.logs.mapping import to_si
 
 FEW_ROWS, FAR, BRIEF = 30, np.radians(240.0), 600.0  # rows; turn of the ship; s: parts of a log that show the wind
@@ -45,9 +45,9 @@ def choose_wind(state: State) -> None:
     pairs = list(product(state.called("V_w"), state.called("beta_w")))
     if not pairs:
         return
-    speed, angle = min(pairs, key=_order)
-    kind, said = _named_kind(speed, angle)
-    parts = parts_of(angle)
+    speed, angle = min(pairs, key=_wind_order)
+    kind, said = _wind_kind_of_names(speed, angle)
+    parts = name_parts(angle)
     towards = bool({"towards", "toward"} & set(parts)) or parts[-1] in TOWARDS
     drafted = Reading(kind, unit_in_name(speed, "m/s") or "m/s", "towards" if towards else "from")
     seen, why = _by_motion(state, speed, angle, drafted)
@@ -61,19 +61,19 @@ def choose_wind(state: State) -> None:
     state.suggest("beta_w", angle, turn, sure, meant, direction=seen.direction, wrap=True, **more)
 
 
-def _order(pair: tuple[str, str]) -> tuple[bool, bool]:
+def _wind_order(pair: tuple[str, str]) -> tuple[bool, bool]:
     """Speed and direction of one wind first, then those of the true wind; else the order of the names."""
     kinds = [wind_kind(name) for name in pair]
     return len({*kinds} - {""}) > 1, "true" not in kinds
 
 
-def _named_kind(speed: str, angle: str) -> tuple[Kind, str]:
+def _wind_kind_of_names(speed: str, angle: str) -> tuple[Kind, str]:
     """Kind of wind by the names, and the words for it; empty where they do not say it."""
     kinds = {wind_kind(speed), wind_kind(angle)} - {""}
     said = kinds.pop() if len(kinds) == 1 else ""
     if said == "apparent":
         return "apparent", said
-    if "twa" in parts_of(angle):
+    if "twa" in name_parts(angle):
         return "angle", "the angle of the true wind from the bow"
     return "true", said
 
@@ -84,7 +84,7 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
         return drafted, ""
     size = state.columns[speed]
     beta = state.columns[angle] * to_si(likely_unit(state, angle, "beta_w"), "beta_w")
-    spans = _turns(state.t, state.psi)
+    spans = _turning_parts(state.t, state.psi)
     written = unit_in_name(speed, "m/s")
     units: tuple[str, ...] = (written,) if written else (*SPEEDS, RARE)
     readings = [drafted, Reading("true", drafted.unit, drafted.direction)]
@@ -96,7 +96,7 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
     left: dict[Reading, float] = {}
     for one in readings:
         wind = _over_ground(state, one, size * to_si(one.unit, "V_w"), beta)
-        parts = [_changes(state.t[span], wind[span]) for span in spans]
+        parts = [_wind_unevenness(state.t[span], wind[span]) for span in spans]
         left[one] = float(np.sqrt(np.mean(np.square(parts))))
     best = min(left, key=left.__getitem__)
     usual = min((one for one in readings if written or one.unit != RARE), key=left.__getitem__)
@@ -120,7 +120,7 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
     return best, turned
 
 
-def _turns(t: Array, psi: Array) -> list[slice]:
+def _turning_parts(t: Array, psi: Array) -> list[slice]:
     """Parts of a log in which the ship turns far."""
     edges = np.searchsorted(t, np.arange(t[0], t[-1] + BRIEF, BRIEF))
     spans = [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= FEW_ROWS]
@@ -139,7 +139,7 @@ def _over_ground(state: State, reading: Reading, size: Array, beta: Array) -> Co
     return np.asarray(wind + state.velocity if reading.kind == "apparent" else wind)
 
 
-def _changes(t: Array, wind: Complex) -> float:
+def _wind_unevenness(t: Array, wind: Complex) -> float:
     """RMS [m/s] by which a wind leaves one that drifts evenly."""
     since = t - t.mean()
     still = np.stack([np.ones_like(since), since], axis=1)

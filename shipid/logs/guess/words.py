@@ -365,27 +365,27 @@ LONGEST_WORD = 80  # letters: a longer one is not cut
 LEAST = 0.45  # share of a name that a phrase explains, before the name counts as fitting
 
 
-def parts_of(name: str) -> tuple[str, ...]:
+def name_parts(name: str) -> tuple[str, ...]:
     """Return the parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
     name = name.translate(WIDE)
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))
     if not bare.isascii():
-        bare = _translations()[0].sub(_translation, unicodedata.normalize("NFKC", bare))
+        bare = _translation_table()[0].sub(_translate, unicodedata.normalize("NFKC", bare))
         bare = re.sub(r"[\u0400-\uffff]+", " unknownword ", bare)
     bare = re.sub(r"\b([MA])/E\b", r"\1E", bare)  # main or auxiliary engine, and no electrical speed
-    text = unicodedata.normalize("NFKD", "".join(_spelt(bare, place) for place in range(len(bare))))
+    text = unicodedata.normalize("NFKD", "".join(_spell_letter(bare, place) for place in range(len(bare))))
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
     whole = [word for word in re.split(r"[^A-Za-z0-9]+", text) if word]
     words = [
         part.lower()
         for word in whole
-        for part in ([word] if word.lower() in _vocabulary() | UNIT_PARTS else _EDGE.split(word.replace("StB", "Stb")))
+        for part in ([word] if word.lower() in _known_words() | UNIT_PARTS else _EDGE.split(word.replace("StB", "Stb")))
     ]
-    return tuple(SYNONYMS.get(part, part) for word in words for part in _cut(word))
+    return tuple(SYNONYMS.get(part, part) for word in words for part in _split_word(word))
 
 
 @cache
-def _translations() -> tuple[re.Pattern[str], dict[str, str]]:
+def _translation_table() -> tuple[re.Pattern[str], dict[str, str]]:
     """A regular expression of all words of other scripts, longer ones first, and word -> known words."""
     pairs = [(word.replace("_", " "), known) for known, words in TRANSLATED.items() for word in words.split()]
     words = {unicodedata.normalize("NFKC", word): known for word, known in pairs}
@@ -393,16 +393,16 @@ def _translations() -> tuple[re.Pattern[str], dict[str, str]]:
     return re.compile("|".join(map(re.escape, longest)), re.IGNORECASE), words
 
 
-def _translation(found: re.Match[str]) -> str:
-    return f" {_translations()[1][found[0].lower()]} "
+def _translate(found: re.Match[str]) -> str:
+    return f" {_translation_table()[1][found[0].lower()]} "
 
 
 def known_words(text: str) -> int:
     """How many different words of other scripts are in a text: few if it is read in a wrong encoding."""
-    return len({*_translations()[0].findall(text)})
+    return len({*_translation_table()[0].findall(text)})
 
 
-def _spelt(text: str, place: int) -> str:
+def _spell_letter(text: str, place: int) -> str:
     """Return a letter of a text without accent, as capitals within capitals: Ü is Ue in Über, UE in FÜG."""
     letter = text[place]
     spelt = _LETTERS.get(letter, letter)
@@ -410,7 +410,7 @@ def _spelt(text: str, place: int) -> str:
     return spelt.upper() if letter.isupper() and any(other.isupper() for other in around) else spelt
 
 
-def units_in(name: str) -> list[str]:
+def units_in_name(name: str) -> list[str]:
     """Return what a name has in brackets, after a blank and a slash as in `Schub / kN`, or after a comma."""
     name = name.translate(WIDE)
     after = _AFTER.search(name)
@@ -419,34 +419,34 @@ def units_in(name: str) -> list[str]:
 
 def shaft_unit(name: str) -> str:
     """Return the unit of a shaft speed that a name has, set off or as its last word; empty where it has none."""
-    said = units_in(name) or re.split(r"[_ ]", name.translate(WIDE).strip())[-1:]
+    said = units_in_name(name) or re.split(r"[_ ]", name.translate(WIDE).strip())[-1:]
     return next((unit for unit in said if _OF_SHAFT.fullmatch(unit.strip().lower())), "")
 
 
 def is_note(text: str) -> bool:
     """Whether a text in brackets has a word that says a quantity, a side, a source or an order, and so is no unit."""
-    known = _vocabulary() | MAGNETIC | NOT_MAGNETIC
-    return bool(known & {*parts_of(text)}) or side_of(f"x {text}") is not None
+    known = _known_words() | MAGNETIC | NOT_MAGNETIC
+    return bool(known & {*name_parts(text)}) or side_in_name(f"x {text}") is not None
 
 
 def wind_kind(name: str) -> str:
     """Whether the name of a column of wind says `true` or `apparent`; empty where it says neither, or both."""
-    parts = set(parts_of(name))
+    parts = set(name_parts(name))
     kinds = [kind for kind, words in WIND_WORDS.items() if parts & set(words.split())]
     return kinds[0] if len(kinds) == 1 else ""
 
 
 @cache
-def _vocabulary() -> frozenset[str]:
+def _known_words() -> frozenset[str]:
     phrases = [*PHRASES.values(), OTHERS]
     words = {word for phrase in phrases for word in phrase.replace(",", " ").split()}
     return frozenset(word for word in words | ORDERS | SOURCES | RUN_WORDS | set(SYNONYMS) if len(word) > 2)
 
 
 @cache
-def _cut(word: str) -> tuple[str, ...]:
+def _split_word(word: str) -> tuple[str, ...]:
     """Cut a word that is no known one into known words, such as `ruderwinkel`; return it whole where it cannot be."""
-    known = _vocabulary()
+    known = _known_words()
     if word in WHOLE:
         return WHOLE[word]
     if word in known or not 6 <= len(word) <= LONGEST_WORD:
@@ -463,7 +463,7 @@ ENGINES = frozenset("engine engines motor motors moteur moteurs motore motori me
 
 
 @cache
-def _phrases() -> dict[str, tuple[tuple[str, ...], ...]]:
+def _meaning_phrases() -> dict[str, tuple[tuple[str, ...], ...]]:
     def cut(text: str) -> tuple[tuple[str, ...], ...]:
         return tuple(tuple(SYNONYMS.get(word, word) for word in phrase.split()) for phrase in text.split(","))
 
@@ -472,19 +472,19 @@ def _phrases() -> dict[str, tuple[tuple[str, ...], ...]]:
 
 def is_electrical(name: str) -> bool:
     """Whether a name says the electrical speed of a motor: that of its shaft times its pairs of poles."""
-    parts = parts_of(name)
+    parts = name_parts(name)
     joined = "_".join(parts)
     return bool(re.search(r"(^|_)(erpm|e_rpm|elec(tr(ic(al)?)?)?_rpm|eldrehzahl)(_|$)", joined))
 
 
 def is_engine(name: str) -> bool:
     """Whether a name says that a speed is that of an engine, which may drive its shaft through a gear."""
-    return not ENGINES.isdisjoint(parts_of(name))
+    return not ENGINES.isdisjoint(name_parts(name))
 
 
 def is_order(name: str) -> bool:
     """Whether a name says that its column is an order or a set point, not what was measured."""
-    parts = parts_of(name)
+    parts = name_parts(name)
     return len(parts) > 1 and bool(ORDERS & set(parts[1:] if len(parts[0]) == 1 else parts))
 
 
@@ -493,7 +493,7 @@ def may_be_measured(name: str) -> str:
 
     They may say a reference system of a dynamic positioning, which measures.
     """
-    parts = parts_of(name)
+    parts = name_parts(name)
     left = [part for part in parts if part not in ("ref", "reference")]
     if not left or not is_order(name):
         return ""
@@ -503,22 +503,22 @@ def may_be_measured(name: str) -> str:
 
 def is_run(name: str) -> bool:
     """Whether a name says that its column holds the run: `Run`, `test no`, `Versuch`."""
-    parts = set(parts_of(name)) - RUN_NUMBERS
+    parts = set(name_parts(name)) - RUN_NUMBERS
     return bool(parts) and parts <= RUN_WORDS
 
 
 def is_magnetic(name: str) -> bool:
     """Whether a name says that a heading is that of a magnetic compass, in brackets, too: Hdg (mag), Hdg [deg M]."""
-    words = {word for unit in units_in(name) for word in re.split(r"[^a-z]+", unit.lower())} | {*parts_of(name)}
+    words = {word for unit in units_in_name(name) for word in re.split(r"[^a-z]+", unit.lower())} | {*name_parts(name)}
     if words & NOT_MAGNETIC:
         return False
     return bool(words & MAGNETIC or re.search(r"(deg|°) ?\(?M\b", name))
 
 
-def side_of(name: str) -> str | None:
+def side_in_name(name: str) -> str | None:
     """Return the side or place in a name, such as `port`; None if there is none."""
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name.translate(WIDE)))  # 1/s is no starboard
-    parts = set(parts_of(name)) | set(re.split(r"[^a-z]+", bare.lower()))
+    parts = set(name_parts(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
         if len(parts - {""}) > 1 and set(words.split("|")) & parts:
             return side
@@ -537,29 +537,29 @@ def how_much_says(name: str, command: str) -> int:
     `rpm_bow_aft` says `bow_aft.n` with two parts, and `bow.n` with one.
     """
     component, _, signal = command.rpartition(".")
-    said, parts = set(parts_of(component)), [part for part in parts_of(name) if part not in UNIT_PARTS - {signal}]
+    said, parts = set(name_parts(component)), [part for part in name_parts(name) if part not in UNIT_PARTS - {signal}]
     if not said or not said <= set(parts):
         return 0
     left = [part for part in parts if part not in said]
     if any(part.isdigit() for part in left):  # one of several
         return 0
     rest = [part for part in left if part not in SOURCES | ORDERS]
-    known = rest == [signal] or fits(" ".join(left) if rest else name).get(signal, 0.0) >= LEAST
+    known = rest == [signal] or meaning_scores(" ".join(left) if rest else name).get(signal, 0.0) >= LEAST
     return len(said) if known else 0
 
 
-def numbered(name: str) -> int | None:
+def number_in_name(name: str) -> int | None:
     """Return the last number among the parts of a name; None if there is none."""
-    return next((int(part) for part in reversed(parts_of(name)) if part.isdigit()), None)
+    return next((int(part) for part in reversed(name_parts(name)) if part.isdigit()), None)
 
 
 @cache
-def fits(name: str) -> dict[str, float]:
+def meaning_scores(name: str) -> dict[str, float]:
     """Return how well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use.
 
     Orders and set points fit commands only.
     """
-    parts = list(parts_of(name))
+    parts = list(name_parts(name))
     order = is_order(name)
     aside = (
         {word for words in SIDE_WORDS.values() for word in words.split("|")} | SOURCES | (ORDERS if order else set())
@@ -568,8 +568,8 @@ def fits(name: str) -> dict[str, float]:
         parts.pop()
     content = [part for part in parts if part not in aside and not part.isdigit()]
     meanings: dict[str, float] = {}
-    for meaning, phrases in _phrases().items():
-        best = max((_covered(phrase, parts, content, aside) for phrase in phrases), default=0.0)
+    for meaning, phrases in _meaning_phrases().items():
+        best = max((_phrase_share(phrase, parts, content, aside) for phrase in phrases), default=0.0)
         row = SIGNALS.get(meaning)
         if order and row is not None and row.role != "command":
             best = 0.0
@@ -588,7 +588,7 @@ def fits(name: str) -> dict[str, float]:
     return meanings
 
 
-def _covered(phrase: tuple[str, ...], parts: list[str], content: list[str], aside: set[str]) -> float:
+def _phrase_share(phrase: tuple[str, ...], parts: list[str], content: list[str], aside: set[str]) -> float:
     """Return the share of the letters of a name that a phrase explains; 0 if the name lacks a word of it."""
     if not set(phrase) <= set(parts):
         return 0.0

@@ -9,7 +9,7 @@ from shipid.logs.guess.bound import name_commands
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import choose_commands
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
-from shipid.logs.guess.words import numbered
+from shipid.logs.guess.words import number_in_name
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.template import Particulars, first_guess
@@ -193,7 +193,7 @@ def test_sides_letters_and_numbers_take_a_column_each(
     values = {name: RPM * random.uniform(0.7, 1.2) for name in columns}
     state, names = drafted(rudders | values, SHIPS[ship])
     assert {name: source for name, source in names.items() if source in columns} == expected
-    by_number = ship != "numbers" and any(numbered(name) for name in columns)
+    by_number = ship != "numbers" and any(number_in_name(name) for name in columns)
     assert any("?" in one.sentence and columns[0] in one.sentence for one in state.questions) == (
         by_number and "L" not in columns[0]
     )

@@ -15,7 +15,7 @@ import pytest
 from shipid.errors import DataError
 from shipid.logs.guess.clock import _is_time_of_day
 from shipid.logs.guess.columns import guess
-from shipid.logs.guess.sniff import sniff
+from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.mapping import clock_seconds
 from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, text
 
@@ -35,7 +35,7 @@ from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, text
 )
 def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path: Path) -> None:
     TABLE.assign(time=clock).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": unit}
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
 
@@ -52,7 +52,7 @@ def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str
         log.to_csv(tmp_path / "log", index=False)
     else:
         log.assign(time=numbers.astype(float)).to_parquet(tmp_path / "log")
-    sniffed = sniff(tmp_path / "log")
+    sniffed = recognise_log(tmp_path / "log")
     assert sniffed.clock == {"from": "time", "unit": "date"}
     np.testing.assert_allclose(sniffed.t, t + pd.Timestamp("2024-05-14 08:13:20").timestamp(), atol=5e-3)
 
@@ -67,7 +67,7 @@ def test_days_with_few_decimals_have_the_step_of_the_rows_and_not_that_with_thei
     t = np.concatenate([k * pause + lengths[:k].sum() + np.arange(length) for k, length in enumerate(lengths)])
     days = pd.Series(45_426.25 + t / 86_400).map("{:.6f}".format)
     pd.DataFrame({"Time": days, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock.get("every", 1.0) == pytest.approx(1.0, abs=1e-4)
     assert np.abs(sniffed.t - sniffed.t[0] - t).max() < 0.1
 
@@ -76,7 +76,7 @@ def test_days_with_few_decimals_have_the_step_of_the_rows_and_not_that_with_thei
 def test_ticks_of_100_ns_are_refused_with_what_to_write(epoch: int, who: str, tmp_path: Path) -> None:
     rows = [f"{(1_715_673_600 + k + epoch) * 10**7},{k % 7}" for k in range(80)]
     with pytest.raises(DataError, match=rf"as {who} does: write seconds since 1970, value / 1e7 - {epoch}"):
-        sniff(log_of(tmp_path, ["Timestamp,x", *rows]))
+        recognise_log(log_of(tmp_path, ["Timestamp,x", *rows]))
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_seconds_that_may_not_count_from_1970_are_asked(
     """A date of ten years ago, or of the future, was given without a word."""
     clock = unit * (pd.Timestamp("2024-05-14 08:00:00").timestamp() - begin + T)
     TABLE.assign(time=clock).rename(columns={"time": name}).to_csv(tmp_path / "log.csv", index=False)
-    doubts = sniff(tmp_path / "log.csv").doubts
+    doubts = recognise_log(tmp_path / "log.csv").doubts
     assert [words in doubt for doubt in doubts] == [True] * bool(words)
 
 
@@ -107,7 +107,7 @@ def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> No
     log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
     log.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match="'time' is a date and a time of day in one number, 140524081320: write 2024"):
-        sniff(tmp_path / "log.csv")
+        recognise_log(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize("name", ["utc", "time", "t"])
@@ -117,7 +117,7 @@ def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step:
     moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
     log = pd.DataFrame({name: moments.strftime("%H%M%S.%f").str[:-4], "N": t, "psi": t})
     log.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": name, "unit": "hhmmss"}
     np.testing.assert_allclose(sniffed.t, 8 * 3600 + 13 * 60 + 20 + t, atol=1e-6)
 
@@ -145,7 +145,7 @@ def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, 
     t = step * np.arange(60)
     table = pd.DataFrame({name: [f"{DAYS_OF[unit] + one / 86400:.10f}" for one in t], "N": t, "psi": t})
     table.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": name, "unit": unit}
     np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=3e-5)
 
@@ -157,7 +157,7 @@ def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_p
     t = step * np.arange(400)
     stamps = [f"{DAYS_OF[unit] + one / 86400:.{digits}f}" for one in t]
     pd.DataFrame({"time": stamps, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": unit, "every": pytest.approx(step, rel=1e-3)}
     np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=1.0)
 
@@ -188,12 +188,12 @@ def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_p
 def test_what_a_clock_counts_in(name: str, values: np.ndarray, unit: str, tmp_path: Path) -> None:
     table = TABLE.assign(time=values).rename(columns={"time": name})
     table.to_csv(tmp_path / "log.csv", index=False, float_format="%.10f")
-    assert sniff(tmp_path / "log.csv").clock["unit"] == unit
+    assert recognise_log(tmp_path / "log.csv").clock["unit"] == unit
 
 
 def test_a_row_of_units_says_that_of_the_clock(tmp_path: Path) -> None:
     lines = ["time,u,v", "h,mph,mm/s", *(f"{k / 3600:.8f},{0.1 * k:.1f},{k}" for k in range(30))]
-    sniffed = sniff(log_of(tmp_path, lines))
+    sniffed = recognise_log(log_of(tmp_path, lines))
     assert sniffed.clock == {"from": "time [h]", "unit": "h"}
     np.testing.assert_allclose(sniffed.t, np.arange(30), atol=1e-4)
     assert list(sniffed.columns) == ["u [mph]", "v [mm/s]"]
@@ -205,7 +205,7 @@ def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
     split = TABLE.assign(time=moments.strftime("%H:%M:%S.%f"))
     split.insert(0, "Day", moments.strftime(day))
     split.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": "date", "date": "Day"}
     np.testing.assert_allclose(sniffed.t, 1.7e9 + T, atol=1e-5)
     assert sniffed.notes == ()
@@ -214,7 +214,7 @@ def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
 def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
     t = np.arange(0.0, 60.0, 0.1)
     pd.DataFrame({"time": np.floor(t + 1e-9), "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": "s", "every": 0.1}
     np.testing.assert_allclose(np.diff(sniffed.t), 0.1, rtol=1e-6)
 
@@ -224,7 +224,7 @@ def test_a_date_beside_times_of_whole_seconds_is_kept(tmp_path: Path) -> None:
     t = pd.Timestamp("2024-05-14 23:59:50") + pd.to_timedelta(0.5 * np.arange(80), "s")
     log = pd.DataFrame({"date": t.strftime("%d.%m.%Y"), "time": t.strftime("%H:%M:%S"), "N": 1.0, "psi": 2.0})
     log.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": "date", "date": "date", "every": 0.5}
     np.testing.assert_allclose(sniffed.t, t[0].timestamp() + 0.5 * np.arange(80), atol=0.5)
 
@@ -233,9 +233,9 @@ def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path)
     counted = TABLE.rename(columns={"time": "time_s"})
     counted.insert(0, "row", range(len(T)))
     counted.to_csv(tmp_path / "log.csv", index=False)
-    assert sniff(tmp_path / "log.csv").clock["from"] == "time_s"
+    assert recognise_log(tmp_path / "log.csv").clock["from"] == "time_s"
     counted.rename(columns={"time_s": "x"}).assign(N=1.0, psi=2.0).to_csv(tmp_path / "log.csv", index=False)
-    assert sniff(tmp_path / "log.csv").clock["from"] == "x"
+    assert recognise_log(tmp_path / "log.csv").clock["from"] == "x"
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_dates_that_may_be_other_moments_are_asked(
 ) -> None:
     moments = pd.Timestamp(first) + pd.to_timedelta([k + jump * (k >= 30) for k in range(60)], "s")
     rows = [f"{one.strftime(style)},{k % 7}" for k, one in enumerate(moments)]
-    doubts = sniff(log_of(tmp_path, ["time,x", *rows])).doubts
+    doubts = recognise_log(log_of(tmp_path, ["time,x", *rows])).doubts
     assert [words in doubt for doubt in doubts] == [True] * bool(words)
 
 
@@ -278,13 +278,13 @@ def test_dates_that_rise_are_the_clock_beside_dates_that_go_back(tmp_path: Path)
         time=SUMMER_TIME_ENDS, utc=pd.date_range("2025-10-26", periods=len(T), freq="500ms").astype(str)
     )
     (tmp_path / "log.csv").write_text(text(table=table))
-    assert sniff(tmp_path / "log.csv").clock["from"] == "utc"
+    assert recognise_log(tmp_path / "log.csv").clock["from"] == "utc"
 
 
 def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path) -> None:
     rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
     twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))
-    sniffed = sniff(log_of(tmp_path, ["time,x,y", *twice]))
+    sniffed = recognise_log(log_of(tmp_path, ["time,x,y", *twice]))
     assert sniffed.clock == {"from": "time", "unit": "s", "repeated": "drop"}
     np.testing.assert_allclose(sniffed.t, 0.2 * np.arange(60))
     assert all(len(values) == 60 for values in sniffed.columns.values())
@@ -300,7 +300,9 @@ def test_a_rounded_clock_keeps_its_rate_where_rows_are_lost(tmp_path: Path, seed
     true = true[rng.random(count) > 0.006]
     stamp = [f"{int(t // 3600) + 8:02d}:{int(t // 60) % 60:02d}:{int(t % 60):02d}" for t in true]
     x = rng.normal(size=len(true))
-    sniffed = sniff(log_of(tmp_path, ["time,x", *(f"{s},{value:.4f}" for s, value in zip(stamp, x, strict=True))]))
+    sniffed = recognise_log(
+        log_of(tmp_path, ["time,x", *(f"{s},{value:.4f}" for s, value in zip(stamp, x, strict=True))])
+    )
     assert sniffed.clock["every"] == pytest.approx(every)
     off = sniffed.t - sniffed.t[0] - (true - true[0])
     assert np.ptp(off) < 1.0 + every, "within the rounding"
@@ -333,7 +335,7 @@ def test_clocks_that_begin_again_and_days_of_the_year(
     """Rows are 0.5 s apart, over midnight or the end of the week, in the draft and in the import."""
     file = tmp_path / "log.csv"
     with_clock(name, values).to_csv(file, index=False)
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.clock == {"from": name, "unit": unit}
     np.testing.assert_allclose(np.diff(sniffed.t), 0.5, atol=1e-4)
     if unit == "date":
@@ -350,7 +352,7 @@ def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) 
     """As MATLAB writes those of a timetable, and pandas its own."""
     times = [write.format(0.5 * k) if isinstance(write, str) else write(0.5 * k) for k in range(600)]
     with_clock("Time", times).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "Time", "unit": "date"}
     np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
 
@@ -362,7 +364,7 @@ def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp
         tmp_path / "log.csv", index=False
     )
     with pytest.raises(DataError, match=rf"'{name}' is a year with decimals, 2024.3655.*: write a date"):
-        sniff(tmp_path / "log.csv")
+        recognise_log(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize(("size", "step"), [(2**16, 500), (2**32, 500_000)])
@@ -371,14 +373,14 @@ def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: P
     values = [(size - 100 * step + 7 + step * k) % size for k in range(600)]
     with_clock("time", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=rf"'time' is a counter that begins again at {size} in row 101: add {size}"):
-        sniff(tmp_path / "log.csv")
+        recognise_log(tmp_path / "log.csv")
 
 
 def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) -> None:
     values = [86280 + 0.5 * k if k < 300 else 40000 + 0.5 * k for k in range(600)]
     with_clock("Seconds of day", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=r"goes back from .* in row 301"):
-        sniff(tmp_path / "log.csv")
+        recognise_log(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize(
@@ -392,7 +394,7 @@ def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) ->
 def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -> None:
     lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
     with pytest.raises(DataError) as caught:
-        sniff(log_of(tmp_path, [*lines[:31], line, *lines[31:]]))
+        recognise_log(log_of(tmp_path, [*lines[:31], line, *lines[31:]]))
     assert words in caught.value.message
 
 
@@ -401,21 +403,21 @@ def test_a_time_that_is_missing_beside_dates_is_named(time: str, tmp_path: Path)
     """Not the dates, that repeat from row to row."""
     rows = [f"2024/05/14,{time if k == 30 else f'08:00:{k:02}'},{2 * k},0.1" for k in range(60)]
     with pytest.raises(DataError, match="'Time' has no value in row 31"):
-        sniff(log_of(tmp_path, ["Date,Time,north,heading", *rows]))
+        recognise_log(log_of(tmp_path, ["Date,Time,north,heading", *rows]))
 
 
 def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
     """The first row has a time that can be read: it was said to have none."""
     lines = ["Time,north,heading", *(f"08:00:{k:02},{2 * k},0.1" for k in range(60)), "Average,59,0.1"]
     with pytest.raises(DataError, match="holds 'Average' in row 61, no time: remove the line"):
-        sniff(log_of(tmp_path, lines))
+        recognise_log(log_of(tmp_path, lines))
     moments = [f"2024-05-14 {line}" for line in lines[1:-1]]
     for below, which in (
         ("Run,1,2", "the line"),
         ("Run,1,2\n1,1,2\n2,1,2", "the 3 such lines"),
     ):  # a number made it no column of dates
         with pytest.raises(DataError, match=f"holds 'Run' in row 61, no time: remove {which}"):
-            sniff(log_of(tmp_path, [lines[0], *moments, below]))
+            recognise_log(log_of(tmp_path, [lines[0], *moments, below]))
 
 
 @pytest.mark.parametrize(
@@ -441,7 +443,7 @@ def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
 def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str, tmp_path: Path) -> None:
     lines = ["GPS time [ms],north,heading", *(f"{time},{200 - k},{k % 7}" for k, time in enumerate(times))]
     with pytest.raises(DataError, match="no column can be the clock: 'GPS time") as caught:
-        sniff(log_of(tmp_path, lines))
+        recognise_log(log_of(tmp_path, lines))
     assert words in caught.value.message
 
 
@@ -481,7 +483,7 @@ def test_a_date_in_columns_is_the_clock(
 ) -> None:
     file = tmp_path / "log.csv"
     in_columns(TABLE, fields).to_csv(file, index=False)
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     np.testing.assert_allclose(sniffed.t, zero + T, atol=1e-5)
     assert sniffed.clock.items() >= clock.items()
     assert list(sniffed.columns) == ["N", "psi"]
@@ -493,7 +495,7 @@ def test_a_date_in_columns_without_names_is_the_clock(tmp_path: Path) -> None:
     log = in_columns(TABLE, fields)
     log.insert(0, "row", range(1, 1 + len(log)))
     log.to_csv(tmp_path / "log.csv", index=False, header=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert (sniffed.clock["from"], sniffed.clock["date"]) == (["5", "6", "7"], ["2", "3", "4"])
     np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
     assert list(sniffed.columns) == ["1", "8", "9"]
@@ -503,7 +505,7 @@ def test_a_date_in_columns_beside_a_time_of_day(tmp_path: Path) -> None:
     log = in_columns(TABLE, {"Day": "%d", "Month": "%m", "Year": "%Y"})
     moments = pd.Timestamp("2024-02-29T23:59:57.5") + pd.to_timedelta(T, "s")
     log.assign(Time=moments.strftime("%H:%M:%S.%f")).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "Time", "unit": "date", "date": ["Year", "Month", "Day"]}
     np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
 
@@ -528,7 +530,7 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
     )
     log = log.assign(timestamp=1.7e9 + long) if "timestamp" in second else log
     log.to_csv(tmp_path / "log.csv", index=False)
-    doubts = sniff(tmp_path / "log.csv").doubts
+    doubts = recognise_log(tmp_path / "log.csv").doubts
     assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
 
 
@@ -556,7 +558,7 @@ def test_a_total_that_rises_is_no_clock_beside_a_clock_with_a_fault(
         times[first:] = [changed(k) for k in range(first, 60)]
 
     with pytest.raises(DataError, match=f"no column can be the clock: 'time' .*{re.escape(fault)}"):
-        sniff(log_of(tmp_path, _rows(change)))
+        recognise_log(log_of(tmp_path, _rows(change)))
 
 
 @pytest.mark.parametrize("other", ["%Y-%m-%dT%H:%M:%SZ", "%d.%m.%Y %H:%M:%S"])
@@ -567,7 +569,7 @@ def test_dates_written_in_two_ways_are_refused_with_what_to_do(other: str, tmp_p
         times[:] = [f"{begin + timedelta(seconds=k):{way}}" for k, way in enumerate(ways)]
 
     with pytest.raises(DataError, match=r"'time' holds .* in row .*, and other rows are written otherwise"):
-        sniff(log_of(tmp_path, _rows(change)))
+        recognise_log(log_of(tmp_path, _rows(change)))
 
 
 @pytest.mark.parametrize(
@@ -593,5 +595,5 @@ def test_dates_written_in_two_ways_are_refused_with_what_to_do(other: str, tmp_p
 def test_a_zone_that_only_the_head_says_is_asked(head: str, clock: str, behind: str, said: str, tmp_path: Path) -> None:
     """Before, the times were counted as UTC without a word."""
     rows = [f"2024-05-14 08:00:{k:02d}{behind},{k % 7},{k % 5}" for k in range(60)]
-    doubts = sniff(log_of(tmp_path, [*head.splitlines(), f"{clock},x,y", *rows])).doubts
+    doubts = recognise_log(log_of(tmp_path, [*head.splitlines(), f"{clock},x,y", *rows])).doubts
     assert [f"is read as UTC, and the log says {said!r}" in doubt for doubt in doubts] == [True] * bool(said)

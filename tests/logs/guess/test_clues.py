@@ -10,7 +10,7 @@ from shipid.logs.guess.clues import (
     State,
     factor_in_name,
     names_another,
-    si_of,
+    si_unit,
     unit_in_name,
     unit_of_another,
     unknown_unit,
@@ -77,7 +77,7 @@ def test_a_unit_that_is_not_known_is_told_from_a_note(name: str, unit: str) -> N
 def state() -> State:
     t = np.arange(100.0)
     names = ("heading [deg]", "hdg_2", "sog", "SOG [kn]", "lat", "fuel")
-    return State(t, "s", dict.fromkeys(names, t), evidence.windows(t))
+    return State(t, "s", dict.fromkeys(names, t), evidence.row_windows(t))
 
 
 def test_a_name_fits_a_meaning(state: State) -> None:
@@ -143,4 +143,10 @@ def test_a_word_for_another_quantity_is_no_yaw_rate(name: str, said: bool) -> No
 
 
 def test_meanings_have_units() -> None:
-    assert [si_of(meaning) for meaning in ("psi", "x", "speed", "velocity_north", "")] == ["rad", "m", "m/s", "m/s", ""]
+    assert [si_unit(meaning) for meaning in ("psi", "x", "speed", "velocity_north", "")] == [
+        "rad",
+        "m",
+        "m/s",
+        "m/s",
+        "",
+    ]

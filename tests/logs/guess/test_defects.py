@@ -15,7 +15,7 @@ from shipid.logs.guess import sniff
 from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess, guess
 from shipid.logs.guess.defects import LEVELS, _piles_up, lost_fixes
-from shipid.logs.guess.draft import draft_mapping, untried
+from shipid.logs.guess.draft import draft_mapping, draft_text
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import as_bridge, globe, si_log
 
@@ -233,7 +233,7 @@ def test_a_log_with_drawn_spikes_is_healed_by_its_draft(seed: int, tmp_path: Pat
     drafted = guessed(tmp_path / "spoilt", spoilt)
     assert {"spikes", "position spikes"} <= drafted.kinds
     mapping = tmp_path / "draft.toml"
-    mapping.write_text(untried(drafted).replace("sha256", "# sha256"))
+    mapping.write_text(draft_text(drafted).replace("sha256", "# sha256"))
     CLEAN.to_csv(tmp_path / "clean.csv", index=False)
     healed, clean = (import_log(read_mapping(mapping), file).frame for file in (drafted.file, tmp_path / "clean.csv"))
     for name, most in (("u", 0.5), ("v", 0.5), ("r", 0.02), ("north", 6.0), ("east", 6.0)):

@@ -12,10 +12,10 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.guess.columns import guess
-from shipid.logs.guess.draft import draft_mapping, moment, segment_log, segments_text, untried
+from shipid.logs.guess.draft import clock_moment, draft_mapping, draft_text, segment_log, segments_text
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mapping import UNITS, Segment
-from shipid.logs.segments import kind_of
+from shipid.logs.segments import run_kind
 from tests.logs.conftest import DATES, stamps
 from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, si_log
 from tests.logs.test_nmea import bridge_log, sentence
@@ -47,7 +47,7 @@ def test_a_draft_needs_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.M
 def test_a_log_with_a_wind_is_asked_which(tmp_path: Path) -> None:
     log = tmp_path / "trial.csv"
     as_bridge(si_log()).assign(**{"Wind speed": 5.0, "Wind dir": 40.0}).to_csv(log, index=False)
-    assert "# ? Is the wind true or apparent" in untried(guess(log))
+    assert "# ? Is the wind true or apparent" in draft_text(guess(log))
 
 
 def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_orders_that_are_written_where_they_change_are_held(tmp_path: Path) -> N
     log = as_bridge(si_log()).round({"rudder": 1, "rpm": 0})
     written = log.assign(**{name: log[name].where(log[name].diff() != 0) for name in ("rudder", "rpm")})
     written.to_csv(tmp_path / "log.csv", index=False)
-    text = untried(guess(tmp_path / "log.csv"))
+    text = draft_text(guess(tmp_path / "log.csv"))
     (tmp_path / "draft.toml").write_text(text)
     frame = import_log(read_mapping(tmp_path / "draft.toml"), tmp_path / "log.csv").frame
     assert len(frame) == len(log)
@@ -116,7 +116,7 @@ def test_segments_of_gunnerus_are_its_zigzags_and_circles(gunnerus_log: Path) ->
 
 
 def test_every_hsva_file_is_a_zigzag(hsva: Dataset) -> None:
-    assert {kind_of(rows) for _, rows in hsva.frame.groupby("run")} == {"zigzag"}
+    assert {run_kind(rows) for _, rows in hsva.frame.groupby("run")} == {"zigzag"}
 
 
 def test_segments_are_text_to_edit(tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_segments_of_a_dated_log_say_when() -> None:
 def test_segments_on_a_clock_of_days_since_a_zero_say_when(unit: str) -> None:
     text = segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)], unit)
     assert "[[segment]]    # 2024-05-14 08:00:05 to 2024-05-14 08:03:00" in text
-    assert moment(1e13, unit) == "1e+13"  # beyond the year 9999
+    assert clock_moment(1e13, unit) == "1e+13"  # beyond the year 9999
 
 
 def test_segments_on_times_of_day_have_no_date() -> None:
@@ -147,7 +147,7 @@ def test_segments_on_times_of_day_have_no_date() -> None:
     text = segments_text([Segment(run="zigzag 1", start=28805.0, end=28980.0)], "date")
     assert "1970" not in text
     assert "# Starts and ends are seconds since the midnight before the log" in text
-    assert moment(28805.0, "date") == "28805"
+    assert clock_moment(28805.0, "date") == "28805"
 
 
 @pytest.mark.parametrize("unit", UNITS["s"])

@@ -10,9 +10,9 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.logs.formats import TextFormat
-from shipid.logs.guess.clock import plain
-from shipid.logs.guess.sniff import sniff
-from shipid.logs.readers import read_table
+from shipid.logs.guess.clock import name_without_unit
+from shipid.logs.guess.sniff import recognise_log
+from shipid.logs.readers import read_log_table
 from tests.logs.guess.conftest import TABLE, T, log_of, text
 
 
@@ -54,20 +54,20 @@ from tests.logs.guess.conftest import TABLE, T, log_of, text
 def test_a_text_log_is_recognised(content: str, form: dict[str, object], tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text(content)
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.form.items() >= form.items()
     np.testing.assert_allclose(sniffed.t, T)
-    assert [plain(name) for name in sniffed.columns] == ["n", "psi"]
+    assert [name_without_unit(name) for name in sniffed.columns] == ["n", "psi"]
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
 
 
 def test_a_log_without_a_header_has_numbers_or_the_names_that_are_given(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text(text(header=False))
-    numbered = sniff(file)
+    numbered = recognise_log(file)
     assert numbered.form["header"] is False
     assert all(name.isdecimal() for name in numbered.columns)
-    assert list(sniff(file, ("clock", "N", "psi")).columns) == ["N", "psi"]
+    assert list(recognise_log(file, ("clock", "N", "psi")).columns) == ["N", "psi"]
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_log_without_a_header_has_numbers_or_the_names_that_are_given(tmp_path
 def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_bytes(text(table=TABLE.rename(columns={"psi": "psi [°]"})).encode(encoding))
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.form["encoding"] == expected
     assert "psi [°]" in sniffed.columns
 
@@ -95,11 +95,11 @@ def test_encodings(encoding: str, expected: str, tmp_path: Path) -> None:
 def test_encodings_of_other_scripts(names: tuple[str, ...], encoding: str, tmp_path: Path) -> None:
     table = TABLE.set_axis(names, axis=1)
     (tmp_path / "log.csv").write_bytes(text(table=table).encode(encoding))
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert (sniffed.form["encoding"], sniffed.clock["from"]) == (encoding, names[0])
     assert tuple(sniffed.columns) == names[1:]
     pd.testing.assert_frame_equal(
-        read_table(tmp_path / "log.csv", TextFormat(encoding=encoding), names[0]), table.astype(str)
+        read_log_table(tmp_path / "log.csv", TextFormat(encoding=encoding), names[0]), table.astype(str)
     )
 
 
@@ -107,7 +107,7 @@ def test_encodings_of_other_scripts(names: tuple[str, ...], encoding: str, tmp_p
 def test_text_of_two_bytes_without_a_mark_is_read(encoding: str, tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_bytes("\n".join(["time,x", *(f"{k},{k % 7}.5" for k in range(80))]).encode(encoding))
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.form["encoding"] == encoding
     np.testing.assert_array_equal(sniffed.t, np.arange(80))
 
@@ -115,7 +115,7 @@ def test_text_of_two_bytes_without_a_mark_is_read(encoding: str, tmp_path: Path)
 def test_many_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_bytes("\r".join(["time,x,y", *(f"{k},{k % 7}.5,1" for k in range(8000))]).encode())
-    np.testing.assert_array_equal(sniff(file).t, np.arange(8000))
+    np.testing.assert_array_equal(recognise_log(file).t, np.arange(8000))
 
 
 @pytest.mark.parametrize("separator", [",", ";"])
@@ -125,7 +125,7 @@ def test_a_separator_between_quotes_is_part_of_a_name(separator: str, tmp_path: 
     rows = "".join(f"{t}{separator}{t % 7}{separator}1.5{separator}{t * t}\n" for t in range(50))
     header = separator.join(f'"{name}"' if separator in name else name for name in names)
     (tmp_path / "log.csv").write_text(f"{header}\n{rows}")
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert list(sniffed.columns) == names[1:]
     assert "header" not in sniffed.form
 
@@ -158,7 +158,7 @@ def test_blanks_in_positions_separate_nothing(
         lines.append(separator.join([f"2024-05-14 08:0{k // 60}:{k % 60:02d}", *written, *["1.5"] * others]))
     file = tmp_path / "log.csv"
     file.write_text(above + "\n".join(lines) + "\n")
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.form["separator"] == separator
     assert "header" not in sniffed.form
     np.testing.assert_allclose(np.stack([sniffed.columns["Lat"], sniffed.columns["Lon"]]).T, places, atol=1e-6)
@@ -167,7 +167,7 @@ def test_blanks_in_positions_separate_nothing(
 def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
     lines = ["  time            east  north", "  -                 m      m"]
     lines += [f"2023-11-12 08:17:{k:02d}.5  {k}  {2 * k}" for k in range(30)]
-    sniffed = sniff(log_of(tmp_path, lines, "log.dat"))
+    sniffed = recognise_log(log_of(tmp_path, lines, "log.dat"))
     assert sniffed.clock["date"] == "date"
     np.testing.assert_allclose(np.diff(sniffed.t), 1.0)
     assert list(sniffed.columns) == ["east [m]", "north [m]"]
@@ -176,14 +176,14 @@ def test_one_name_over_a_date_and_a_time(tmp_path: Path) -> None:
 def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> None:
     lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
     file = log_of(tmp_path, [*lines[:20], "# zigzag", *lines[20:40], lines[0], *lines[40:]])
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.form["ragged"] == "drop"
     assert sniffed.notes == (
         "2 lines repeat the header or have another number of cells, the first is line 21: left out",
     )
     np.testing.assert_array_equal(sniffed.t, np.arange(60.0))
     with pytest.raises(DataError, match="repeats the header: remove the line") as caught:
-        read_table(log_of(tmp_path, [*lines[:40], lines[0], *lines[40:]]), TextFormat(), "time")
+        read_log_table(log_of(tmp_path, [*lines[:40], lines[0], *lines[40:]]), TextFormat(), "time")
     assert caught.value.path == "line 41"
 
 
@@ -203,7 +203,7 @@ def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> Non
 def test_names_in_several_lines(above: str, names: list[str] | None, tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text(text(above=above, header=False))
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert sniffed.form.get("names") == names
     assert [sniffed.clock["from"], *sniffed.columns] == (names or ["time", "North", "Heading"])
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
@@ -215,7 +215,7 @@ def test_lines_that_sum_up_the_log_are_no_names(units: str, tmp_path: Path) -> N
     sums = "Min,0.0,30.0\nMax,14.25,39.5\nMean,7.1,34.75\n"
     file = tmp_path / "log.csv"
     file.write_text(text(above=f"time,North,Heading\n{units}{sums}", header=False))
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert [name.partition(" ")[0] for name in (sniffed.clock["from"], *sniffed.columns)] == [
         "time",
         "North",
@@ -230,11 +230,11 @@ def test_a_table_beside_the_first_lines_is_left_out(tmp_path: Path) -> None:
     beside = ["channel,mean", "psi,34.75", "N,7.1"]
     lines = [",".join([line, "", *beside[i : i + 1]]) if i < len(beside) else line for i, line in enumerate(lines)]
     (tmp_path / "log.csv").write_text("\n".join(lines))
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert list(sniffed.columns) == ["N", "psi"]
     np.testing.assert_allclose(sniffed.columns["psi"], 30.0 + T[2:])
     assert any("2 lines repeat the header or have another number of cells" in note for note in sniffed.notes)
-    table = read_table(tmp_path / "log.csv", TextFormat.model_validate(sniffed.form), "time")
+    table = read_log_table(tmp_path / "log.csv", TextFormat.model_validate(sniffed.form), "time")
     np.testing.assert_allclose(table["psi"].astype(float), 30.0 + T[2:])
 
 
@@ -254,7 +254,7 @@ def test_a_table_below_the_log_is_named_with_its_line(below: list[list[str]], ki
     place, other = ("line", "file") if kind == "csv" else ("row", "sheet")
     begins = f"{place} {len(log) + 3}: another table begins below the log, with '{below[0][0]}': .* another {other}"
     with pytest.raises(DataError, match=begins):
-        sniff(file)
+        recognise_log(file)
 
 
 def test_a_table_right_below_the_log_is_named_with_its_line(tmp_path: Path) -> None:
@@ -263,8 +263,8 @@ def test_a_table_right_below_the_log_is_named_with_its_line(tmp_path: Path) -> N
     other = TABLE.rename(columns={"N": "E", "psi": "rpm"}).to_csv(index=False).splitlines()
     remedy = r"another table begins below the log, with 'time': move it .*\[file.<name>\]"
     with pytest.raises(DataError, match=f"line {len(log) + 1}: {remedy}"):
-        sniff(log_of(tmp_path, [*log, *other]))
-    assert len(sniff(log_of(tmp_path, [*log[:10], "# rudder, 20", *log[10:]])).t) == len(T)
+        recognise_log(log_of(tmp_path, [*log, *other]))
+    assert len(recognise_log(log_of(tmp_path, [*log[:10], "# rudder, 20", *log[10:]])).t) == len(T)
 
 
 def test_words_beside_the_first_lines_are_no_header(tmp_path: Path) -> None:
@@ -273,7 +273,7 @@ def test_words_beside_the_first_lines_are_no_header(tmp_path: Path) -> None:
     beside = ["Weather", "Sea state 2", "Depth 54 m"]
     lines = [f"{line},,{beside[i] if i < len(beside) else ''}" for i, line in enumerate(lines)]
     (tmp_path / "log.csv").write_text("\n".join(lines))
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert list(sniffed.columns)[:2] == ["N", "psi"]
     np.testing.assert_allclose(sniffed.columns["psi"], 30.0 + T)
 
@@ -301,7 +301,7 @@ def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, di
     large = np.round(7_034_120.4 + 97.3 * T * (-1) ** np.arange(len(T)), digits) if digits else np.round(1800 + 3 * T)
     table = TABLE.assign(lat=63.4399978 + 1e-5 * T, N=[written(one) for one in large])
     table.to_csv(tmp_path / "log.csv", index=False, sep=separator, decimal=decimal)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.form.items() >= {"decimal": decimal, "thousands": mark, "separator": separator}.items()
     np.testing.assert_allclose(sniffed.columns["N"], large)
     np.testing.assert_allclose(sniffed.columns["lat"], table["lat"])
@@ -316,7 +316,7 @@ def test_marks_of_thousands_are_read_beside_dates_with_points(tmp_path: Path) ->
     table.insert(0, "Datum", days.dt.strftime("%d.%m.%Y"))
     table.insert(1, "Uhrzeit", days.dt.strftime("%H:%M:%S,%f"))
     table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=",")
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.form["thousands"] == "."
     np.testing.assert_allclose(sniffed.columns["N"], north)
 
@@ -326,7 +326,7 @@ def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
     """1,800 is 1.8 where nothing in the log says that it is 1800."""
     table = TABLE.assign(time=TABLE["time"] + 1.0)
     table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal, float_format="%.3f")
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert "thousands" not in sniffed.form
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
 
@@ -339,13 +339,13 @@ def test_a_row_for_each_value_is_named(more: str, tmp_path: Path) -> None:
     with pytest.raises(
         DataError, match=r"a row for each value, called 'GPS1.LAT', 'GPS1.LON', .*: write a row for each"
     ):
-        sniff(log_of(tmp_path, [f"Timestamp,Tag,Value{',Quality' * bool(more)}", *rows]))
+        recognise_log(log_of(tmp_path, [f"Timestamp,Tag,Value{',Quality' * bool(more)}", *rows]))
 
 
 def test_a_header_longer_than_its_rows_keeps_its_names(tmp_path: Path) -> None:
     """As LabVIEW writes: a column of comments has a name and no cells."""
     lines = text().splitlines()
-    sniffed = sniff(log_of(tmp_path, [f"{lines[0]},,Comment", *lines[1:]]))
+    sniffed = recognise_log(log_of(tmp_path, [f"{lines[0]},,Comment", *lines[1:]]))
     assert list(sniffed.columns) == ["N", "psi"]
 
 
@@ -354,4 +354,4 @@ def test_sentences_of_two_bytes_a_character_are_named(encoding: str, tmp_path: P
     lines = [f"$HEHDT,{k},T" for k in range(40)]
     (tmp_path / "log.nmea").write_bytes("\r\n".join(lines).encode(encoding))
     with pytest.raises(DataError, match=f"NMEA 0183 in {encoding}: save it in utf-8"):
-        sniff(tmp_path / "log.nmea")
+        recognise_log(tmp_path / "log.nmea")

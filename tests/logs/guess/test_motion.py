@@ -13,7 +13,7 @@ from shipid.logs.guess.motion import (
     choose_velocities,
     choose_yaw_rate,
     is_possible,
-    pace,
+    ship_pace,
 )
 from shipid.units import GRAVITY
 from tests.logs.conftest import CLOCKS, SPEEDS
@@ -156,7 +156,7 @@ def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> Non
 def test_a_slow_model_that_goes_as_none_of_its_length_does_is_asked(wrong: float, asked: int) -> None:
     """With its clock in minutes it goes as a fast ship: only its length says that it does not."""
     state = state_with_pose({}, 1.0 / wrong)
-    speed, across = pace(state)
+    speed, across = ship_pace(state)
     scale = min(1.0, 0.5 * HARDEST / across, 0.5 * FASTEST / speed)
     assert state.position is not None
     state.position = np.asarray(scale * state.position)

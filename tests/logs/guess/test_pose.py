@@ -10,7 +10,7 @@ from pymap3d import geodetic2ecef, ned2geodetic
 
 from shipid.errors import DataError
 from shipid.logs.guess.clues import State
-from shipid.logs.guess.pose import Frame, choose_pose, plane
+from shipid.logs.guess.pose import Frame, choose_pose, local_plane
 from tests.logs.simulated import si_log, state_of
 
 LOG = si_log()
@@ -44,7 +44,7 @@ def test_far_from_the_first_place_the_way_is_along_the_meridians_there(latitude:
     lat, lon = ned2geodetic(NORTH, EAST, 0.0, latitude, 14.4, 0.0)[:2]
     first = np.arange(len(T)) < 20
     columns = {"lat": np.where(first, latitude, lat), "lon": np.where(first, 10.4, lon)}
-    way = np.diff(plane(state_of(columns, T), "lat", "lon", on_globe=True))[20:]
+    way = np.diff(local_plane(state_of(columns, T), "lat", "lon", on_globe=True))[20:]
     np.testing.assert_allclose(way, np.diff(NORTH + 1j * EAST)[20:], rtol=2e-3)
 
 
@@ -222,8 +222,8 @@ def test_what_is_missing_is_named(columns: dict[str, np.ndarray], missing: str) 
 
 def test_a_degree_of_latitude_is_sixty_miles() -> None:
     state = state_of({"lat": np.array([60.0, 60.5, 61.0]), "lon": np.array([5.0, 5.0, 6.0])}, np.arange(3.0))
-    assert plane(state, "lat", "lon", on_globe=True)[1] == pytest.approx(30 * 1852, rel=5e-3)
-    np.testing.assert_array_equal(plane(state, "lat", "lon", on_globe=False), [60 + 5j, 60.5 + 5j, 61 + 6j])
+    assert local_plane(state, "lat", "lon", on_globe=True)[1] == pytest.approx(30 * 1852, rel=5e-3)
+    np.testing.assert_array_equal(local_plane(state, "lat", "lon", on_globe=False), [60 + 5j, 60.5 + 5j, 61 + 6j])
 
 
 @pytest.mark.parametrize(("off", "asked"), [(5.0, True), (0.2, False)])

@@ -14,10 +14,10 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
 from shipid.files import write_new
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import draft_mapping, untried
+from shipid.logs.guess.draft import draft_mapping, draft_text
 from shipid.logs.guess.pose import Frame
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.mapping import degrees_of
+from shipid.logs.mapping import degrees_and_minutes
 from tests.logs.simulated import SCHEDULE, as_bridge, si_log
 
 LOG = si_log()
@@ -205,7 +205,7 @@ def test_messages_of_AIS_are_decoded(names: tuple[str, ...], silent: bool, tmp_p
 
 def test_numbers_that_are_no_rate_of_AIS_are_refused(tmp_path: Path) -> None:
     frame = as_ais(("t", "lat", "lon", "speed", "course", "heading", "turn"))
-    draft = untried(guess(as_file(frame, tmp_path))).replace("sha256", "# sha256")
+    draft = draft_text(guess(as_file(frame, tmp_path))).replace("sha256", "# sha256")
     wrong = as_file(frame.assign(turn=frame["turn"].where(frame.index != 5, 300)), tmp_path)
     with pytest.raises(DataError, match=r"columns\.r\.unit: 300 in row 6 is none of -128 to 127, as AIS has: is the"):
         import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)
@@ -333,13 +333,13 @@ def test_names_of_north_and_east_changed_round_are_said_where_a_course_shows_it(
 
 @pytest.mark.parametrize(("text", "value"), [(6326.4, 63.44), (-1024.0, -10.4), (5960.0, np.nan), (0.0, 0.0)])
 def test_degrees_and_minutes(text: float, value: float) -> None:
-    np.testing.assert_allclose(degrees_of(np.array([text])), [value])
+    np.testing.assert_allclose(degrees_and_minutes(np.array([text])), [value])
 
 
 def test_minutes_above_60_are_refused_with_their_row(tmp_path: Path) -> None:
     frame = on_globe(*((x // 1 * 100 + x % 1 * 60).round(6) for x in (LAT, LON)))
     frame.to_csv(tmp_path / "log.csv", index=False)
-    mapping = write_new(untried(guess(tmp_path / "log.csv")), tmp_path / "draft.toml")
+    mapping = write_new(draft_text(guess(tmp_path / "log.csv")), tmp_path / "draft.toml")
     frame.loc[3, "lat"] = 6375.0
     frame.to_csv(tmp_path / "log.csv", index=False)
     mapping.write_text("\n".join(line for line in mapping.read_text().splitlines() if "sha256" not in line))
@@ -348,7 +348,7 @@ def test_minutes_above_60_are_refused_with_their_row(tmp_path: Path) -> None:
 
 
 def test_only_positions_are_in_degrees_and_minutes(tmp_path: Path) -> None:
-    mapping = untried(guess(as_file(BRIDGE, tmp_path))).replace('unit = "deg"', 'unit = "ddmm"', 1)
+    mapping = draft_text(guess(as_file(BRIDGE, tmp_path))).replace('unit = "deg"', 'unit = "ddmm"', 1)
     with pytest.raises(DocumentError, match="only latitude and longitude"):
         read_mapping(write_new(mapping, tmp_path / "draft.toml"))
 
@@ -488,7 +488,7 @@ def test_a_rudder_with_its_side_in_letters_is_read(style: str, tmp_path: Path) -
 @pytest.mark.parametrize("text", ["12.5", "P-12.5", "P12.5S", "Q12.5"])
 def test_a_rudder_without_its_side_among_others_is_refused(text: str, tmp_path: Path) -> None:
     frame = BRIDGE.assign(rudder=RUDDER.map(TEXTS["P12.5"]))
-    draft = untried(guess(as_file(frame, tmp_path))).replace("sha256", "# sha256")
+    draft = draft_text(guess(as_file(frame, tmp_path))).replace("sha256", "# sha256")
     wrong = as_file(frame.assign(rudder=frame["rudder"].where(frame.index != 5, text)), tmp_path)
     with pytest.raises(DataError, match=r"row 6: .* is no number( and no angle with S or P)? \(column 'rudder'"):
         import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)

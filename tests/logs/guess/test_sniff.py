@@ -10,9 +10,9 @@ import pytest
 from scipy.io import savemat
 
 from shipid.errors import DataError
-from shipid.logs.guess.clock import plain
-from shipid.logs.guess.layout import cells
-from shipid.logs.guess.sniff import sniff
+from shipid.logs.guess.clock import name_without_unit
+from shipid.logs.guess.layout import split_cells
+from shipid.logs.guess.sniff import recognise_log
 from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, text
 
 
@@ -21,7 +21,7 @@ def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None
     savemat(
         file, {**{name: TABLE[name].to_numpy() for name in TABLE}, "rpm": TABLE["N"].to_numpy(dtype=object), "m": 3}
     )
-    sniffed = sniff(file)
+    sniffed = recognise_log(file)
     assert list(sniffed.columns) == ["N", "psi"]
     assert sniffed.notes == (
         "'rpm' is an array of 20 cells, not a vector of numbers: save rpm = cell2mat(rpm), or datenum(rpm) of dates",
@@ -33,12 +33,12 @@ def test_only_variables_that_must_be_saved_anew_have_a_note(tmp_path: Path) -> N
     file = tmp_path / "log.mat"
     columns = {name: TABLE[name].to_numpy() for name in TABLE}
     savemat(file, {**columns, "saved": np.ones((len(TABLE), 2)), "save_rate": 3.0})
-    assert sniff(file).notes == ()
+    assert recognise_log(file).notes == ()
 
 
 def test_a_quantity_in_words_has_its_remedy(tmp_path: Path) -> None:
     rows = [f"{k},{'PS'[k % 2]}{k % 9}.5,A{k},{k % 3},{k % 5}" for k in range(80)]
-    notes = sniff(
+    notes = recognise_log(
         log_of(tmp_path, ["time,Rudder order,ROT,remark,x,y", *(row.replace(",", ",P1,", 1) for row in rows)])
     ).notes
     assert "column 'ROT' holds words, not numbers, such as 'P0.5': write it as a number with a sign" in notes
@@ -47,7 +47,7 @@ def test_a_quantity_in_words_has_its_remedy(tmp_path: Path) -> None:
 
 def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> None:
     TABLE.assign(mode="auto", spare=np.nan, N=TABLE["N"].where(T != 2.0)).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert list(sniffed.columns) == ["N", "psi"]
     assert sniffed.notes == ("column 'mode' holds words, not numbers", "column 'spare' is empty")
     assert np.flatnonzero(np.isnan(sniffed.columns["N"])).tolist() == [4]
@@ -79,25 +79,25 @@ def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> Non
 def test_what_is_no_log_is_one_sentence(content: bytes, message: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_bytes(content)
     with pytest.raises(DataError, match=rf"log\.csv.*{message}"):
-        sniff(tmp_path / "log.csv")
+        recognise_log(tmp_path / "log.csv")
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"cannot be read \(No such file"):
-        sniff(tmp_path / "gone.csv")
+        recognise_log(tmp_path / "gone.csv")
 
 
 def test_cells_and_names() -> None:
-    assert cells('1, "a b" ,', ",") == ["1", "a b", ""]
-    assert cells(" 1   2\t3", "whitespace") == ["1", "2", "3"]
-    assert plain(" Yaw-Rate (deg/s)") == "yaw_rate"
+    assert split_cells('1, "a b" ,', ",") == ["1", "a b", ""]
+    assert split_cells(" 1   2\t3", "whitespace") == ["1", "2", "3"]
+    assert name_without_unit(" Yaw-Rate (deg/s)") == "yaw_rate"
 
 
 @pytest.mark.parametrize("word", ["-999", "9999", "-99.0"])
 def test_a_number_for_missing_values_is_reported_and_not_taken(tmp_path: Path, word: str) -> None:
     rows = [f"{k},{np.sin(k):.3f},{360 * ((0.01 * k) % 1):.1f}" for k in range(80)]
     rows[40] = f"40,{word},{word if word != '-99.0' else '144.0'}"
-    sniffed = sniff(log_of(tmp_path, ["time,x,heading", *rows]))
+    sniffed = recognise_log(log_of(tmp_path, ["time,x,heading", *rows]))
     assert sniffed.form["missing"][-1] == word
     assert np.isnan(sniffed.columns["x"][40])
     assert np.nanmax(np.abs(sniffed.columns["heading"])) <= 360
@@ -108,7 +108,7 @@ def test_a_word_for_nothing_is_declared_as_a_missing_value(tmp_path: Path, word:
     """Before, the draft could not be imported: this word is no number."""
     rows = [f"{k};{str(np.sin(k)).replace('.', ',')};{k % 360}" for k in range(80)]
     rows[40] = f"40;{word};{word}"
-    sniffed = sniff(log_of(tmp_path, ["time;x;heading", *rows]))
+    sniffed = recognise_log(log_of(tmp_path, ["time;x;heading", *rows]))
     assert sniffed.form["missing"] == ["", "nan", "NaN", word]
     assert f"{word!r} stands for a value that is missing" in sniffed.notes
     assert all(np.flatnonzero(np.isnan(values)).tolist() == [40] for values in sniffed.columns.values())
@@ -118,7 +118,9 @@ def test_a_word_for_nothing_is_declared_as_a_missing_value(tmp_path: Path, word:
 def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: str, value: float) -> None:
     """Before, a speed over ground was taken for one with a factor of 0.64."""
     held = [f"{12 + 5 * np.sin(k / 9):.1f}" if k % 20 else str(value) for k in range(80)]
-    sniffed = sniff(log_of(tmp_path, [f"time,{name},rpm", *(f"{k},{one},{k % 3}" for k, one in enumerate(held))]))
+    sniffed = recognise_log(
+        log_of(tmp_path, [f"time,{name},rpm", *(f"{k},{one},{k % 3}" for k, one in enumerate(held))])
+    )
     assert sniffed.form["missing"][-1] == str(value)
     assert np.isnan(sniffed.columns[name]).sum() == 4
 
@@ -141,11 +143,11 @@ def test_a_number_far_beyond_all_others_again_and_again_is_a_missing_value(
     rows = [
         f"{k / 2},{k % 7},{value if k % 20 == row % 20 and k >= row else others[k % len(others)]}" for k in range(80)
     ]
-    sniffed = sniff(log_of(tmp_path, ["time,psi,n", *rows]))
+    sniffed = recognise_log(log_of(tmp_path, ["time,psi,n", *rows]))
     assert np.isnan(sniffed.columns["n"]).any() == lost
     assert (value in sniffed.form.get("missing", [])) == lost
     rows[9] = f"4.5,{value},{others[0]}"  # of another column it is a value
-    assert "missing" not in sniff(log_of(tmp_path, ["time,psi,n", *rows])).form
+    assert "missing" not in recognise_log(log_of(tmp_path, ["time,psi,n", *rows])).form
 
 
 @pytest.mark.parametrize(
@@ -170,44 +172,46 @@ def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], w
     rows = [f"{k},{values[k % 2]},{10 + k % 2},{np.sin(k):.3f}" for k in range(80)]
     log = log_of(tmp_path, [f"time,{name},lat,heading", *rows])
     if not words:
-        assert "lat" in sniff(log).columns
+        assert "lat" in recognise_log(log).columns
         return
     remedy = "write the rows of each ship to a separate log, or take the column out of the log if it is one ship$"
     with pytest.raises(DataError, match=f"{re.escape(words)}.*: {remedy}"):
-        sniff(log)
+        recognise_log(log)
 
 
 def test_a_column_that_changes_with_every_row_is_no_ship(tmp_path: Path) -> None:
     rows = [f"{k},{k},{np.sin(k):.3f}" for k in range(80)]
-    assert "lat" in sniff(log_of(tmp_path, ["time,Ship no,lat", *rows])).columns
+    assert "lat" in recognise_log(log_of(tmp_path, ["time,Ship no,lat", *rows])).columns
 
 
 def test_a_column_of_whole_degrees_is_no_list_of_ships(tmp_path: Path) -> None:
     """A heading `Ship` was refused as 84 ships."""
     rows = [f"{k},{k // 10},{np.sin(k):.3f}" for k in range(840)]
-    assert "Ship" in sniff(log_of(tmp_path, ["time,Ship,lat", *rows])).columns
+    assert "Ship" in recognise_log(log_of(tmp_path, ["time,Ship,lat", *rows])).columns
     names = [f"{k},Ship {k // 10},{np.sin(k):.3f}" for k in range(840)]
     with pytest.raises(DataError, match="holds 84 ships"):
-        sniff(log_of(tmp_path, ["time,Ship,lat", *names]))
+        recognise_log(log_of(tmp_path, ["time,Ship,lat", *names]))
 
 
 def test_a_number_for_missing_values_is_one_in_every_column(tmp_path: Path) -> None:
     """In hundredths of a degree -999 is not far from the others, but the import takes it for a missing value."""
     rows = [f"{k},{np.sin(k):.3f},{400 * k}" for k in range(80)]
     rows[40] = "40,-999,-999"
-    assert np.isnan(sniff(log_of(tmp_path, ["time,x,heading", *rows])).columns["heading"][40])
+    assert np.isnan(recognise_log(log_of(tmp_path, ["time,x,heading", *rows])).columns["heading"][40])
 
 
 def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
     rows = [f"{k},{600 + 5 * k}" for k in range(80)] + ["80,999"]
-    assert "missing" not in sniff(log_of(tmp_path, ["time,rpm", *rows])).form
+    assert "missing" not in recognise_log(log_of(tmp_path, ["time,rpm", *rows])).form
 
 
 @pytest.mark.parametrize("others", [(98,), (0,), (60, 99), (0, 55)])
 def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tmp_path: Path) -> None:
     """Before, every row of 99 was taken out where the rest was 98, or stood."""
     speeds = np.repeat([*others, 99], 40)
-    sniffed = sniff(log_of(tmp_path, ["time,heading,rpm", *(f"{k},{k % 360}.5,{n}" for k, n in enumerate(speeds))]))
+    sniffed = recognise_log(
+        log_of(tmp_path, ["time,heading,rpm", *(f"{k},{k % 360}.5,{n}" for k, n in enumerate(speeds))])
+    )
     assert "missing" not in sniffed.form
     assert sniffed.columns["rpm"].tolist() == speeds.tolist()
 
@@ -216,13 +220,13 @@ def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tm
 def test_a_packed_log_is_named_as_one(name: str, tmp_path: Path) -> None:
     TABLE.to_csv(tmp_path / name, index=False)
     with pytest.raises(DataError, match=r"packed by|a ZIP archive") as caught:
-        sniff(tmp_path / name)
+        recognise_log(tmp_path / name)
     assert "unpack it" in caught.value.message
 
 
 def test_a_column_of_yes_and_no_is_no_number(tmp_path: Path) -> None:
     TABLE.assign(rpm=T > 3).to_parquet(tmp_path / "log.parquet")
-    sniffed = sniff(tmp_path / "log.parquet")
+    sniffed = recognise_log(tmp_path / "log.parquet")
     assert "rpm" not in sniffed.columns
     assert any("'rpm' holds words" in note for note in sniffed.notes)
 
@@ -245,7 +249,7 @@ def test_degrees_and_minutes_in_columns(
     parts = [parts[0], size % 1 * 60] if len(names) == 2 else parts
     parts = [-size, -size] if columns is None else parts
     TABLE.assign(**dict(zip(names, parts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.in_parts == (columns or {} if columns is None else columns or {" + ".join(names): names})
     if columns is not None:
         np.testing.assert_allclose(sniffed.columns[" + ".join(names)], -size)
@@ -270,7 +274,7 @@ def test_positions_as_text(
     texts = [[f"{one} {other}" for one, other in zip(*texts, strict=True)]] if len(names) == 1 else texts
     texts[0][3] = nothing
     TABLE.assign(**dict(zip(names, texts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.in_parts == made
     assert sniffed.sides == ({"S", "E"} if names[-1] != "remark" else {"S"})
     latitude = sniffed.columns["Position latitude" if made else "Latitude"]
@@ -288,7 +292,7 @@ def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path
     table = TABLE.assign(rudder=np.sin(T)).astype(object)
     table.loc[4:7, "rudder"] = value
     table.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = sniff(tmp_path / "log.csv")
+    sniffed = recognise_log(tmp_path / "log.csv")
     assert value in sniffed.form["missing"]
     assert np.flatnonzero(np.isnan(sniffed.columns["rudder"])).tolist() == [4, 5, 6, 7]
 
@@ -310,5 +314,5 @@ def test_minus_one_is_asked_where_nothing_else_is_negative(
 ) -> None:
     values = np.where(np.isin(np.arange(len(T)), (3, 11)), -1.0, others)
     TABLE.drop(columns="psi").assign(**{name: values}).to_csv(tmp_path / "log.csv", index=False)
-    doubts = sniff(tmp_path / "log.csv").doubts
+    doubts = recognise_log(tmp_path / "log.csv").doubts
     assert [doubt.partition(" and ")[0] for doubt in doubts] == [f"{name!r} is -1 in 2 rows"] * asked

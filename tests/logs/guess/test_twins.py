@@ -11,8 +11,8 @@ import pytest
 from shipid.engine.rollout import rollout
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import choose_commands
-from shipid.logs.guess.evidence import windows
-from shipid.logs.guess.twins import twins
+from shipid.logs.guess.evidence import row_windows
+from shipid.logs.guess.twins import twin_columns
 from shipid.vessel.load import load_vessel
 
 STEP = 0.2
@@ -51,7 +51,7 @@ def craft(seed: int) -> pd.DataFrame:
 def guessed(log: pd.DataFrame, columns: dict[str, np.ndarray]) -> State:
     t = log["t"].to_numpy()
     position = log["north"].to_numpy() + 1j * log["east"].to_numpy()
-    state = State(t, "s", columns, windows(t), position=position, psi=log["psi"].to_numpy(), r=log["r"].to_numpy())
+    state = State(t, "s", columns, row_windows(t), position=position, psi=log["psi"].to_numpy(), r=log["r"].to_numpy())
     choose_commands(state)
     return state
 
@@ -122,4 +122,4 @@ def test_two_columns_are_twins_where_only_the_side_differs() -> None:
     log = craft(0)
     values = {name: log["port"].to_numpy() for name in ("cmd port", "cmd stbd", "temp port", "gas stbd", "cmd")}
     t = log["t"].to_numpy()
-    assert twins(State(t, "s", values, windows(t))) == [("cmd port", "cmd stbd")]
+    assert twin_columns(State(t, "s", values, row_windows(t))) == [("cmd port", "cmd stbd")]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.logs.guess.columns import guess
-from shipid.logs.guess.draft import untried
+from shipid.logs.guess.draft import draft_text
 from tests.logs.simulated import as_bridge, si_log
 
 
@@ -39,7 +39,7 @@ def test_a_column_that_is_not_used_says_why(name: str, values: str, message: str
     proposal = guess(file)
     assert list(proposal.unused) == [name]
     assert message in proposal.unused[name]
-    assert f"# column {name!r} is not used: {proposal.unused[name]}" in untried(proposal)
+    assert f"# column {name!r} is not used: {proposal.unused[name]}" in draft_text(proposal)
 
 
 @pytest.mark.parametrize("name", ["SOG [km/h]", "Fahrt \u00fc. Grund [km/h]"])

@@ -7,13 +7,13 @@ import pytest
 from shipid.logs.guess.words import (
     OTHERS,
     PHRASES,
-    fits,
     is_magnetic,
     is_order,
     is_run,
-    parts_of,
-    side_of,
-    units_in,
+    meaning_scores,
+    name_parts,
+    side_in_name,
+    units_in_name,
     wind_kind,
 )
 from shipid.physics.signals import SIGNALS
@@ -38,7 +38,7 @@ from shipid.physics.signals import SIGNALS
     ],
 )
 def test_parts(name: str, parts: tuple[str, ...]) -> None:
-    assert parts_of(name) == parts
+    assert name_parts(name) == parts
 
 
 @pytest.mark.parametrize(
@@ -106,19 +106,19 @@ def test_parts(name: str, parts: tuple[str, ...]) -> None:
     ],
 )
 def test_the_best_meaning(name: str, meaning: str) -> None:
-    scores = fits(name)
+    scores = meaning_scores(name)
     assert max(scores, key=lambda one: scores[one]) == meaning
 
 
 @pytest.mark.parametrize("name", ["Heading setpoint", "psi_d", "Sollkurs", "HDG SET", "rudder_cmd"])
 def test_an_order_is_no_measured_motion(name: str) -> None:
     assert is_order(name)
-    motion = {meaning for meaning in fits(name) if meaning in SIGNALS and SIGNALS[meaning].role == "motion"}
+    motion = {meaning for meaning in meaning_scores(name) if meaning in SIGNALS and SIGNALS[meaning].role == "motion"}
     assert not motion
 
 
 def test_an_order_of_the_rudder_is_a_command() -> None:
-    assert fits("Rudder order")["delta"] > 0.6
+    assert meaning_scores("Rudder order")["delta"] > 0.6
 
 
 @pytest.mark.parametrize(
@@ -126,28 +126,28 @@ def test_an_order_of_the_rudder_is_a_command() -> None:
     [("RPM P", "port"), ("n StB", "starboard"), ("Ruder BB", "port"), ("p", None), ("n act[1/s]", None)],
 )
 def test_sides(name: str, side: str | None) -> None:
-    assert side_of(name) == side
+    assert side_in_name(name) == side
 
 
 @pytest.mark.parametrize("name", ["Ruderpropeller_Winkel_{}_deg", "rpm{}", "Ruder{}", "Drehzahl {} [1/min]", "n_{}"])
 @pytest.mark.parametrize(("port", "starboard"), [("BB", "StB"), ("BB", "STB"), ("Bb", "Stb"), ("PS", "SB")])
 def test_both_sides_of_a_pair_fit_the_same(name: str, port: str, starboard: str) -> None:
     names = name.format(port), name.format(starboard)
-    assert [side_of(one) for one in names] == ["port", "starboard"]
-    assert fits(names[0]) == fits(names[1])
+    assert [side_in_name(one) for one in names] == ["port", "starboard"]
+    assert meaning_scores(names[0]) == meaning_scores(names[1])
 
 
 def test_every_phrase_fits_its_meaning() -> None:
     for meaning, phrases in {**PHRASES, "": OTHERS}.items():
         for phrase in phrases.split(", "):
-            taken = not meaning and SIGNALS.keys() & fits(phrase)  # a signal takes a name that had no meaning
+            taken = not meaning and SIGNALS.keys() & meaning_scores(phrase)  # a signal takes a name that had no meaning
             if not is_order(phrase) and not taken:
-                assert fits(phrase).get(meaning, 0.0) > 0.6, (meaning, phrase, fits(phrase))
+                assert meaning_scores(phrase).get(meaning, 0.0) > 0.6, (meaning, phrase, meaning_scores(phrase))
 
 
 def test_a_name_that_says_nothing_fits_nothing() -> None:
-    assert fits("Kanal 17") == {}
-    assert fits("") == {}
+    assert meaning_scores("Kanal 17") == {}
+    assert meaning_scores("") == {}
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_a_name_says_that_its_column_is_the_run(name: str, said: bool) -> None:
     [("Schub / kN", ["kN"]), ("v, m/s", ["m/s"]), ("u [kn]", ["kn"]), ("m/s", []), ("Wind speed", [])],
 )
 def test_units_that_are_set_off(name: str, units: list[str]) -> None:
-    assert units_in(name) == units
+    assert units_in_name(name) == units
 
 
 def test_a_magnetic_heading_is_a_second_one() -> None:
