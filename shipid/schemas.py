@@ -78,9 +78,9 @@ def _study_schema() -> Schema:
 
 
 def _settings_schema() -> Schema:
-    from shipid.identification.outcome import Settings
+    from shipid.identification.outcome import SettingsFile
 
-    return _model_schema(Settings)
+    return _model_schema(SettingsFile)
 
 
 class _ClosedModel(BaseModel):

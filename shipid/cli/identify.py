@@ -93,7 +93,7 @@ def identify_command(
     """
     from shipid.data.dataset import read_dataset
     from shipid.files import check_new
-    from shipid.identification.outcome import check, read_settings, run_identification, write_patch
+    from shipid.identification.outcome import check_identification, read_settings, run_identification, write_patch
     from shipid.study.structures import check_comparison
     from shipid.vessel.load import load_vessel
 
@@ -124,7 +124,9 @@ def identify_command(
     how |= {} if folds is None else {"folds": folds}
     if structures is None:
         with _errors_of_settings(settings):
-            check(ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ())
+            check_identification(
+                ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ()
+            )
     elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
         raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
     else:
@@ -204,7 +206,7 @@ def _compare_structures(
 
 def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     """Print errors on runs held out, standard manoeuvres, and errors by side."""
-    from shipid.identification.sides import HEADS, shown
+    from shipid.identification.sides import HEADS, side_table_rows
 
     length = f"of {compared.ahead:g} s" if compared.ahead else "as long as the runs"
     answer.say(
@@ -238,7 +240,7 @@ def _show_structures(compared: StructureComparison, answer: Answer) -> None:
     answer.say("between: range over the structures not shown to be worse; within: the widest interval of one of them")
     if len(compared.groups):
         answer.say(f"Errors of {compared.chosen} by side, helm and speed, on runs that the fit has not seen:")
-        answer.rows("groups", compared.groups, text_table(list(HEADS), shown(compared.groups)))
+        answer.rows("groups", compared.groups, text_table(list(HEADS), side_table_rows(compared.groups)))
     answer.say("\n".join(compared.sentences), sentences=list(compared.sentences))
     answer.rows("spread", compared.spread, None)
     notes = compared.manoeuvres[(compared.manoeuvres["note"].fillna("") != "") & (compared.manoeuvres["measure"] == "")]
@@ -306,7 +308,7 @@ def _show_nuisances(outcome: Identified, answer: Answer) -> None:
 
 def _show_identified(outcome: Identified, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
-    from shipid.identification.sides import HEADS, shown
+    from shipid.identification.sides import HEADS, side_table_rows
 
     _show_estimates(outcome, answer)
     _show_nuisances(outcome, answer)
@@ -314,7 +316,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
     _show_manoeuvres(outcome, answer)
     if len(outcome.groups):
         answer.say(f"Errors by side, helm and speed, on {'runs held out' if outcome.held_out else 'the fitted runs'}:")
-        answer.rows("groups", outcome.groups, text_table(list(HEADS), shown(outcome.groups)))
+        answer.rows("groups", outcome.groups, text_table(list(HEADS), side_table_rows(outcome.groups)))
     if outcome.solution.effective:
         worth = ", ".join(f"{name} {count:.0f}" for name, count in outcome.solution.effective.items())
         counts = dict(outcome.solution.effective)

@@ -35,7 +35,7 @@ def replay_command(
     from shipid.data.dataset import read_dataset
     from shipid.data.windows import gaps_in_words
     from shipid.files import check_table, write_table
-    from shipid.identification.free_run import free_runs, unfelt
+    from shipid.identification.free_run import missing_inputs, simulate_free_runs
     from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
     from shipid.identification.segments import too_short
@@ -56,8 +56,8 @@ def replay_command(
     short = too_short(log, chosen, step, ahead)
     chosen = tuple(run for run in chosen if run not in short) or chosen
     settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0, commands=commands)
-    replayed = free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
-    zero = unfelt(ship, log, settings, chosen)
+    replayed = simulate_free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
+    zero = missing_inputs(ship, log, settings, chosen)
     holes = gaps_in_words(log.select(chosen), step)
     late = late_commands(ship, log, chosen) if commands == "held" else None
     rows = [[row["run"], *motion_errors(row)] for row in replayed.errors.to_dict("records")]

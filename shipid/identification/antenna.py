@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.document import short_names
-from shipid.identification.covariance import inverted
+from shipid.identification.covariance import invert_information
 from shipid.identification.late_fit import OUTSIDE
-from shipid.identification.settings import unknowns
+from shipid.identification.settings import free_factors
 from shipid.identification.solve import Solution, by_log, identify
-from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
 from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
 from shipid.units import join_names, percent_text, significant_digits
 
@@ -48,7 +48,7 @@ class Antenna:
         return self.certain >= CERTAIN and self.explained >= EXPLAINED
 
 
-def antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
+def locate_antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
     """The point that the log looks to be of; None where it is estimated already, or cannot be computed.
 
     What one step of Gauss-Newton shows is fitted again with the log moved to the origin: arms are not linear.
@@ -56,19 +56,19 @@ def antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
     length = solution.vessel.length
     if length is None or "lever_arm" in solution.settings.widths:
         return None
-    seen, total = stepped(solution, dataset, length), _squares(solution)
+    seen, total = step_antenna(solution, dataset, length), _sum_of_squares(solution)
     for _ in range(REFITS):
         if seen is None or seen.certain < CERTAIN or seen.explained < WORTH:
             return seen
         moved = _to_origin(dataset, seen.x, seen.y)
         again = identify(solution.vessel, moved, solution.runs, solution.settings)
-        more = stepped(again, moved, length, (seen.x, seen.y)) if again.status == "ok" else None
-        explained = 1 - _squares(again) / total
+        more = step_antenna(again, moved, length, (seen.x, seen.y)) if again.status == "ok" else None
+        explained = 1 - _sum_of_squares(again) / total
         seen = None if more is None else replace(more, explained=explained, factors=again.factors)
     return seen
 
 
-def stepped(
+def step_antenna(
     solution: Solution, dataset: Dataset, length: float, at: tuple[float, float] = (0.0, 0.0)
 ) -> Antenna | None:
     """The point after one step of Gauss-Newton with the factors; None where predictions diverge, or rows are too few.
@@ -86,13 +86,13 @@ def stepped(
         return None
     J = np.hstack([solution.jacobian[:, free], added])
     prior = np.append(solution.prior_widths[free], [np.inf, np.inf])
-    inverse = inverted(J.T @ J + np.diag(1 / prior**2))[0]
+    inverse = invert_information(J.T @ J + np.diag(1 / prior**2))[0]
     step = -inverse[:, -2:] @ (added.T @ solution.residuals)  # the factors are at their optimum
     left = solution.residuals + J @ step
     paths = (*np.array(solution.paths)[free].tolist(), AHEAD, ABEAM)
     factors = np.append(solution.factors[free], np.array(at) / length) + step
     clusters, signals = solution.clusters, solution.signals
-    judged = statistics(
+    judged = fit_statistics(
         LinearFit(paths, factors, left, J, clusters, signals, prior, solution.spent, runs=solution.runs)
     )
     half = (judged.high - judged.low)[-2:] / 2
@@ -104,27 +104,27 @@ def stepped(
     return Antenna(x, y, float(sizes.max()), explained, every)
 
 
-def turned(solution: Solution, dataset: Dataset) -> float:
+def heading_share(solution: Solution, dataset: Dataset) -> float:
     """Share of the squares of the residuals that a heading which is off takes away, by one step of Gauss-Newton."""
     free = ~(solution.held | solution.at_bound)
-    change = by_log(solution, dataset, _turned(dataset, OFF))
+    change = by_log(solution, dataset, _rotate_log(dataset, OFF))
     total = float(solution.residuals @ solution.residuals)
     if change is None or not total > 0:
         return 0.0
     added = change / OFF
     J = np.column_stack([solution.jacobian[:, free], added])
-    inverse = inverted(J.T @ J + np.diag(np.append(solution.prior_widths[free], np.inf) ** -2.0))[0]
+    inverse = invert_information(J.T @ J + np.diag(np.append(solution.prior_widths[free], np.inf) ** -2.0))[0]
     left = solution.residuals - J @ (inverse[:, -1] * float(added @ solution.residuals))
     return 1 - float(left @ left) / total
 
 
-def _turned(dataset: Dataset, angle: float) -> Dataset:
+def _rotate_log(dataset: Dataset, angle: float) -> Dataset:
     """The log with the heading turned by an angle [rad]; the velocity over ground is unchanged."""
     repair = HeadingOffset(kind="heading_offset", reason="a trial", offset=angle)
     return replace(dataset, frame=turn_heading(dataset.frame, repair).rows)
 
 
-def _squares(solution: Solution) -> float:
+def _sum_of_squares(solution: Solution) -> float:
     """Sum of the squares of the residuals; with huber of what each counts as, whatever share is within."""
     shares = np.array([solution.within[name] for name in solution.signals])
     return float((shares * solution.residuals) @ solution.residuals)
@@ -138,20 +138,20 @@ def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
 
 def antenna_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     """A sentence where the log looks like that of an antenna away from the origin; else none."""
-    seen, length = antenna(solution, dataset), solution.vessel.length
+    seen, length = locate_antenna(solution, dataset), solution.vessel.length
     if seen is None or length is None or not seen.shown:
         return ""
     far = np.hypot(seen.x, seen.y) >= NEAREST * length
     if not far or abs(seen.x) > FARTHEST * length or abs(seen.y) > WIDEST * length:
         return ""
-    if turned(solution, dataset) >= seen.explained:  # a heading that is off explains as much
+    if heading_share(solution, dataset) >= seen.explained:  # a heading that is off explains as much
         return ""
     half, changes = (judged.high - judged.low) / 2, seen.factors - solution.factors
     share = np.where(np.isfinite(half), np.abs(changes) / np.maximum(half, 1e-12), 0.0)
     worst = int(np.argmax(share))
     size, moves = abs(solution.factors[worst]), ""
     if share[worst] >= OUTSIDE and size > 0:
-        name = short_names(unknowns(solution.vessel, solution.settings).paths)[worst]
+        name = short_names(free_factors(solution.vessel, solution.settings).paths)[worst]
         change, width = 100 * changes[worst] / size, 100 * half[worst] / size
         moves = f" and moves {name} by {significant_digits(change, 2, '+')} %, its interval is +-{significant_digits(width, 2)} %"
     ways = ((seen.x, "ahead", "astern"), (seen.y, "to starboard", "to port"))

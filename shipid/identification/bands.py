@@ -21,7 +21,7 @@ from scipy.special import stdtrit
 
 from shipid.document import short_names
 from shipid.errors import DataError, ShipidError
-from shipid.identification.settings import unknowns
+from shipid.identification.settings import free_factors
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import join_names, significant_digits
@@ -57,7 +57,7 @@ def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str
     )
 
 
-def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
+def band_refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
     """Why no band can be promised, in one sentence; empty where one can."""
     why = short_horizon(solution, judged, spacing)
     if why:
@@ -71,7 +71,7 @@ def refusal(solution: Solution, judged: Statistics, spacing: float) -> str:
     return ""
 
 
-def bands(
+def measure_bands(
     vessel: Vessel,
     solution: Solution,
     judged: Statistics,
@@ -93,9 +93,9 @@ def bands(
     check_level(level)
     free = np.flatnonzero(~(solution.at_bound | solution.held))
     best = judged.covariances[judged.chosen]
-    axes = principal(best.matrix)
+    axes = principal_axes(best.matrix)
     quantile = float(stdtrit(np.median(best.freedom), 0.5 + level / 2))
-    at, unknown = vessel.with_values(solution.values), unknowns(vessel, solution.settings)
+    at, unknown = vessel.with_values(solution.values), free_factors(vessel, solution.settings)
     sides = []
     for axis in axes.T:
         for sign in (1.0, -1.0):
@@ -121,7 +121,7 @@ def bands(
     return pd.DataFrame(rows, columns=["manoeuvre", "measure", "value", "deviation", "low", "high", "note"])
 
 
-def principal(covariance: Array) -> Array:
+def principal_axes(covariance: Array) -> Array:
     """Principal axes (n, k) of a covariance (n, n), each as long as its standard deviation; tiny ones are left out."""
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
     kept = values > SMALL**2 * max(float(values.max(initial=0.0)), 1e-300)

@@ -53,7 +53,7 @@ class Combination:
         return f"only {join_names(self.names)} together; {' with '.join(moves)} has no effect on these data"
 
 
-def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:
+def collinear_sets(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:
     """Smallest sets with a collinearity index above `MOST_COLLINEAR`; worst first.
 
     Backward elimination: parameters are removed one by one, each time the one whose removal leaves the most collinear
@@ -64,23 +64,23 @@ def combinations(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ..
     silent = np.flatnonzero(lengths <= UNSEEN * lengths.max(initial=0.0)).tolist()
     names = short_names(paths)
     result = [Combination((paths[j],), (names[j],), (1.0,), float("inf")) for j in silent]
-    gram = _gram(jacobian)
+    gram = _scaled_gram(jacobian)
     left = [j for j in range(len(paths)) if j not in silent]
-    while len(left) > 1 and _gamma(gram, left) > MOST_COLLINEAR:
-        chosen = _shrunk(gram, left)
-        weights = _weakest(gram, chosen) / lengths[chosen]
+    while len(left) > 1 and _collinearity_index(gram, left) > MOST_COLLINEAR:
+        chosen = _shrink_set(gram, left)
+        weights = _weakest_direction(gram, chosen) / lengths[chosen]
         weights = weights / weights[np.argmax(np.abs(weights))]
         labels = tuple(paths[j] for j in chosen), tuple(names[j] for j in chosen)
-        result.append(Combination(*labels, tuple(map(float, weights)), _gamma(gram, chosen)))
-        left.remove(chosen[int(np.argmax(np.abs(_weakest(gram, chosen))))])
+        result.append(Combination(*labels, tuple(map(float, weights)), _collinearity_index(gram, chosen)))
+        left.remove(chosen[int(np.argmax(np.abs(_weakest_direction(gram, chosen))))])
     return tuple(result)
 
 
-def _shrunk(gram: Array, members: list[int]) -> list[int]:
+def _shrink_set(gram: Array, members: list[int]) -> list[int]:
     """Remove members one by one while the collinearity index stays above the limit; the members that are left."""
     while len(members) > 2:
         without = [[smaller for smaller in members if smaller != gone] for gone in members]
-        gammas = [_gamma(gram, smaller) for smaller in without]
+        gammas = [_collinearity_index(gram, smaller) for smaller in without]
         best = int(np.argmax(gammas))
         if gammas[best] <= MOST_COLLINEAR:
             break
@@ -88,17 +88,17 @@ def _shrunk(gram: Array, members: list[int]) -> list[int]:
     return members
 
 
-def _gamma(gram: Array, members: list[int]) -> float:
+def _collinearity_index(gram: Array, members: list[int]) -> float:
     smallest = float(np.linalg.eigvalsh(gram[np.ix_(members, members)])[0])
     return float(1 / np.sqrt(max(smallest, UNSEEN)))
 
 
-def _weakest(gram: Array, members: list[int]) -> Array:
+def _weakest_direction(gram: Array, members: list[int]) -> Array:
     """Unit vector of the smallest eigenvalue of the scaled Gram matrix: the direction with the least effect."""
     return np.asarray(np.linalg.eigh(gram[np.ix_(members, members)])[1][:, 0])
 
 
-def _gram(jacobian: Array) -> Array:
+def _scaled_gram(jacobian: Array) -> Array:
     """Gram matrix of the columns scaled to unit length; zero columns stay 0."""
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     scaled = jacobian / np.where(lengths > 0, lengths, 1.0)

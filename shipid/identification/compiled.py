@@ -12,14 +12,14 @@ from shipid.engine.native import C, StagedSource, compile_source, compiler_targe
 from shipid.engine.printing import print_function
 from shipid.engine.threads import run_tasks, threaded_source
 from shipid.engine.vectors import CompilerTarget, vector_source
-from shipid.identification.sensitivities import Layout, Variation, variation
+from shipid.identification.sensitivities import FitLayout, Variation, build_variation
 
 Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step
 _ARRAYS = dict.fromkeys(("numbers", "inputs", "signals", "state", "records"), "double")
 
 
-class _Source(StagedSource):
+class _VariationSource(StagedSource):
     """C source of one variation: terms of parameters alone are computed once, terms of the inputs once per step."""
 
     def __init__(self, model: Variation) -> None:
@@ -80,25 +80,25 @@ static void outputs(const V *z, const V *m, const V *saved0, const V *saved1, co
 
 
 @lru_cache(maxsize=32)
-def _library(layout: Layout) -> Any:
-    return compile_source(_Source(variation(layout)).text(compiler_target()))
+def _compile_variation(layout: FitLayout) -> Any:
+    return compile_source(_VariationSource(build_variation(layout)).text(compiler_target()))
 
 
-def pack(array: Array) -> Array:
+def pack_lanes(array: Array) -> Array:
     """Group predictions by SIMD lanes: (K, ..., entries) -> (groups, ..., entries, lanes); the last one is repeated."""
     lanes, count = compiler_target().lanes, len(array)
     filled = np.concatenate([array, np.repeat(array[-1:], -count % lanes, axis=0)])
     return np.ascontiguousarray(np.moveaxis(filled.reshape(-1, lanes, *array.shape[1:]), 1, -1), dtype=float)
 
 
-def run_compiled(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
+def run_compiled(layout: FitLayout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
     """Outputs (groups, lanes, N, .) of K predictions, by the compiled library.
 
     x : (K, size) initial states with their sensitivities. fixed : (K, .) numbers that are constant along a prediction.
-    known, seen : inputs and measured signals of each step, grouped by `pack`: (groups, N, ., lanes).
+    known, seen : inputs and measured signals of each step, grouped by `pack_lanes`: (groups, N, ., lanes).
     """
-    run, model = _library(layout), variation(layout)
-    state, numbers = pack(x), pack(fixed)
+    run, model = _compile_variation(layout), build_variation(layout)
+    state, numbers = pack_lanes(x), pack_lanes(fixed)
     groups, num_steps = known.shape[:2]
     records = np.empty((groups, num_steps, model.outputs.size1_out(0), compiler_target().lanes))
     work = num_steps * model.size  # of one group

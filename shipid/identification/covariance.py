@@ -10,7 +10,7 @@ from shipid.identification.collinearity import UNSEEN
 Array = NDArray[np.float64]
 
 
-def inverted(information: Array) -> tuple[Array, NDArray[np.bool_]]:
+def invert_information(information: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Pseudo-inverse (n, n) of an information matrix, and a mask (n,) of parameters along its null directions."""
     scale = np.sqrt(np.diag(information))
     scale = np.where(scale > 0, scale, 1.0)

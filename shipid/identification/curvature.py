@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.document import short_names
-from shipid.identification.covariance import inverted
-from shipid.identification.fit import beside
-from shipid.identification.residuals import build
+from shipid.identification.covariance import invert_information
+from shipid.identification.fit import local_linearisation
+from shipid.identification.residuals import build_problem
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import join_names
@@ -45,18 +45,18 @@ it may as well be open, and the rise, the difference of two sums of squares, may
 RANK = 1e-9  # relative, of a Jacobian
 
 
-def ends(judged: Statistics, at: Beside, profiled: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
+def interval_end_ratios(judged: Statistics, at: Beside, profiled: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
     """Factor -> how many times as far its lower and its upper end are from the estimate as those of its interval.
 
     Of identified factors, except those whose interval is narrow and those `profiled`. At most `MOST`; 0 where a
     prediction diverges at the end: a profile counts that as outside, too.
     """
-    fit, wide = judged.fit, _wide(judged, profiled)
+    fit, wide = judged.fit, _wide_factors(judged, profiled)
     if not wide:
         return {}
     places = np.array([fit.paths.index(path) for path in judged.free])
     J, precision = fit.jacobian[:, places], 0.0 if fit.prior_widths is None else 1 / fit.prior_widths[places] ** 2
-    inverse = inverted(J.T @ J + np.diag(precision * np.ones(len(places))))[0]
+    inverse = invert_information(J.T @ J + np.diag(precision * np.ones(len(places))))[0]
     least = float(np.square(at(np.zeros(len(fit.paths)))[0]).sum())
     result = {}
     for j in wide:
@@ -66,13 +66,13 @@ def ends(judged: Statistics, at: Beside, profiled: Sequence[str] = ()) -> dict[s
             change = np.zeros(len(fit.paths))
             change[places] = side * half * inverse[:, j] / variance
             e, slopes = at(change)
-            share = (_left(e, slopes[:, np.delete(places, j)]) - least) * variance / half**2
+            share = (_squares_after_step(e, slopes[:, np.delete(places, j)]) - least) * variance / half**2
             times.append(share**-0.5 if share > MOST**-2 else MOST)
         result[judged.free[j]] = (times[0], times[1])
     return result
 
 
-def _left(e: Array, J: Array) -> float:
+def _squares_after_step(e: Array, J: Array) -> float:
     """Sum of the squares of e (m,) after one step of Gauss-Newton with J (m, k); infinite where it diverges."""
     if not (np.isfinite(e).all() and np.isfinite(J).all()):
         return float("inf")
@@ -81,8 +81,8 @@ def _left(e: Array, J: Array) -> float:
     return float(np.square(e - scaled @ np.linalg.lstsq(scaled, e, rcond=RANK)[0]).sum())
 
 
-def sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str:
-    """The factors whose intervals end too early on a side, and by how much; none: empty. seen : of `ends`."""
+def curvature_sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str:
+    """The factors whose intervals end too early on a side, and by how much; none: empty. seen : of `interval_end_ratios`."""
     names = dict(zip(judged.fit.paths, short_names(judged.fit.paths), strict=True))
     short = [
         (times, path, f"{names[path]} {side} {times:.2g}")
@@ -99,7 +99,7 @@ def sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str
     )
 
 
-def curved(
+def curvature_warning(
     solution: Solution,
     dataset: Dataset,
     judged: Statistics,
@@ -110,19 +110,19 @@ def curved(
 
     profiled : factors that have a profile already. go_on : called before each prediction; what it raises ends the look.
     """
-    if not _wide(judged, profiled):
+    if not _wide_factors(judged, profiled):
         return ""
-    problem = build(solution.vessel, dataset, solution.runs, solution.settings)
-    at = beside(problem, solution.factors, solution.point)
+    problem = build_problem(solution.vessel, dataset, solution.runs, solution.settings)
+    at = local_linearisation(problem, solution.factors, solution.point)
 
     def next_at(change: Array) -> tuple[Array, Array]:
         go_on()
         return at(change)
 
-    return sentence(judged, ends(judged, next_at, profiled))
+    return curvature_sentence(judged, interval_end_ratios(judged, next_at, profiled))
 
 
-def _wide(judged: Statistics, profiled: Sequence[str]) -> list[int]:
+def _wide_factors(judged: Statistics, profiled: Sequence[str]) -> list[int]:
     """Places among the free factors of those that are identified, not profiled, with intervals that are not narrow."""
     places = [judged.fit.paths.index(path) for path in judged.free]
     half, size = judged.high - judged.fit.factors, np.abs(judged.fit.factors)

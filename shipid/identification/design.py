@@ -85,7 +85,7 @@ class Informed:
     information: Array
 
 
-def recorded(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[float, Limits]:
+def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[float, Limits]:
     """Median speed [m/s] of some runs, and as limits the greatest speed of the shafts that drive the ship ahead.
 
     A tunnel thruster turns faster, and is none of these.
@@ -96,7 +96,7 @@ def recorded(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[flo
     return float(np.median(np.hypot(rows["u"], rows["v"]))), limits
 
 
-def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
+def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
     """Candidate manoeuvres at each approach speed [m/s] that respect the limits.
 
     At each speed: zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in which
@@ -113,11 +113,11 @@ def candidates(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | No
             for angle in angles:
                 one = define_standard(vessel, kind, angle, speed=speed)
                 result.append(Candidate(f"{one.title}, {speed:.2g} m/s", one.manoeuvre))
-        result += _excitations(vessel, speed, length, bounds)
-    return [candidate for candidate in result if allowed(candidate.manoeuvre, bounds)]
+        result += _excitation_candidates(vessel, speed, length, bounds)
+    return [candidate for candidate in result if within_limits(candidate.manoeuvre, bounds)]
 
 
-def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
+def _excitation_candidates(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
     """A speed run and a multisine at one approach speed [m/s], with the largest amplitudes within the limits."""
     n_rpm, passing = shaft_speed(Controls(vessel), speed) / RPM, length / speed
     swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
@@ -132,7 +132,7 @@ def _excitations(vessel: Vessel, speed: float, length: float, limits: Limits) ->
     yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} rpm, {speed:.2g} m/s", waves)
 
 
-def allowed(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
+def within_limits(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
     """Whether all orders of a manoeuvre are within the limits of helm and shaft.
 
     The rate limits apply to excitations only: in other manoeuvres the actuator model limits the rates.
@@ -141,7 +141,7 @@ def allowed(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
     return shaft <= limits.n_rpm * (1 + 1e-9) and helm <= limits.angle_deg * (1 + 1e-9)
 
 
-def informed(
+def information_of_candidates(
     vessel: Vessel,
     choice: Sequence[Candidate],
     groups: Sequence[Sequence[str]],
@@ -173,18 +173,18 @@ def informed(
         raise ShipidError("no manoeuvre is within the limits of the actuators")
     every = steps_between(vessel, interval) if step is None else max(round(interval / step), 1)
     fine = interval / every
-    log = performed(vessel, choice, step=fine)
-    cut = _cut(vessel, log, round(horizon / interval) * every, every)
+    log = perform_candidates(vessel, choice, step=fine)
+    cut = _cut_predictions(vessel, log, round(horizon / interval) * every, every)
     signals = {name: width for signal, width in weights.items() for name in WEIGHTED[signal]}
-    by_factor, by_start = _sensitivities(vessel, cut, groups, scale, signals, fine, every)
-    each = _projected(by_factor, by_start)
+    by_factor, by_start = _finite_difference_sensitivities(vessel, cut, groups, scale, signals, fine, every)
+    each = _project_out_start(by_factor, by_start)
     return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
 
 
-def informed_of_possible(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[Informed]:
-    """As `informed`, without the candidates that cannot be simulated; ShipidError where none can."""
+def information_where_possible(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[Informed]:
+    """As `information_of_candidates`, without the candidates that cannot be simulated; ShipidError where none can."""
     try:
-        return informed(vessel, choice, *args, **how)
+        return information_of_candidates(vessel, choice, *args, **how)
     except ShipidError as error:
         if len(choice) < 2:
             raise
@@ -192,7 +192,7 @@ def informed_of_possible(vessel: Vessel, choice: Sequence[Candidate], *args: Any
     result = []
     for one in choice:
         try:
-            result += informed(vessel, [one], *args, **how)
+            result += information_of_candidates(vessel, [one], *args, **how)
         except ShipidError as error:  # the ship may perform the others
             reason = error
     if not result:
@@ -200,7 +200,7 @@ def informed_of_possible(vessel: Vessel, choice: Sequence[Candidate], *args: Any
     return result
 
 
-def performed(
+def perform_candidates(
     vessel: Vessel,
     choice: Sequence[Candidate],
     *,
@@ -238,7 +238,7 @@ class _Cut:
     seen: NDArray[np.bool_]
 
 
-def _cut(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
+def _cut_predictions(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
     """Cut logs into predictions of `steps` steps (0: whole runs); the last, shorter one of each run is kept."""
     model, names = vessel_dynamics(vessel), log["run"].to_numpy()
     bounds = [(np.flatnonzero(names == run)[0], int((names == run).sum())) for run in dict.fromkeys(names)]
@@ -265,7 +265,7 @@ def _cut(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
     )
 
 
-def _sensitivities(
+def _finite_difference_sensitivities(
     vessel: Vessel,
     cut: _Cut,
     groups: Sequence[Sequence[str]],
@@ -322,14 +322,16 @@ def _sensitivities(
     return by_factor, rows((apart[:, 0] - apart[:, 1]) / (2 * sizes))
 
 
-def _projected(by_factor: Array, by_start: Array) -> Array:
+def _project_out_start(by_factor: Array, by_start: Array) -> Array:
     """Fisher information (S, n, n) of the factors from each prediction, its initial state projected out."""
     crossed = by_start.swapaxes(1, 2) @ by_factor
     known = by_start.swapaxes(1, 2) @ by_start
     return np.asarray(by_factor.swapaxes(1, 2) @ by_factor - crossed.swapaxes(1, 2) @ np.linalg.pinv(known) @ crossed)
 
 
-def rank(contributions: Sequence[Informed], paths: Sequence[str], present: Array | None = None) -> pd.DataFrame:
+def rank_candidates(
+    contributions: Sequence[Informed], paths: Sequence[str], present: Array | None = None
+) -> pd.DataFrame:
     """Candidates: `manoeuvre`, `hours`, `gain` [bits], `per_hour` [bits/h], `narrows`, `before`, `after`.
 
     Those with the most bits per hour come first. `narrows` is the factor whose standard error falls by the largest
@@ -342,10 +344,10 @@ def rank(contributions: Sequence[Informed], paths: Sequence[str], present: Array
         default: that alone.
     """
     known = np.eye(len(paths)) / UNKNOWN**2 + (0.0 if present is None else present)
-    before, rows = _errors(known), []
+    before, rows = _standard_errors(known), []
     for one in contributions:
         total = known + one.information
-        gain, after = _bits(total) - _bits(known), _errors(total)
+        gain, after = _information_bits(total) - _information_bits(known), _standard_errors(total)
         most = int(np.argmax(before / after))
         rate = gain / one.candidate.hours
         rows.append((one.candidate.title, one.candidate.hours, gain, rate, paths[most], before[most], after[most]))
@@ -353,10 +355,10 @@ def rank(contributions: Sequence[Informed], paths: Sequence[str], present: Array
     return table.sort_values("per_hour", ascending=False, ignore_index=True)
 
 
-def _bits(information: Array) -> float:
+def _information_bits(information: Array) -> float:
     """1/2 log2 det [bits]."""
     return float(np.linalg.slogdet(information)[1] / (2 * np.log(2)))
 
 
-def _errors(information: Array) -> Array:
+def _standard_errors(information: Array) -> Array:
     return np.sqrt(np.diag(np.linalg.inv(information)))

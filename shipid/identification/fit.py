@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from shipid.identification.residuals import Prediction, Problem, predict
+from shipid.identification.residuals import Problem, ResidualPrediction, predict_residuals
 from shipid.identification.settings import NUISANCES
 from shipid.interrupts import hold_interrupts
 
@@ -59,13 +59,13 @@ class Result:
     """
 
     factors: Array
-    at: Prediction
+    at: ResidualPrediction
     objective: float
     iterations: int
     status: str
 
 
-def loss(r: Array, threshold: float) -> tuple[Array, Array]:
+def huber_loss(r: Array, threshold: float) -> tuple[Array, Array]:
     """Huber loss of whitened residuals r: contribution of each to the objective, and its weight.
 
     r^2 with weight 1 up to the threshold; linear beyond it, with weight threshold / |r|.
@@ -76,14 +76,14 @@ def loss(r: Array, threshold: float) -> tuple[Array, Array]:
         return np.where(inside, r**2, 2 * threshold * size - threshold**2), np.where(inside, 1.0, threshold / size)
 
 
-def origin(problem: Problem) -> Point:
+def initial_point(problem: Problem) -> Point:
     """Initial unknowns of the runs: no fault, except a small value where the derivative would vanish at 0."""
     first = np.array([BEGIN.get(name, 0.0) for name in problem.names])
     starts = (len(problem.segments), len(problem.model.node)) if problem.start_width is not None else (0, 0)
     return Point(np.tile(first, (len(problem.runs), 1)), np.zeros(starts))
 
 
-def search(
+def search_factors(
     problem: Problem,
     factors: Array,
     point: Point,
@@ -109,27 +109,29 @@ def search(
     free = problem.unknown.low < problem.unknown.high
     with hold_interrupts() as held, np.errstate(all="ignore"):
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
-        watch = _Watch(progress, held, before)
-        run = _Search(problem, evaluate(problem, begin, deepest(problem, begin, point) or point), free, watch)
+        watch = _IterationMonitor(progress, held, before)
+        run = _SearchState(
+            problem, evaluate_factors(problem, begin, deepest_valley(problem, begin, point) or point), free, watch
+        )
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.to_the_end(tolerance, most)
         best = run.best
         for _ in range(VALLEYS):
-            deeper = deepest(problem, best.factors, best.point) if word == "ok" else None
+            deeper = deepest_valley(problem, best.factors, best.point) if word == "ok" else None
             if deeper is None:
                 break
-            there = evaluate(problem, best.factors, deeper)
+            there = evaluate_factors(problem, best.factors, deeper)
             if there.objective >= best.objective * (1 - FALL):
                 break
             watch.iterations += 1
-            again = _Search(problem, there, free, watch)
+            again = _SearchState(problem, there, free, watch)
             word = again.to_the_end(tolerance, most)
             best = again.best
     return Result(best.factors, best.at, best.objective, watch.iterations, word)
 
 
-def deepest(problem: Problem, factors: Array, point: Point) -> Point | None:
+def deepest_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
     """Unknowns of the runs in the deepest valley of several: each run may have one for each guess of its current.
 
     Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.
@@ -140,14 +142,14 @@ def deepest(problem: Problem, factors: Array, point: Point) -> Point | None:
     places = [problem.names.index(name) for name in NUISANCES["current"]]
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     guesses = [FAR * np.array([np.cos(angle), np.sin(angle)]) for angle in angles]
-    best = _eliminated(problem, factors, point)
-    costs = np.nan_to_num(_costs(problem, best, problem.settings.linear_from), nan=np.inf)
+    best = _eliminate_run_unknowns(problem, factors, point)
+    costs = np.nan_to_num(_run_objectives(problem, best, problem.settings.linear_from), nan=np.inf)
     nuisances, away = best.nuisances.copy(), best.away.copy()
     for guess in [np.median(best.nuisances[:, places], axis=0), *guesses]:
         begin = point.nuisances.copy()
         begin[:, places] = guess
-        at = _eliminated(problem, factors, Point(begin, point.away))
-        found = np.nan_to_num(_costs(problem, at, problem.settings.linear_from), nan=np.inf)
+        at = _eliminate_run_unknowns(problem, factors, Point(begin, point.away))
+        found = np.nan_to_num(_run_objectives(problem, at, problem.settings.linear_from), nan=np.inf)
         better = found < costs * (1 - FALL)
         nuisances[better], costs[better] = at.nuisances[better], found[better]
         if away.size:
@@ -157,11 +159,11 @@ def deepest(problem: Problem, factors: Array, point: Point) -> Point | None:
 
 
 @dataclass(frozen=True)
-class _Value:
+class _Evaluation:
     """One evaluation: residuals f (m,) and Jacobian J (m, n) in the form that is given to SciPy."""
 
     factors: Array
-    at: Prediction
+    at: ResidualPrediction
     f: Array
     J: Array
 
@@ -177,7 +179,7 @@ class _Value:
 
 
 @dataclass
-class _Watch:
+class _IterationMonitor:
     """Reports iterations to `progress`. held : Ctrl-C deferred by `hold_interrupts`. iterations : count so far."""
 
     progress: Progress | None
@@ -190,10 +192,10 @@ class _Watch:
         return asked or bool(self.held)
 
 
-class _Search:
+class _SearchState:
     """State of one search: the last, the best and the first evaluation, and which factors are free."""
 
-    def __init__(self, problem: Problem, start: _Value, free: NDArray[np.bool_], watch: _Watch) -> None:
+    def __init__(self, problem: Problem, start: _Evaluation, free: NDArray[np.bool_], watch: _IterationMonitor) -> None:
         self.problem, self.free, self.watch = problem, free, watch
         self.last = self.best = self.start = start
         self._stopped = np.isfinite(self.start.objective) and watch.stops(self.start.objective)
@@ -208,11 +210,11 @@ class _Search:
         at_bound = self.pushed()
         return self.settle(at_bound, tolerance, most) if word == "ok" and at_bound.any() else word
 
-    def _at(self, x: Array) -> _Value:
+    def _at(self, x: Array) -> _Evaluation:
         factors = self.best.factors.copy()
         factors[self.free] = x
         if not np.array_equal(factors, self.last.factors):
-            self.last = evaluate(self.problem, factors, self.best.point)
+            self.last = evaluate_factors(self.problem, factors, self.best.point)
             if self.last.objective < self.best.objective:
                 self.best = self.last
         return self.last
@@ -266,10 +268,10 @@ class _Search:
                 return True
         return False
 
-    def _beside(self, begin: _Value, factors: Array) -> _Value:
+    def _beside(self, begin: _Evaluation, factors: Array) -> _Evaluation:
         """The evaluation at other factors, clipped to their bounds."""
         factors = np.clip(factors, self.problem.unknown.low, self.problem.unknown.high)
-        return evaluate(self.problem, factors, begin.point)
+        return evaluate_factors(self.problem, factors, begin.point)
 
     def _across(self) -> bool:
         """Take steps where the best point is in a kink; True if they lower the objective by the share `FALL`.
@@ -296,7 +298,7 @@ class _Search:
     def _sampled(self, free: NDArray[np.bool_], draw: np.random.Generator, around: float) -> Array:
         """Gauss-Newton step (free,) for the sum of the squares linearised at the best point and at points around it."""
         begin = self.best
-        scale = _scale(begin.J[:, free])
+        scale = _column_norms(begin.J[:, free])
         _, s, axes = np.linalg.svd(begin.J[:, free] / scale, full_matrices=False)
         s, axes = s[s > RANK * s[0]], axes[s > RANK * s[0]]
         J, f = [begin.J[:, free] / scale], [begin.f]
@@ -339,7 +341,7 @@ class _Search:
         """Set factors exactly to their bounds and search over the others: the trust region only approaches a bound."""
         unknown, before = self.problem.unknown, self.best
         nearer = np.where(before.factors - unknown.low < unknown.high - before.factors, unknown.low, unknown.high)
-        there = evaluate(self.problem, np.where(at_bound, nearer, before.factors), before.point)
+        there = evaluate_factors(self.problem, np.where(at_bound, nearer, before.factors), before.point)
         if not np.isfinite(there.objective):
             return "ok"
         self.free = self.free & ~at_bound
@@ -347,7 +349,7 @@ class _Search:
         return self.minimise(tolerance, most)
 
 
-def _scale(J: Array) -> Array:
+def _column_norms(J: Array) -> Array:
     """Norms (n,) of the columns of a Jacobian (m, n); 1 for a column of zeros."""
     size = np.linalg.norm(J, axis=0)
     return np.asarray(np.where(size > 0, size, 1.0), dtype=float)
@@ -355,47 +357,47 @@ def _scale(J: Array) -> Array:
 
 def _gauss_newton(J: Array, f: Array) -> tuple[Array, Array, float]:
     """Scale (n,) of the columns, the scaled Gauss-Newton step (n,), and the fall of the squares that it promises."""
-    scale = _scale(J)
+    scale = _column_norms(J)
     step = np.linalg.lstsq(J / scale, f, rcond=RANK)[0]
     return scale, np.asarray(step, dtype=float), float(np.square(J / scale @ step).sum())
 
 
-def evaluate(problem: Problem, factors: Array, point: Point) -> _Value:
+def evaluate_factors(problem: Problem, factors: Array, point: Point) -> _Evaluation:
     """Residuals and Jacobian at given factors (n,), with the unknowns of the runs at their optimum."""
-    at = _eliminated(problem, factors, point)
-    whole = _triangular(problem, at, problem.num_factors)
-    return _Value(factors, at, whole[:, -1], whole[:, :-1])
+    at = _eliminate_run_unknowns(problem, factors, point)
+    whole = _run_triangles(problem, at, problem.num_factors)
+    return _Evaluation(factors, at, whole[:, -1], whole[:, :-1])
 
 
-def beside(problem: Problem, factors: Array, point: Point) -> Callable[[Array], tuple[Array, Array]]:
+def local_linearisation(problem: Problem, factors: Array, point: Point) -> Callable[[Array], tuple[Array, Array]]:
     """Function of a change of the factors (n,) to residuals (m,) and Jacobian (m, n) there, priors included.
 
     Their squares are the objective that one step of Gauss-Newton of the unknowns of the runs leaves, from where these
     are to first order. One prediction each; where it diverges, they are not finite.
     """
-    here = predict(problem, factors, point.nuisances, point.away)
+    here = predict_residuals(problem, factors, point.nuisances, point.away)
 
     def linearised(change: Array) -> tuple[Array, Array]:
         with np.errstate(all="ignore"):
             to = point
             if point.nuisances.size or point.away.size:
                 moved = replace(here, r=here.r + here.by_factor @ change)
-                steps, _ = _steps(problem, moved, problem.settings.linear_from)
-                to = Point(*_moved(problem, here, steps, np.ones(len(problem.runs))))
-            there = predict(problem, factors + change, to.nuisances, to.away)
-            whole = _triangular(problem, there, problem.num_factors + 1)
+                steps, _ = _run_steps(problem, moved, problem.settings.linear_from)
+                to = Point(*_apply_run_steps(problem, here, steps, np.ones(len(problem.runs))))
+            there = predict_residuals(problem, factors + change, to.nuisances, to.away)
+            whole = _run_triangles(problem, there, problem.num_factors + 1)
         return whole[:, -1], whole[:, :-1]
 
     return linearised
 
 
-def _triangular(problem: Problem, at: Prediction, columns: int) -> Array:
+def _run_triangles(problem: Problem, at: ResidualPrediction, columns: int) -> Array:
     """Jacobian and residuals (m, n + 1), with the priors of the factors; the triangular factor of each run.
 
     columns : how many of the columns lose what the unknowns of the runs can do; n where these are at their optimum.
     """
     parts, n = list[Array](), problem.num_factors
-    f, J, A = _robust(at, problem.settings.linear_from)
+    f, J, A = _robust_residuals(at, problem.settings.linear_from)
     if np.isfinite(f).all() and np.isfinite(J).all():
         for run in range(len(problem.runs)):
             rows = at.rows(run)
@@ -415,38 +417,38 @@ def _triangular(problem: Problem, at: Prediction, columns: int) -> Array:
     return np.vstack([*parts, prior[known]])
 
 
-def _robust(at: Prediction, threshold: float) -> tuple[Array, Array, Array]:
+def _robust_residuals(at: ResidualPrediction, threshold: float) -> tuple[Array, Array, Array]:
     """Residuals (m,) whose squares are the loss, their Jacobian (m, n), and the weight (m,) of any other derivative."""
     if not np.isfinite(threshold):
         return at.r, at.by_factor, np.ones(len(at.r))
-    f = np.sign(at.r) * np.sqrt(loss(at.r, threshold)[0])
+    f = np.sign(at.r) * np.sqrt(huber_loss(at.r, threshold)[0])
     slope = np.where(np.abs(at.r) <= threshold, 1.0, threshold / np.maximum(np.abs(f), threshold))
     return f, slope[:, None] * at.by_factor, slope
 
 
-def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
+def _eliminate_run_unknowns(problem: Problem, factors: Array, point: Point) -> ResidualPrediction:
     """The prediction with the unknowns of each run at their optimum, by Gauss-Newton steps with step halving."""
-    at = predict(problem, factors, point.nuisances, point.away)
+    at = predict_residuals(problem, factors, point.nuisances, point.away)
     if not (point.nuisances.size or point.away.size) or not np.isfinite(at.r).all():
         return at
     threshold = problem.settings.linear_from
-    costs = _costs(problem, at, threshold)
+    costs = _run_objectives(problem, at, threshold)
     for _ in range(INNER):
-        step, fall = _steps(problem, at, threshold)
+        step, fall = _run_steps(problem, at, threshold)
         if (fall <= CLOSE * costs).all():
             break
         share = np.where(fall > CLOSE * costs, 1.0, 0.0)
         for _ in range(HALVINGS):
-            trial = predict(problem, factors, *_moved(problem, at, step, share))
-            after = _costs(problem, trial, threshold)
+            trial = predict_residuals(problem, factors, *_apply_run_steps(problem, at, step, share))
+            after = _run_objectives(problem, trial, threshold)
             worse = ~(after <= costs) & (share > 0)
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
         else:
             share = np.where(worse, 0.0, share)
-            trial = predict(problem, factors, *_moved(problem, at, step, share))
-            after = _costs(problem, trial, threshold)
+            trial = predict_residuals(problem, factors, *_apply_run_steps(problem, at, step, share))
+            after = _run_objectives(problem, trial, threshold)
         settled = (costs - after <= CLOSE * costs).all()
         at, costs = trial, after
         if settled:
@@ -454,29 +456,29 @@ def _eliminated(problem: Problem, factors: Array, point: Point) -> Prediction:
     return at
 
 
-def _costs(problem: Problem, at: Prediction, threshold: float) -> Array:
+def _run_objectives(problem: Problem, at: ResidualPrediction, threshold: float) -> Array:
     """Objective (R,) of each run, without the priors of the factors."""
-    total = np.bincount(at.run, loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
+    total = np.bincount(at.run, huber_loss(at.r, threshold)[0], len(problem.runs)) + (at.nuisances**2).sum(axis=1)
     if at.away.size:
         total += np.bincount(problem.whole.run, (at.away**2).sum(axis=1), len(problem.runs))
     return np.asarray(total)
 
 
-def _steps(problem: Problem, at: Prediction, threshold: float) -> tuple[list[Array], Array]:
+def _run_steps(problem: Problem, at: ResidualPrediction, threshold: float) -> tuple[list[Array], Array]:
     """Gauss-Newton step of the unknowns of each run, and the predicted decrease (R,) of its objective."""
-    f, _, root = _robust(at, threshold)
+    f, _, root = _robust_residuals(at, threshold)
     steps, fall = list[Array](), np.zeros(len(problem.runs))
     for run in range(len(problem.runs)):
         rows = at.rows(run)
         A, xi = at.unknown(run, rows, root)
         slope = A.T @ f[rows] + xi
-        step = _ridge(A, f[rows], xi)
+        step = _regularised_step(A, f[rows], xi)
         steps.append(step)
         fall[run] = -slope @ step
     return steps, fall
 
 
-def _ridge(A: Array, f: Array, xi: Array) -> Array:
+def _regularised_step(A: Array, f: Array, xi: Array) -> Array:
     """Step (k,) to the least |f + A step|^2 + |xi + step|^2; A : (m, k). f : (m,). xi : (k,)."""
     unit = np.eye(len(xi))
     try:
@@ -486,7 +488,7 @@ def _ridge(A: Array, f: Array, xi: Array) -> Array:
         return -step / scale
 
 
-def _moved(problem: Problem, at: Prediction, steps: list[Array], share: Array) -> tuple[Array, Array]:
+def _apply_run_steps(problem: Problem, at: ResidualPrediction, steps: list[Array], share: Array) -> tuple[Array, Array]:
     """Nuisances and initial states after `share` (R,) of each run's step; latencies are limited to the lags kept."""
     nuisances, away, q = at.nuisances.copy(), at.away.copy(), len(problem.names)
     for run, step in enumerate(steps):

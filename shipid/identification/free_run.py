@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
-from shipid.identification.residuals import CURRENT, build
+from shipid.identification.residuals import CURRENT, build_problem
 from shipid.identification.segments import LEAST_STEPS, ShootingSegment
-from shipid.identification.settings import ENVIRONMENT, Identify, overrides, overrides_of
+from shipid.identification.settings import ENVIRONMENT, Identify, resolve_overrides, run_overrides
 from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -41,12 +41,12 @@ class FreeRuns:
     errors: pd.DataFrame
 
 
-def unfelt(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str]) -> list[str]:
+def missing_inputs(vessel: Vessel, dataset: Dataset, settings: Identify, runs: Sequence[str]) -> list[str]:
     """Columns of states and weather of the vessel that neither dataset, settings nor nuisances give: they are 0."""
     model = vessel_dynamics(vessel)
     given = {*map(str, dataset.frame), *(CURRENT if "current" in settings.widths else ())}
     needed = [state_column(name) for name in (*model.state, *model.environment)]
-    overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
+    overridden = resolve_overrides(settings, runs, vessel, model.environment, dataset.runs)
     return [
         name
         for name in needed
@@ -60,7 +60,7 @@ def check_length(settings: Identify, length: float) -> None:
         raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
 
 
-def free_runs(
+def simulate_free_runs(
     vessels: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str], settings: Identify, length: float = 0.0
 ) -> FreeRuns:
     """Simulate vessels of one structure along recorded runs, in pieces of `length` [s]; 0: whole unbroken stretches.
@@ -74,16 +74,16 @@ def free_runs(
     if steps > MOST_STEPS:
         many = f"{settings.step:g} s makes {steps:.2g} steps of these runs, at most {MOST_STEPS:.0e}"
         raise DataError(f"{many}: give a longer step, or fewer runs", path="step")
-    overridden = overrides_of(settings, runs)
+    overridden = run_overrides(settings, runs)
     first = next(iter(vessels.values()))
     asked = {"horizon": length, "nuisance": [], "runs": overridden}
-    problem = build(first, dataset, runs, settings.model_copy(update=_nothing_free(first, overridden) | asked))
+    problem = build_problem(first, dataset, runs, settings.model_copy(update=_held_settings(first, overridden) | asked))
     given = np.array(list(first.parameters.values()))
     predicted: dict[tuple[int, int], Array] = {}
     for values in np.unique(problem.base, axis=0):  # runs of the same parameters at once
         places = [i for i, one in enumerate(problem.segments) if np.array_equal(problem.base[one.run], values)]
         rows = [np.where(values != given, values, list(vessel.parameters.values())) for vessel in vessels.values()]
-        states_of = _predicted(first, [problem.segments[i] for i in places], np.array(rows), settings)
+        states_of = _predict_pieces(first, [problem.segments[i] for i in places], np.array(rows), settings)
         predicted |= {(model, places[piece]): states for (model, piece), states in states_of.items()}
     parts = []
     for number, run in enumerate(problem.runs):
@@ -93,11 +93,11 @@ def free_runs(
             for piece, place in enumerate(places)
             for model, name in enumerate((MEASURED, *vessels))
         ]
-    series = _series(parts)
-    return FreeRuns(series.drop(columns="measured"), _errors(series))
+    series = _state_series(parts)
+    return FreeRuns(series.drop(columns="measured"), _series_errors(series))
 
 
-def _nothing_free(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, object]:
+def _held_settings(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, object]:
     """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides.
 
     It is not 0, which would need a scale.
@@ -108,7 +108,7 @@ def _nothing_free(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, 
     return none | {"parameters": [path], "fixed": [], "together": [], "ranges": False}
 
 
-def _predicted(
+def _predict_pieces(
     vessel: Vessel, segments: Sequence[ShootingSegment], values: Array, settings: Identify
 ) -> dict[tuple[int, int], Array]:
     """(model, piece) -> states (N + 1, channels); model 0 is the log, model i > 0 has the parameters values[i - 1]."""
@@ -158,7 +158,7 @@ def _is_sound(states: Array) -> bool:
     return bool(np.isfinite(states).all() and (speed <= SPEED_LIMIT).all())
 
 
-def _series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:
+def _state_series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:
     """Rows of run, piece, model, its instants and its states (N + 1, channels), one part after the other."""
     runs, pieces, models, segments, states = zip(*parts, strict=True)
     lengths = [len(segment.t) for segment in segments]
@@ -171,7 +171,7 @@ def _series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd
     return frame[["run", "piece", "t", "model", *CHANNELS, "measured"]]
 
 
-def _errors(series: pd.DataFrame) -> pd.DataFrame:
+def _series_errors(series: pd.DataFrame) -> pd.DataFrame:
     log = series[series["model"] == MEASURED]
     rows = []
     for model in [name for name in series["model"].unique() if name != MEASURED]:

@@ -97,14 +97,16 @@ def inverse_dynamics(
     given = np.full(len(paths), np.inf) if prior is None else np.asarray(prior, dtype=float)
     widths = np.minimum(given, LOOSE)
     model = vessel_dynamics(vessel)
-    problem = _Problem(vessel, model, tied, sizes, _runs(vessel, model, dataset, runs, environment or {}))
+    problem = _Problem(vessel, model, tied, sizes, _long_stretches(vessel, model, dataset, runs, environment or {}))
     linear = problem.linear(centre)
-    factors, levels, settled = _solved(problem, centre, widths, bool(linear.all()))
+    factors, levels, settled = _solve_weighted(problem, centre, widths, bool(linear.all()))
     weight = np.array([1 / levels[name] for name in problem.signals])
     return Inverse(paths, factors, linear, problem.evaluate(factors)[1] * weight[:, None], levels, settled)
 
 
-def _solved(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tuple[Array, dict[str, float], bool]:
+def _solve_weighted(
+    problem: _Problem, centre: Array, widths: Array, linear: bool
+) -> tuple[Array, dict[str, float], bool]:
     """Gauss-Newton iteration with step halving on weighted residuals and priors; weights from the residuals.
 
     Returns factors (n,), levels, and whether it converged. Minimum-norm steps keep undetermined factors at their base.
@@ -174,7 +176,7 @@ class _Problem:
                 row += 1
         velocities = model.state[model.num_dof :]
         self.rows = [velocities.index(name) for name in MEASURED]
-        motion = equations(model, tuple(self.free))
+        motion = force_equations(model, tuple(self.free))
         shared = [motion.n_in() - 1]  # the parameters
         sizes = {stretch.inputs[0].shape[1] for stretch in stretches}
         by_size = {size: motion.map("equations", "serial", size, shared, []) for size in sizes}
@@ -220,7 +222,7 @@ class _Problem:
 
 
 @lru_cache(maxsize=16)
-def equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
+def force_equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
     """(state, memory, commands, environment, parameters) -> F, dF/d free, M, dM/d free.
 
     The accelerations are M^-1 (F + tau), so M is the inverse of their derivative to tau.
@@ -246,7 +248,7 @@ def equations(model: Dynamics, free: tuple[int, ...]) -> ca.Function:
     return ca.Function("equations", [*inputs, parameters], result, {"cse": True})
 
 
-def _runs(
+def _long_stretches(
     vessel: Vessel,
     model: Dynamics,
     dataset: Dataset,
@@ -261,7 +263,7 @@ def _runs(
     for run, rows in stretches_of_runs(dataset):
         if run not in runs or len(rows) <= LEAST_SAMPLES:
             continue
-        stretch = _stretch(vessel, model, rows, environment.get(run, {}))
+        stretch = _weighted_stretch(vessel, model, rows, environment.get(run, {}))
         if stretch is not None:
             result.append(stretch)
     if not result:
@@ -269,7 +271,7 @@ def _runs(
     return result
 
 
-def _window(vessel: Vessel, rows: pd.DataFrame) -> float:
+def _test_function_width(vessel: Vessel, rows: pd.DataFrame) -> float:
     """Time [s] for one ship length at the run's speed, at least 8 samples, at most a quarter of the run."""
     t = rows["t"].to_numpy()
     speed = float(np.sqrt((rows["u"].to_numpy() ** 2 + rows["v"].to_numpy() ** 2).mean()))
@@ -277,7 +279,7 @@ def _window(vessel: Vessel, rows: pd.DataFrame) -> float:
     return float(max(samples, min(LENGTHS * (vessel.length or 0.0) / max(speed, 1e-3), (t[-1] - t[0]) / 4)))
 
 
-def _stretch(
+def _weighted_stretch(
     vessel: Vessel,
     model: Dynamics,
     rows: pd.DataFrame,
@@ -300,7 +302,7 @@ def _stretch(
     memory = np.array([reached[name] for name in model.memory]).reshape(-1, len(t))
     given = {name: np.full(len(t), environment[name]) for name in model.environment if name in environment}
     weather = np.array([given.get(name, columns.get(name, zero)) for name in model.environment]).reshape(-1, len(t))
-    before, after, pull = _bumps(t, _window(vessel, rows))
+    before, after, pull = _test_functions(t, _test_function_width(vessel, rows))
     if not len(pull):
         return None
     # an order is held until the next row, so where it changes the end of the interval is an additional point
@@ -313,7 +315,7 @@ def _stretch(
     return _Stretch((state[:, rows_at], memory[:, rows_at], orders, weather[:, rows_at]), nu, weigh, pull)
 
 
-def _bumps(t: Array, window: float) -> tuple[Array, Array, Array]:
+def _test_functions(t: Array, window: float) -> tuple[Array, Array, Array]:
     """Quadrature weights (num_bumps, N) of the test functions at times t [s], each of integral 1.
 
     Returns the weights of forces at the end and at the start of intervals, and of velocities. phi = c (1 - s^2)^p with

@@ -38,7 +38,7 @@ class Late:
         return self.interval / 2
 
 
-def interval_of(dataset: Dataset, runs: Sequence[str]) -> float:
+def row_interval(dataset: Dataset, runs: Sequence[str]) -> float:
     """Median time from row to row of some runs [s]."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     return float(rows.groupby("run", sort=False)["t"].diff().median())
@@ -55,11 +55,11 @@ def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late
     steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
     if not steering or vessel.length is None:
         return None
-    late = Late(interval_of(dataset, runs))
+    late = Late(row_interval(dataset, runs))
     return late if late.delay * float(rows["u"].abs().mean()) / vessel.length >= CONSIDERABLE else None
 
 
-def between_rows(
+def interpolate_commands(
     vessel: Vessel, rows: Mapping[str, NDArray[Any]], instants: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
     """Commands of one unbroken stretch at instants [s] (any shape), where they change between the rows.

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.document import short_names
-from shipid.identification.covariance import inverted
-from shipid.identification.late import COARSE, interval_of
-from shipid.identification.settings import unknowns
+from shipid.identification.covariance import invert_information
+from shipid.identification.late import COARSE, row_interval
+from shipid.identification.settings import free_factors
 from shipid.identification.solve import Solution, by_log
 from shipid.identification.statistics import Statistics
 from shipid.units import significant_digits
@@ -41,22 +41,22 @@ class Lateness:
     explained: float
 
 
-def lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
+def command_lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
     """The effect of commands half a row earlier; None where it cannot be computed.
 
     An order that is given between two rows is first seen in the later one. Its mean delay is half a row. The residuals
     with all commands one row earlier show what that does, and whether they become smaller.
     """
     settings = solution.settings
-    between = interval_of(dataset, solution.runs)
+    between = row_interval(dataset, solution.runs)
     if settings.step > COARSE * between:
         return None
-    change = by_log(solution, dataset, _earlier(dataset))
+    change = by_log(solution, dataset, _advance_commands(dataset))
     if change is None:
         return None
     free = ~(solution.held | solution.at_bound)
     J = solution.jacobian[:, free]
-    inverse = inverted(J.T @ J + np.diag(1 / solution.prior_widths[free] ** 2))[0]
+    inverse = invert_information(J.T @ J + np.diag(1 / solution.prior_widths[free] ** 2))[0]
     moved = -inverse @ (J.T @ change)
     left = change + J @ moved  # what no factor makes up for
     size, along = float(change @ left), float(solution.residuals @ change)  # the factors are at their optimum
@@ -73,7 +73,7 @@ def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
 
     Commands that are held come half a row late. What is more than that, or less than none, has another cause.
     """
-    late = lateness(solution, dataset)
+    late = command_lateness(solution, dataset)
     if late is None:
         return ""
     held = solution.settings.commands == "held"
@@ -87,15 +87,15 @@ def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     shown = share[worst] >= OUTSIDE or (apart and late.explained >= EXPLAINED)
     if not shown or abs(changes[worst]) < WORTH * abs(solution.factors[worst]):
         return ""
-    name = short_names(unknowns(solution.vessel, solution.settings).paths)[worst]
+    name = short_names(free_factors(solution.vessel, solution.settings).paths)[worst]
     factor = solution.factors[worst]
     change, width = 100 * changes[worst] / abs(factor), 100 * half[worst] / abs(factor)
     moves = f"moves {name} by {change:+.2g} %, its interval is +-{width:.2g} %"
-    gear = _geared(solution, dataset)
+    gear = _actuated_commands(solution, dataset)
     if apart:
         rows, seconds = abs(late.rows), significant_digits(abs(late.rows) * late.between)
         when = f"{seconds} s ({rows:.2g} rows) {'earlier' if late.rows > 0 else 'later'} than in the log: that {moves}"
-        return f"the fit is better with commands {when}; {_causes(late.rows > 0, gear)}"
+        return f"the fit is better with commands {when}; {_lateness_causes(late.rows > 0, gear)}"
     remedy = f"--set commands=between{f' --set step={late.between / 2:.3g}' if gear else ''}"
     remedy = f"compare with {remedy}" if not solution.settings.outputs else "log faster"
     return (
@@ -104,13 +104,13 @@ def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     )
 
 
-def _geared(solution: Solution, dataset: Dataset) -> list[str]:
+def _actuated_commands(solution: Solution, dataset: Dataset) -> list[str]:
     """Commands to actuators of the vessel that change in the fitted runs."""
     model, fitted = vessel_dynamics(solution.vessel), dataset.select(solution.runs)
     return [name for name in model.commands if name in model.memory and fitted.frame[name].nunique() > 1]
 
 
-def _causes(late: bool, gear: Sequence[str]) -> str:
+def _lateness_causes(late: bool, gear: Sequence[str]) -> str:
     """What makes commands late in a log, or early, and the remedy."""
     if not late:
         lag = "an actuator of the vessel is too fast" if gear else "the vessel lacks an actuator"
@@ -124,7 +124,7 @@ def _causes(late: bool, gear: Sequence[str]) -> str:
     )
 
 
-def _earlier(dataset: Dataset) -> Dataset:
+def _advance_commands(dataset: Dataset) -> Dataset:
     """The dataset with every command one row earlier; the last of a stretch stays."""
     frame = dataset.frame.copy()
     for _, rows in stretches_of_runs(dataset):

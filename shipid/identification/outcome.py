@@ -26,28 +26,28 @@ from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.files import write_new
 from shipid.identification import design
 from shipid.identification.antenna import antenna_fit
-from shipid.identification.bands import LONG, Measure, bands, check_level, refusal
-from shipid.identification.curvature import curved
+from shipid.identification.bands import LONG, Measure, band_refusal, check_level, measure_bands
+from shipid.identification.curvature import curvature_warning
 from shipid.identification.fit import Progress
-from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs, unfelt
+from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs
 from shipid.identification.late_fit import late_fit
-from shipid.identification.plausible import verdict
-from shipid.identification.profile import Profile, profile, variance_ratio
-from shipid.identification.reach import beyond, of_log, reach_of
-from shipid.identification.settings import BLOCK, Identify, overrides, overrides_of, unknowns
-from shipid.identification.sides import by_group, uneven
+from shipid.identification.plausible import implausibility
+from shipid.identification.profile import Profile, profile_factor, variance_ratio
+from shipid.identification.reach import data_reach, extrapolation_sentence, of_log
+from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
+from shipid.identification.sides import by_group, uneven_side_warnings
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import (
     LinearFit,
     Statistics,
     against_priors,
-    autocorrelation,
-    decided_alone,
+    factors_of_single_runs,
+    fit_statistics,
     open_to_drift,
-    statistics,
+    pooled_autocorrelation,
 )
 from shipid.identification.stream import current_fit
-from shipid.identification.unstable import grows, growth_in
+from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.interrupts import hold_interrupts
 from shipid.simulation.measured import TRIALS, measure_standard
 from shipid.units import join_names, percent_text, plural_word, significant_digits
@@ -73,7 +73,7 @@ COMPARED = {
 """Kind of a standard manoeuvre -> measures of it that are set beside each other, those of the base and of the fit."""
 
 
-class Settings(BaseModel):
+class SettingsFile(BaseModel):
     """A settings file: one `[identify]` table."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -94,7 +94,7 @@ class Identified:
         out, else on fitted ones. beyond : sentences on standard manoeuvres that go farther than the fitted runs.
     outputs : measured outputs of components that the vessel predicts, on fitted runs: `output`, `unit`, root mean
         square `measured`, and of the difference `before` and `after`; empty without any.
-    programme : manoeuvres to run next, ranked by `shipid.identification.design.rank`; None: not requested.
+    programme : manoeuvres to run next, ranked by `shipid.identification.design.rank_candidates`; None: not requested.
     """
 
     vessel: Vessel
@@ -151,8 +151,8 @@ class Identified:
             base_digest=digest,
             source=f"identified from {count} of dataset {self.digest} by shipid {__version__}",
             values=changed | dict(solution.values),
-            provenance=_plain(self._provenance()),
-            unusual=tuple(_odd(vessel.with_values(solution.values))),
+            provenance=_as_toml_value(self._provenance()),
+            unusual=tuple(_unusual_numbers(vessel.with_values(solution.values))),
         )
 
     def _provenance(self) -> dict[str, Any]:
@@ -167,15 +167,16 @@ class Identified:
             "status": solution.status,
             "sentence": solution.sentence,
             "residuals": len(solution.residuals),
-            "objective_start": _rounded(solution.objective_start),
-            "objective": _rounded(solution.objective),
+            "objective_start": _round_significant(solution.objective_start),
+            "objective": _round_significant(solution.objective),
             "standard_errors_by": self.statistics.chosen,
             "not_identified": rows.loc[~rows["identified"].astype(bool), "path"].tolist(),
             "warnings": list(self.warnings),
-            "factors": {path: _rounded(factor) for path, (factor, _) in known.items()},
-            "standard_errors": {path: _rounded(error) for path, (_, error) in known.items()},
+            "factors": {path: _round_significant(factor) for path, (factor, _) in known.items()},
+            "standard_errors": {path: _round_significant(error) for path, (_, error) in known.items()},
             "free_run_rms": {
-                f"{row['set']} {row['model']}": {name: _rounded(row[name]) for name in ERRORS_OF} for row in free
+                f"{row['set']} {row['model']}": {name: _round_significant(row[name]) for name in ERRORS_OF}
+                for row in free
             },
             "settings": solution.settings.model_dump(),
         }
@@ -191,7 +192,7 @@ def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = 
         raise DocumentError("must be a table", file=file, path=BLOCK)
     inside = {f"{BLOCK}.{path}": value for path, value in (changes or {}).items()}
     block = documents.replace_values({BLOCK: {}, **document}, inside, file)
-    return cast(Settings, documents.parse_model(Settings, block, file)).identify
+    return cast(SettingsFile, documents.parse_model(SettingsFile, block, file)).identify
 
 
 def pick_runs(
@@ -278,59 +279,59 @@ def run_identification(
     profiles, ahead = as_names("profiles", profiles, DataError), check_number("ahead", ahead, DataError)
     check_function_or_none("progress", progress)
     check_level(band)
-    fitted, tested = check(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
+    fitted, tested = check_identification(vessel, dataset, settings, runs, held_out, ahead=ahead, profiles=profiles)
     digest = dataset.digest
     dataset, fitted, shared = without_shared(dataset, fitted, tested)
     sets = {"fit": fitted, "test": tested} if tested else {"fit": fitted}
     with hold_interrupts() as held:  # an interrupted library call raises an unrelated error
 
         def free(vessels: Mapping[str, Vessel]) -> dict[str, FreeRuns]:
-            return {name: free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
+            return {name: simulate_free_runs(vessels, dataset, each, settings, ahead) for name, each in sets.items()}
 
         free({BEFORE: vessel})  # an error in the free runs is raised before the long fit
         _go_on(held)
-        fit_settings = settings.model_copy(update={"runs": overrides_of(settings, fitted)})
+        fit_settings = settings.model_copy(update={"runs": run_overrides(settings, fitted)})
         solution = identify(vessel, dataset, fitted, fit_settings, progress=progress)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
         if (solution.at_bound | solution.held).all():
-            raise ShipidError(_nothing_free(solution))
+            raise ShipidError(_no_estimate_reason(solution))
         _go_on(held)
-        judged = statistics(LinearFit.of(solution))
+        judged = fit_statistics(LinearFit.of(solution))
         determined = [path for path in profiles if path in judged.free]
         curves = tuple(_profile(path, dataset, solution, judged) for path in determined)
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
         pairs = free(pair)
         _go_on(held)
         logs: dict[str, pd.DataFrame] = {}
-        manoeuvres, refused = _manoeuvres(pair, logs), ""
+        manoeuvres, refused = _compare_manoeuvres(pair, logs), ""
         if band is not None:
-            manoeuvres, refused = _banded(manoeuvres, vessel, solution, judged, band)
+            manoeuvres, refused = _add_measure_bands(manoeuvres, vessel, solution, judged, band)
         _go_on(held)
         warnings = (
             *shared,
             *solution.warnings,
             *filter(None, (_in_log(solution, dataset, judged),)),
             *unmeasured(vessel, dataset, fitted, settings),
-            *unrecorded(dataset, fitted, settings),
+            *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
-            *_warnings(solution, judged, pairs, growth_in(dataset, fitted, pair[AFTER])),
-            *filter(None, (curved(solution, dataset, judged, determined, partial(_go_on, held)),)),
-            *_left(solution, curves),
+            *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER])),
+            *filter(None, (curvature_warning(solution, dataset, judged, determined, partial(_go_on, held)),)),
+            *_better_fit_warnings(solution, curves),
             *(
                 f"no profile of {path}: it is at a bound, fixed or dropped"
                 for path in profiles
                 if path not in determined
             ),
         )
-        warnings += _implausible(vessel, pair[AFTER], solution.values)
-        outputs = _outputs(pair, dataset, fitted)
-        warnings += tuple(_unused(outputs, settings))
-        groups = _groups(pair[AFTER], dataset, tested or fitted, settings)
-        warnings += uneven(groups)
+        warnings += _implausible_estimates(vessel, pair[AFTER], solution.values)
+        outputs = _compare_outputs(pair, dataset, fitted)
+        warnings += tuple(_unused_output_warnings(outputs, settings))
+        groups = _errors_by_group(pair[AFTER], dataset, tested or fitted, settings)
+        warnings += uneven_side_warnings(groups)
         ranked = None
         if programme:
-            ranked, missing = _programme(pair[AFTER], dataset, fitted, solution, judged)
+            ranked, missing = _next_manoeuvres(pair[AFTER], dataset, fitted, solution, judged)
             warnings += tuple(filter(None, (missing,)))
         if refused:
             warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
@@ -341,16 +342,16 @@ def run_identification(
             runs=fitted,
             held_out=tested,
             digest=digest,
-            estimates=_estimates(vessel, solution, judged),
+            estimates=_estimate_table(vessel, solution, judged),
             ahead=ahead,
             free=pairs,
             manoeuvres=manoeuvres,
-            colours=_colours(solution),
+            colours=_whiteness_table(solution),
             programme=ranked,
             profiles=curves,
             warnings=warnings,
             groups=groups,
-            beyond=_beyond(pair[AFTER], dataset, fitted, logs),
+            beyond=_extrapolated_manoeuvres(pair[AFTER], dataset, fitted, logs),
             outputs=outputs,
         )
 
@@ -380,23 +381,23 @@ def _in_log(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     return next(filter(None, seen), "")
 
 
-def _implausible(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
+def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
     """A sentence for each estimate that no ship has, whether the fit or the rest of the document shows it."""
-    judgements = {path: verdict(vessel, path, values) for path in values}
+    judgements = {path: implausibility(vessel, path, values) for path in values}
     judgements |= {
         path: f"{path}: {words}; hold it, or give it a prior"
-        for path, words in _odd(identified).items()
+        for path, words in _unusual_numbers(identified).items()
         if not judgements.get(path)
     }
     return tuple(filter(None, judgements.values()))
 
 
-def _odd(vessel: Vessel) -> dict[str, str]:
+def _unusual_numbers(vessel: Vessel) -> dict[str, str]:
     """Numbers that a document is refused for unless they are `unusual` in it: dotted path -> a sentence."""
     return find_contradictions(vessel.document, vessel.parameters)
 
 
-def _nothing_free(solution: Solution) -> str:
+def _no_estimate_reason(solution: Solution) -> str:
     """Why no factor has an estimate, and what would give one."""
     if not solution.dropped:
         return "every parameter is at a bound or fixed: free more parameters, or widen bounds"
@@ -406,13 +407,13 @@ def _nothing_free(solution: Solution) -> str:
     return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
 
 
-def _groups(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
+def _errors_by_group(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
     """Errors by side, helm and speed of free runs as long as the predictions that were fitted."""
-    series = free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
+    series = simulate_free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
     return by_group(series, AFTER, vessel, dataset)
 
 
-def _outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) -> pd.DataFrame:
+def _compare_outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) -> pd.DataFrame:
     """Measured outputs against those of the vessels, in the recorded motion."""
     part = dataset.select(runs)
     if not outputs_in_common(pair[AFTER], part):
@@ -431,7 +432,7 @@ def _outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) 
     )
 
 
-def _unused(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
+def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
     """Warnings on measured outputs that are not fitted."""
     for row in outputs.to_dict("records"):
         if row["output"] not in settings.weights:
@@ -439,13 +440,17 @@ def _unused(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
             yield f"{name} was measured and is not fitted: --set weights.{name}={width} [{row['unit']}]"
 
 
-def _beyond(vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]) -> tuple[str, ...]:
+def _extrapolated_manoeuvres(
+    vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]
+) -> tuple[str, ...]:
     """Sentences on standard manoeuvres in which the identified vessel goes beyond the data."""
-    data = reach_of(vessel, dataset, runs)
-    return tuple(filter(None, (beyond(title, of_log(vessel, log), data) for title, log in logs.items())))
+    data = data_reach(vessel, dataset, runs)
+    return tuple(
+        filter(None, (extrapolation_sentence(title, of_log(vessel, log), data) for title, log in logs.items()))
+    )
 
 
-def _title(kind: str, angles: Sequence[float]) -> str:
+def _manoeuvre_title(kind: str, angles: Sequence[float]) -> str:
     return f"{kind} {'/'.join(f'{angle:g}' for angle in angles)}"
 
 
@@ -455,7 +460,7 @@ def _go_on(held: Sequence[int]) -> None:
         raise KeyboardInterrupt
 
 
-def check(
+def check_identification(
     vessel: Vessel,
     dataset: Dataset,
     settings: Identify,
@@ -471,8 +476,8 @@ def check(
     """
     fitted, tested = pick_runs(dataset, runs, held_out)
     check_length(settings, ahead)
-    overrides(settings, (*fitted, *tested), vessel, vessel_dynamics(vessel).environment, known=dataset.runs)
-    known = unknowns(vessel, settings).paths
+    resolve_overrides(settings, (*fitted, *tested), vessel, vessel_dynamics(vessel).environment, known=dataset.runs)
+    known = free_factors(vessel, settings).paths
     wrong = next((path for path in profiles if path not in known), None)
     if wrong is not None:
         raise DataError(f"{wrong!r} is not free in the fit: {suggest_name(wrong, known)}", path="profile")
@@ -484,8 +489,8 @@ def write_patch(outcome: Identified, file: Path) -> Path:
     return write_new(outcome.patch(file), file, "patch")
 
 
-def _estimates(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.DataFrame:
-    unknown = unknowns(solution.vessel, solution.settings)
+def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.DataFrame:
+    unknown = free_factors(solution.vessel, solution.settings)
     rows = []
     parts = zip(unknown.groups, unknown.scale, short_names(unknown.paths), strict=True)
     for j, (group, scales, name) in enumerate(parts):
@@ -514,7 +519,7 @@ def _estimates(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.Dat
     return pd.DataFrame(rows)
 
 
-def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None = None) -> pd.DataFrame:
+def _compare_manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None = None) -> pd.DataFrame:
     """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`.
 
     A manoeuvre that neither performs is one row without a measure.
@@ -523,12 +528,12 @@ def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None
     """
     rows = []
     for kind, angles in TRIED:
-        title = _title(kind, angles)
+        title = _manoeuvre_title(kind, angles)
         values: dict[str, dict[str, dict[str, Any]]] = {}
         notes: dict[str, str] = {}
         for name, vessel in pair.items():
             try:
-                values[name] = _measured(vessel, kind, angles, logs if name == AFTER else None)
+                values[name] = _measure_manoeuvre(vessel, kind, angles, logs if name == AFTER else None)
             except ShipidError as error:
                 values[name] = {}
                 notes[name] = error.message
@@ -549,34 +554,34 @@ def _manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None
     return pd.DataFrame(rows)
 
 
-def _banded(
+def _add_measure_bands(
     manoeuvres: pd.DataFrame, vessel: Vessel, solution: Solution, judged: Statistics, level: float
 ) -> tuple[pd.DataFrame, str]:
     """The measures with the band of each, `low` and `high`; or as they are, and why there is no band."""
-    why = refusal(solution, judged, residual_spacing(solution))
+    why = band_refusal(solution, judged, residual_spacing(solution))
     if why:
         return manoeuvres, why
 
     def performed(kind: str, angles: Sequence[float]) -> Measure:
         def measure(one: Vessel) -> dict[str, float]:
-            measures = _measured(one, kind, angles)
+            measures = _measure_manoeuvre(one, kind, angles)
             return {name: float(measures[name]["value"]) for name in COMPARED[kind] if name in measures}
 
         return measure
 
-    titled = [(_title(kind, angles), performed(kind, angles)) for kind, angles in TRIED]
-    measures = bands(vessel, solution, judged, titled, level)
+    titled = [(_manoeuvre_title(kind, angles), performed(kind, angles)) for kind, angles in TRIED]
+    measures = measure_bands(vessel, solution, judged, titled, level)
     ends = measures[["manoeuvre", "measure", "low", "high"]]
     return manoeuvres.merge(ends, how="left", on=["manoeuvre", "measure"]), ""
 
 
-def _measured(
+def _measure_manoeuvre(
     vessel: Vessel, kind: str, angles: Sequence[float], logs: dict[str, pd.DataFrame] | None = None
 ) -> dict[str, dict[str, Any]]:
     """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.rows.measure_rows`."""
     done = measure_standard(vessel, kind, angles, engine=REPEATED)
     if logs is not None:
-        logs[_title(kind, angles)] = done.frame
+        logs[_manoeuvre_title(kind, angles)] = done.frame
     return {row["measure"]: row for row in done.measures}
 
 
@@ -587,17 +592,17 @@ def residual_spacing(solution: Solution) -> float:
     return float(np.median(steps)) if len(steps) else solution.settings.step
 
 
-def _longest(solution: Solution) -> float:
+def _longest_run(solution: Solution) -> float:
     """Length of the longest run [s]."""
     each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
     return max(float(np.ptp(times)) for times in each)
 
 
-def _colours(solution: Solution) -> pd.DataFrame:
+def _whiteness_table(solution: Solution) -> pd.DataFrame:
     labels, between, frames = np.array(solution.signals), residual_spacing(solution), []
     for name in dict.fromkeys(solution.signals):
         selected = labels == name
-        rho = autocorrelation(
+        rho = pooled_autocorrelation(
             [solution.residuals[selected & (solution.clusters == run)] for run in np.unique(solution.clusters)]
         )
         lags = np.arange(min(len(rho), 61))
@@ -605,20 +610,20 @@ def _colours(solution: Solution) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-def _programme(
+def _next_manoeuvres(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, judged: Statistics
 ) -> tuple[pd.DataFrame | None, str]:
     """Ranked manoeuvres at the median speed of the fitted runs and at half of it, within the recorded shaft speeds.
 
     Also a sentence on those that the identified vessel cannot perform; without any other there is no table.
     """
-    speed, limits = design.recorded(vessel, dataset, runs)
-    unknown, settings = unknowns(solution.vessel, solution.settings), solution.settings
+    speed, limits = design.recorded_limits(vessel, dataset, runs)
+    unknown, settings = free_factors(solution.vessel, solution.settings), solution.settings
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     try:
-        choice = design.candidates(vessel, (speed / 2, speed), limits)
-        contributions = design.informed_of_possible(
+        choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), limits)
+        contributions = design.information_where_possible(
             vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
             interval=settings.step,
         )  # fmt: skip
@@ -628,7 +633,7 @@ def _programme(
     lacking = [one.title for one in choice if one.title not in possible]
     words = f"not among the manoeuvres to run next, for the identified ship cannot perform them: {'; '.join(lacking)}"
     prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
-    table = design.rank(contributions, unknown.paths, judged.information + np.diag(prior))
+    table = design.rank_candidates(contributions, unknown.paths, judged.information + np.diag(prior))
     return table, words if lacking else ""
 
 
@@ -640,7 +645,7 @@ def residual_level(judged: Statistics, signal: str) -> float:
 
 def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics) -> Profile:
     index = solution.paths.index(path)
-    unknown = unknowns(solution.vessel, solution.settings)
+    unknown = free_factors(solution.vessel, solution.settings)
     held = {
         gone: (factor, factor)
         for gone, factor in zip(solution.paths, solution.factors, strict=True)
@@ -655,7 +660,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
         again = identify(solution.vessel, dataset, solution.runs, changed, start=begin)
         return (again.objective if again.status == "ok" else float("inf")), again.factors
 
-    return profile(
+    return profile_factor(
         path,
         solution.factors,
         index,
@@ -671,14 +676,14 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
 
 def unmeasured(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
     """A warning if the vessel feels what nobody measured: the numbers make up for it."""
-    lacking = unfelt(vessel, dataset, settings, runs)
+    lacking = missing_inputs(vessel, dataset, settings, runs)
     if not lacking:
         return []
     current = "; --nuisance current=0.2 gives each run a current" if "V_c" in lacking else ""
     return [f"not in the log, taken as 0: {', '.join(lacking)}: the estimates make up for what they do{current}"]
 
 
-def unrecorded(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
+def unrecorded_time_warning(dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
     """A warning if the runs to fit hold times without rows, over which predictions go on with the last orders."""
     words = gaps_in_words(dataset.select(runs), settings.step)
     remedy = "orders are held and weather is interpolated there; set max_gap in [clock] of the mapping and import again"
@@ -695,7 +700,7 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
     return [f"{join_names(held)} {are} the same in all runs to fit: what other orders do there is not learnt"]
 
 
-def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
+def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[str]:
     """Warnings for profiles that contain a better fit than the estimate."""
     warnings = []
     for curve in curves:
@@ -709,7 +714,7 @@ def _left(solution: Solution, curves: Sequence[Profile]) -> list[str]:
     return warnings
 
 
-def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float) -> list[str]:
+def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float) -> list[str]:
     """Warnings about the fit: coloured residuals, horizon, untrusted errors, bounds, no test, worse free runs.
 
     rate : at which a small yaw of the identified ship grows [1/s].
@@ -725,9 +730,9 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
             f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the model, or "
             f"the wind and current data, are incomplete{starts}"
         )
-        grown = grows(rate, _longest(solution), longest)
+        grown = growth_warning(rate, _longest_run(solution), longest)
         if 0 < horizon < LONG * longest:
-            longer = [f"{significant_digits(LONG * longest)} s"] if LONG * longest < _longest(solution) else []
+            longer = [f"{significant_digits(LONG * longest)} s"] if LONG * longest < _longest_run(solution) else []
             longer += [] if grown else ["whole runs (horizon 0)"]
             warnings.append(
                 f"the horizon of {horizon:g} s is short in comparison: estimates may be biased beyond their intervals"
@@ -742,7 +747,7 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         warnings += [
             f"run {run} alone decides {path}: the interval takes the errors of this run to be like those of others; "
             f"excite {path} in another run, too"
-            for path, run in decided_alone(judged.fit).items()
+            for path, run in factors_of_single_runs(judged.fit).items()
         ]
     drifting = open_to_drift(judged) if best.kind == "fisher" and best.trusted else {}
     if drifting:
@@ -777,13 +782,13 @@ def _warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRun
         diverged = [str(model) for model in every.index if not np.isfinite(every["u"][model])]
         if diverged:
             warnings.append(f"free runs of the {name} runs diverge {join_names(diverged)} identification")
-        worse = [] if diverged else _worse(every)
+        worse = [] if diverged else _worse_signals(every)
         if worse:
             warnings.append(f"free runs of the {name} runs{without} are worse than before in {join_names(worse)}")
     return warnings
 
 
-def _worse(errors: pd.DataFrame) -> list[str]:
+def _worse_signals(errors: pd.DataFrame) -> list[str]:
     """Signals with more error after the fit than before, and by how much; errors : by model."""
     ratios = {name: float(errors[name][AFTER]) / max(float(errors[name][BEFORE]), 1e-12) for name in ERRORS_OF}
     return [
@@ -791,15 +796,15 @@ def _worse(errors: pd.DataFrame) -> list[str]:
     ]
 
 
-def _rounded(value: float) -> float:
+def _round_significant(value: float) -> float:
     """Round to 6 significant digits, so that the text does not depend on the machine."""
     return float(f"{value:.6g}")
 
 
-def _plain(value: Any) -> Any:
+def _as_toml_value(value: Any) -> Any:
     """Convert a value for TOML: None entries are removed, tuples become lists."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+        return {str(key): _as_toml_value(item) for key, item in value.items() if item is not None}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [_as_toml_value(item) for item in value]
     return value

@@ -88,7 +88,7 @@ class _Curve:
         return max((self.points[value][0] - self.least) / self.ratio, 0.0)
 
 
-def profile(
+def profile_factor(
     path: str,
     factors: Array,
     index: int,
@@ -123,19 +123,19 @@ def profile(
         centre = min(curve.points, key=lambda value: curve.points[value][0])
         for side, bound in ((-1, bounds[0]), (1, bounds[1])):
             farthest = bound if np.isfinite(bound) else centre + side * far
-            ends[side] = _end(curve, centre, side, step, limit, farthest)
+            ends[side] = _profile_crossing(curve, centre, side, step, limit, farthest)
     values = np.array(sorted(curve.points))
     rises = np.array([curve.rise(value) for value in values])
     best = float(values[np.argmin(rises)])
     moved = (objective - curve.least) / ratio > 0.01 * limit
     tried = tuple(f"{value:.4g}{' (its bound)' * (value in bounds)}" for value in (values[0], values[-1]))
-    sentence = _sentence(path, unit, ends[-1], ends[1], tried, best if moved else None)
+    sentence = _profile_sentence(path, unit, ends[-1], ends[1], tried, best if moved else None)
     if curve.failed:
         sentence += f"; {len(curve.failed)} refits failed and count as outside"
     return Profile(path, values, rises, limit, ends[-1], ends[1], len(curve.failed), sentence)
 
 
-def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, farthest: float) -> float:
+def _profile_crossing(curve: _Curve, estimate: float, side: int, step: float, limit: float, farthest: float) -> float:
     """Value of the factor where the profile crosses the limit on one side (-1 or 1); infinite if it stays below.
 
     Growing steps bracket the crossing, then regula falsi on sqrt(profile), which is nearly linear in the factor.
@@ -165,7 +165,7 @@ def _end(curve: _Curve, estimate: float, side: int, step: float, limit: float, f
     return float(value)
 
 
-def _sentence(path: str, unit: str, low: float, high: float, tried: Sequence[str], best: float | None) -> str:
+def _profile_sentence(path: str, unit: str, low: float, high: float, tried: Sequence[str], best: float | None) -> str:
     """One sentence with the interval, open sides with the farthest value tried, and a better fit if there is one."""
     fitted = "the data are fitted as well"
     if np.isfinite(low) and np.isfinite(high):

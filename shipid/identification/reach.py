@@ -49,7 +49,7 @@ class Reach:
         )
 
 
-def reach_of(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Reach:
+def data_reach(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Reach:
     """Reach of the runs of a dataset."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     names = ["u", "v", "r", *vessel_dynamics(vessel).commands]
@@ -57,7 +57,7 @@ def reach_of(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Reach:
     return Reach.of(vessel, {name: rows[name].to_numpy() for name in names}, ORDINARY)
 
 
-def beyond(title: str, one: Reach, data: Reach) -> str:
+def extrapolation_sentence(title: str, one: Reach, data: Reach) -> str:
     """Sentence where a manoeuvre goes beyond the data: `turning 35 reaches 20 deg of drift; the data reach 13`."""
     parts = [
         (f"{one.drift:.0f} deg of drift", f"{data.drift:.0f}", one.drift > max(MARGIN * data.drift, data.drift + 1)),

@@ -18,9 +18,9 @@ from shipid.data.dataset import Dataset
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import find_compiler, refuse_compiling
 from shipid.errors import DataError, DocumentError, suggest_name
-from shipid.identification.compiled import pack, run_compiled
+from shipid.identification.compiled import pack_lanes, run_compiled
 from shipid.identification.segments import ShootingSegment, cut_segments
-from shipid.identification.sensitivities import Layout, Variation, is_thrust, run_machine, variation
+from shipid.identification.sensitivities import FitLayout, Variation, build_variation, is_thrust, run_machine
 from shipid.identification.settings import (
     BLOCK,
     ENVIRONMENT,
@@ -28,8 +28,8 @@ from shipid.identification.settings import (
     NUISANCES,
     Identify,
     Unknowns,
-    overrides,
-    unknowns,
+    free_factors,
+    resolve_overrides,
 )
 from shipid.simulation.log import state_column
 from shipid.vessel.dynamics import vessel_dynamics
@@ -61,7 +61,7 @@ class Problem:
     runs: tuple[str, ...]
     settings: Identify
     unknown: Unknowns
-    layout: Layout
+    layout: FitLayout
     segments: tuple[ShootingSegment, ...]
     base: Array
     names: tuple[str, ...]
@@ -73,7 +73,7 @@ class Problem:
     @cached_property
     def model(self) -> Variation:
         """The variational equations of this fit, as CasADi functions."""
-        return variation(self.layout)
+        return build_variation(self.layout)
 
     @cached_property
     def node_scale(self) -> Array:
@@ -98,7 +98,7 @@ class Problem:
         return np.hstack([np.tile(factors, (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
 
 
-def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Problem:
+def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Problem:
     """Assemble a fit of the vessel to the runs; DocumentError or DataError names what is missing or wrong."""
     if not runs:
         raise DataError("no run to fit: name at least one", path="runs")
@@ -110,22 +110,22 @@ def build(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Ident
     if "thrust_scale" in widths and not any(map(is_thrust, vessel.parameters)):
         message = f"{vessel.name} has no thrust coefficient: leave it out"
         raise DocumentError(message, path=f"{BLOCK}.nuisance.thrust_scale")
-    model, unknown = vessel_dynamics(vessel), unknowns(vessel, settings)
+    model, unknown = vessel_dynamics(vessel), free_factors(vessel, settings)
     _check_outputs(vessel, dataset, settings)
-    overridden = overrides(settings, runs, vessel, model.environment, dataset.runs)
+    overridden = resolve_overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
     numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
     segments = cut_segments(vessel, dataset, runs, settings.step, settings.horizon, lags, numbers, settings.commands)
-    weather = _weather(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
+    weather = _given_environment(segments, overridden, model.environment, [n for n in names if n.startswith("current")])
     _check_set_for_a_run(unknown, overridden, widths)
     return Problem(
         vessel=vessel,
         runs=tuple(runs),
         settings=settings,
         unknown=unknown,
-        layout=Layout(
+        layout=FitLayout(
             model, unknown.groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
         ),
         segments=tuple(_with_weather(segment, weather, overridden[runs[segment.run]]) for segment in segments),
@@ -167,7 +167,7 @@ def _check_set_for_a_run(
             raise DocumentError(message, path=f"{BLOCK}.runs.{run}.{path}")
 
 
-def _weather(
+def _given_environment(
     segments: Sequence[ShootingSegment],
     overridden: Mapping[str, Mapping[str, float]],
     channels: Sequence[str],
@@ -222,7 +222,7 @@ class Predictions:
         )
         compiled = known.shape[0] * self.length * problem.model.size > COMPILE_FROM and find_compiler() is not None
         self.steps = known, seen
-        self.packed = (pack(known), pack(seen)) if compiled else None
+        self.packed = (pack_lanes(known), pack_lanes(seen)) if compiled else None
 
     def __len__(self) -> int:
         return len(self.run)
@@ -311,7 +311,7 @@ class Predictions:
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class ResidualPrediction:
     """Residuals of all predictions with their derivatives.
 
     factors : (n,). nuisances : (R, nq) in prior widths. away : (S, nn) initial states minus the measured ones, in prior
@@ -403,7 +403,9 @@ class Prediction:
         return result
 
 
-def predict(problem: Problem, factors: Array, nuisances: Array, away: Array | None = None) -> Prediction:
+def predict_residuals(
+    problem: Problem, factors: Array, nuisances: Array, away: Array | None = None
+) -> ResidualPrediction:
     """Run all predictions of a fit.
 
     Parameters
@@ -431,7 +433,7 @@ def predict(problem: Problem, factors: Array, nuisances: Array, away: Array | No
     if by_q.size:
         with np.errstate(all="ignore"):
             by_q = (by_q + np.einsum("mi,mij->mj", by_start, slope[where])) * problem.widths
-    return Prediction(
+    return ResidualPrediction(
         problem=problem,
         factors=factors,
         nuisances=nuisances,

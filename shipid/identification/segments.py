@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset, clock_slack, sample_columns, stretch_ro
 from shipid.data.windows import is_without_rows
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, suggest_name
-from shipid.identification.late import COARSE, Changes, between_rows, held_over_steps
+from shipid.identification.late import COARSE, Changes, held_over_steps, interpolate_commands
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -88,10 +88,12 @@ def cut_segments(
     for run, places in stretch_rows(dataset):
         if run in runs:
             rows = {name: values[places] for name, values in table.items()}
-            result += _cut(vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags, commands)
+            result += _cut_segments(
+                vessels.get(run, vessel), rows, list(runs).index(run), step, horizon, lags, commands
+            )
     without = next((run for i, run in enumerate(runs) if not any(segment.run == i for segment in result)), None)
     if without is not None:
-        wanted = _least(step, horizon)
+        wanted = _shortest_segment(step, horizon)
         half = f", half of {horizon:g} s" if horizon and wanted == horizon / 2 else ""
         message = f"{without!r} has no unbroken stretch of {wanted:g} s{half}: predict less far, or leave it out"
         raise DataError(message, path="runs")
@@ -108,7 +110,7 @@ def too_short(dataset: Dataset, runs: Sequence[str], step: float, horizon: float
     longest = dict.fromkeys(runs, 0)
     for run, rows in stretches_of_runs(dataset.select(runs)):
         longest[run] = max(longest[run], _num_steps(rows["t"].to_numpy(), step))
-    return [run for run, count in longest.items() if count < _least(step, horizon) / step]
+    return [run for run, count in longest.items() if count < _shortest_segment(step, horizon) / step]
 
 
 def _num_steps(t: Array, step: float) -> int:
@@ -116,7 +118,7 @@ def _num_steps(t: Array, step: float) -> int:
     return int((t[-1] - t[0] + clock_slack(t)) / step)
 
 
-def _least(step: float, horizon: float) -> float:
+def _shortest_segment(step: float, horizon: float) -> float:
     """Shortest time [s] that is predicted: two steps, or half a horizon."""
     return max(LEAST_STEPS * step, round(horizon / step) * step / 2 if horizon else 0.0)
 
@@ -128,7 +130,7 @@ def near_a_row(t: Array, instants: Array, step: float) -> NDArray[np.bool_]:
     return np.asarray(np.minimum(after, before) <= step / 2 + clock_slack(t))
 
 
-def _cut(
+def _cut_segments(
     vessel: Vessel,
     rows: Mapping[str, NDArray[Any]],
     run: int,
@@ -140,7 +142,7 @@ def _cut(
     t = rows["t"]
     count = _num_steps(t, step)
     each = round(horizon / step) if horizon else max(count, 1)
-    least = _least(step, horizon) / step
+    least = _shortest_segment(step, horizon) / step
     if count < least:
         return []
     grid = t[0] + step * np.arange(count + 1)
@@ -148,7 +150,7 @@ def _cut(
     measured = near_a_row(t, grid, step)
     if between == "between":
         _check_step(vessel, rows, step)
-        columns |= between_rows(vessel, rows, grid + step / 2)  # as they are in the middle of each step
+        columns |= interpolate_commands(vessel, rows, grid + step / 2)  # as they are in the middle of each step
     elif step <= COARSE * float(np.median(np.diff(t))):
         columns |= held_over_steps(vessel, rows, grid, step)
     commands = {name: columns[name] for name in vessel_dynamics(vessel).commands}

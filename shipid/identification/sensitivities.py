@@ -32,7 +32,7 @@ THRUST = re.compile(r"thruster\.[^.]+\.(?:k_T|(?:K_T|K_T_astern|C_T)\..+|k_P|k_J
 
 
 @dataclass(frozen=True)
-class Layout:
+class FitLayout:
     """Structure of a fit without its numbers: the key under which equations are built and compiled.
 
     groups : paths that share each factor. signals : fitted columns. nuisances : scalars, those that change the motion
@@ -88,7 +88,7 @@ class Variation:
     node : names of the node's entries: states, then memories where they depend on an unknown.
     """
 
-    layout: Layout
+    layout: FitLayout
     rates: ca.Function
     advance: ca.Function
     outputs: ca.Function
@@ -100,7 +100,7 @@ class Variation:
     @cached_property
     def entries(self) -> tuple[str, ...]:
         """Names of the log columns that `begin` takes as `measured`."""
-        return _entries(self.states)
+        return _initial_columns(self.states)
 
     @property
     def num_columns(self) -> int:
@@ -137,7 +137,7 @@ class Variation:
 class _Ship:
     """Symbols of all inputs of a layout, and the ship's equations in these symbols."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: FitLayout) -> None:
         model = layout.model
         self.layout, self.model = layout, model
         self.theta, self.q = SX.sym("theta", len(layout.groups)), SX.sym("q", len(layout.nuisances))
@@ -148,9 +148,9 @@ class _Ship:
         self.memory = SX.sym("memory", len(model.memory))
         self.names = (*model.state, *model.hidden)
         self.value_of = dict(zip(layout.nuisances, ca.vertsplit(self.q) if layout.nuisances else [], strict=True))
-        commands = _delayed(layout, self.commands, self.value_of)
-        environment = _environment(layout, self.weather, self.value_of)
-        parameters = _parameters(layout, self.base, self.scale, self.theta, self.value_of)
+        commands = _delay_commands(layout, self.commands, self.value_of)
+        environment = _environment_channels(layout, self.weather, self.value_of)
+        parameters = _scaled_parameters(layout, self.base, self.scale, self.theta, self.value_of)
         self.inputs = [self.memory, commands, environment, parameters]
 
     @property
@@ -193,7 +193,9 @@ class _Ship:
         if self.layout.outputs:
             outputs = SX(self.model.measured(state, *self.inputs))
             shown = dict(zip(self.model.outputs, ca.vertsplit(outputs), strict=True))
-        return _signals(self.layout.signals, dict(zip(names, ca.vertsplit(values), strict=True)) | shown, self.value_of)
+        return _sensed_signals(
+            self.layout.signals, dict(zip(names, ca.vertsplit(values), strict=True)) | shown, self.value_of
+        )
 
     @property
     def now(self) -> SX:
@@ -202,10 +204,10 @@ class _Ship:
 
 
 @lru_cache(maxsize=32)
-def variation(layout: Layout) -> Variation:
+def build_variation(layout: FitLayout) -> Variation:
     """Build the variational equations of a layout; the result is cached."""
     ship = _Ship(layout)
-    needed = _needed(ship)
+    needed = _influential_states(ship)
     states = tuple(ship.names[i] for i in needed)
     node = (*states, *layout.model.memory) if layout.carried else states
     z, whole = SX.sym("states", len(needed)), SX(len(ship.names), 1)
@@ -231,26 +233,28 @@ def variation(layout: Layout) -> Variation:
             moved += ca.jacobian(h, ship.memory) @ D
     R = ca.horzcat(moved, ca.jacobian(h, ship.seen))
     weighted = [seen[count:] * (h - seen[:count]), ca.vec(ca.repmat(seen[count:], 1, R.shape[1]) * R)]
-    entries, begin = _begin(states, ship.value_of)
+    entries, begin = _initial_state(states, ship.value_of)
     both = {"z": ca.vertcat(z, ca.vec(S)), "m": ca.vertcat(ship.memory, ca.vec(D)), "fixed": ship.fixed}
     timed = {"m": both["m"], "fixed": ship.fixed, "known": ship.known, "dt": dt}
     return Variation(
         layout=layout,
-        rates=_function("rates", {**both, "known": ship.known}, ca.vertcat(f, ca.vec(slope))),
-        advance=_function("advance", timed, ca.vertcat(later, ca.vec(more))),
-        outputs=_function("outputs", {**both, "seen": ca.vertcat(seen, ship.now)}, ca.vertcat(*weighted)),
-        begin=_function("begin", {"measured": entries, "nuisances": ship.q}, begin),
-        begin_slope=_function("slope", {"measured": entries, "nuisances": ship.q}, ca.jacobian(begin, ship.q)),
+        rates=_variation_function("rates", {**both, "known": ship.known}, ca.vertcat(f, ca.vec(slope))),
+        advance=_variation_function("advance", timed, ca.vertcat(later, ca.vec(more))),
+        outputs=_variation_function("outputs", {**both, "seen": ca.vertcat(seen, ship.now)}, ca.vertcat(*weighted)),
+        begin=_variation_function("begin", {"measured": entries, "nuisances": ship.q}, begin),
+        begin_slope=_variation_function(
+            "slope", {"measured": entries, "nuisances": ship.q}, ca.jacobian(begin, ship.q)
+        ),
         states=states,
         node=node,
     )
 
 
-def _function(name: str, inputs: Mapping[str, SX], result: SX) -> ca.Function:
+def _variation_function(name: str, inputs: Mapping[str, SX], result: SX) -> ca.Function:
     return ca.Function(name, list(inputs.values()), [ca.densify(result)], list(inputs), ["result"], {"cse": True})
 
 
-def _parameters(layout: Layout, base: SX, scale: SX, theta: SX, value_of: Mapping[str, SX]) -> SX:
+def _scaled_parameters(layout: FitLayout, base: SX, scale: SX, theta: SX, value_of: Mapping[str, SX]) -> SX:
     """Every parameter of the vessel: its base value, or scale x factor; thrust coefficients times their scale."""
     place = {path: i for i, path in enumerate(layout.model.parameters)}
     result, number = SX(base), 0
@@ -264,7 +268,7 @@ def _parameters(layout: Layout, base: SX, scale: SX, theta: SX, value_of: Mappin
     return result
 
 
-def _delayed(layout: Layout, commands: SX, value_of: Mapping[str, SX]) -> SX:
+def _delay_commands(layout: FitLayout, commands: SX, value_of: Mapping[str, SX]) -> SX:
     """Commands delayed by the nuisance `latency` [s]; linear interpolation between steps.
 
     commands : values at this step, then at the `lags` steps before it.
@@ -276,7 +280,7 @@ def _delayed(layout: Layout, commands: SX, value_of: Mapping[str, SX]) -> SX:
     return sum((ca.fmax(0, 1 - ca.fabs(late - j)) * part for j, part in enumerate(parts)), SX(parts[0].shape[0], 1))
 
 
-def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
+def _environment_channels(layout: FitLayout, weather: SX, value_of: Mapping[str, SX]) -> SX:
     """All environment channels: from the inputs, from the nuisances, or 0."""
     channel = dict(zip(layout.weather, ca.vertsplit(weather) if layout.weather else [], strict=True))
     if "current_north" in value_of:
@@ -285,7 +289,7 @@ def _environment(layout: Layout, weather: SX, value_of: Mapping[str, SX]) -> SX:
     return ca.vertcat(SX(0, 1), *(channel.get(name, SX(1, 1)) for name in layout.model.environment))
 
 
-def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[str, SX]) -> SX:
+def _sensed_signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[str, SX]) -> SX:
     """Signals of a log with the sensor faults in `value_of`, from the true states and outputs.
 
     Velocities are horizontal. heading_bias [rad] is added to the true heading, and u and v are resolved along the
@@ -307,9 +311,9 @@ def _signals(signals: Sequence[str], state: Mapping[str, SX], value_of: Mapping[
     return ca.vertcat(*(read[name]() if name in read else state[name] for name in signals))
 
 
-def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
-    """Symbols of a row of the log, and the true states for which `_signals` gives that row: its inverse."""
-    entry = {name: SX.sym(name) for name in _entries(states)}
+def _initial_state(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
+    """Symbols of a row of the log, and the true states for which `_sensed_signals` gives that row: its inverse."""
+    entry = {name: SX.sym(name) for name in _initial_columns(states)}
     zero = SX(1, 1)
     b, x = value_of.get("heading_bias", zero), value_of.get("lever_arm", zero)
     u, v = (entry[name] - value_of.get(f"velocity_bias_{name}", zero) for name in ("u", "v"))
@@ -321,12 +325,12 @@ def _begin(states: Sequence[str], value_of: Mapping[str, SX]) -> tuple[SX, SX]:
     return ca.vertcat(*entry.values()), ca.vertcat(*(true[name] for name in states))
 
 
-def _entries(states: Sequence[str]) -> tuple[str, ...]:
+def _initial_columns(states: Sequence[str]) -> tuple[str, ...]:
     """Columns needed for an initial state: the states, and the columns that sensor faults mix with them."""
     return tuple(dict.fromkeys(("u", "v", "r", "psi", "north", "east", *states)))
 
 
-def _needed(ship: _Ship) -> list[int]:
+def _influential_states(ship: _Ship) -> list[int]:
     """Indices of the states that influence a fitted signal, directly or through other states; u, v, r always."""
     x = SX.sym("x", len(ship.names))
     h = ship.signals(x, ship.names, x)
@@ -338,9 +342,9 @@ def _needed(ship: _Ship) -> list[int]:
 
 
 @lru_cache(maxsize=32)
-def scan(layout: Layout, num_steps: int) -> ca.Function:
+def prediction_scan(layout: FitLayout, num_steps: int) -> ca.Function:
     """One prediction on CasADi's virtual machine: (x, fixed, known, seen) -> outputs of each of `num_steps` steps."""
-    model = variation(layout)
+    model = build_variation(layout)
     one = model.step
     x, fixed = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("fixed", one.size1_in(1))
     known, seen = (ca.MX.sym(name, one.size1_in(i), num_steps) for i, name in ((2, "known"), (3, "seen")))
@@ -348,7 +352,7 @@ def scan(layout: Layout, num_steps: int) -> ca.Function:
     return ca.Function("prediction", [x, fixed, known, seen], [record])
 
 
-def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
+def run_machine(layout: FitLayout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
     """Outputs (1, K, N, .) of K predictions of N steps, by CasADi's virtual machine.
 
     x : (K, size) initial states with their sensitivities. fixed : (K, .) numbers that are constant along a prediction.
@@ -356,7 +360,7 @@ def run_machine(layout: Layout, x: Array, fixed: Array, known: Array, seen: Arra
     """
     count, num_steps = known.shape[:2]
     with hold_interrupts():
-        record = scan(layout, num_steps).map(count)(
+        record = prediction_scan(layout, num_steps).map(count)(
             x.T, fixed.T, known.reshape(count * num_steps, -1).T, seen.reshape(count * num_steps, -1).T
         )
     return np.array(record).T.reshape(1, count, num_steps, -1)

@@ -17,7 +17,7 @@ from shipid.checked import CheckedModel
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, suggest_name
 from shipid.identification.late import Changes
-from shipid.identification.plausible import within
+from shipid.identification.plausible import plausible_factors
 from shipid.physics.signals import is_output, rows_of_role
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import select_paths
@@ -140,7 +140,7 @@ class Identify(CheckedModel, BaseModel):
     @property
     def signals(self) -> dict[str, float]:
         """Fitted column -> standard deviation of its residuals, in the unit of the column."""
-        return {column: width for name, width in self.weights.items() for column in columns_of(name)}
+        return {column: width for name, width in self.weights.items() for column in weighted_columns(name)}
 
     @property
     def linear_from(self) -> float:
@@ -153,7 +153,7 @@ class Identify(CheckedModel, BaseModel):
         return [name for name in self.weights if is_output(name)]
 
 
-def columns_of(name: str) -> tuple[str, ...]:
+def weighted_columns(name: str) -> tuple[str, ...]:
     """Columns of the data that a name in `weights` fits; an output is its column."""
     return WEIGHTED.get(name, (name,))
 
@@ -190,7 +190,7 @@ class Unknowns:
         }
 
 
-def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
+def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
     """The factors that the settings leave free; DocumentError for a selection without a match or a zero base value."""
     base = vessel.parameters
 
@@ -198,7 +198,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
         try:
             return select_paths(patterns, base, None, f"{BLOCK}.{key}")
         except DocumentError as error:
-            message = f"{error.message}{_left_out(vessel, patterns)}"
+            message = f"{error.message}{_default_parameter_remedy(vessel, patterns)}"
             raise DocumentError(message, path=error.path) from None
 
     selected = chosen(settings.parameters, "parameters")
@@ -224,7 +224,7 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     if unknown is not None:
         hint = f"is {base[unknown]:g}: scale is for a 0" if unknown in base else suggest_name(unknown, base)
         raise DocumentError(f"{unknown!r}: {hint}", path=f"{BLOCK}.scale")
-    groups = [without_zeros(group, settings, base) for group in _groups(settings, free, chosen)]
+    groups = [without_zeros(group, settings, base) for group in _factor_groups(settings, free, chosen)]
     scales = []
     for group in groups:
         if len({base[path] == 0 for path in group}) > 1:
@@ -238,12 +238,12 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])
     high, prior = np.full(len(groups), np.inf), np.full(len(groups), np.inf)
     key = _Digested(vessel.digest, vessel)
-    low = np.array([max(_least(key, path) for path in group) for group in groups])
+    low = np.array([max(_smallest_factor(key, path) for path in group) for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
     if settings.ranges:
         for i, group in enumerate(groups):
             for path in group:
-                least, most = within(vessel, path)
+                least, most = plausible_factors(vessel, path)
                 low[i], high[i] = max(low[i], least), min(high[i], most)
     for pattern, limits in settings.bounds.items():
         for path in reached(pattern, "bounds", place):
@@ -254,18 +254,18 @@ def unknowns(vessel: Vessel, settings: Identify) -> Unknowns:
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
 
 
-def _left_out(vessel: Vessel, patterns: Sequence[str]) -> str:
+def _default_parameter_remedy(vessel: Vessel, patterns: Sequence[str]) -> str:
     """How to make a number that the vessel leaves at its default one that can be fitted; empty where there is none."""
     for path in patterns:
         block, _, name = path.rpartition(".")
         if path in vessel.parameters or "*" in path or not block:
             continue
-        if any(_accepts(vessel, path, value) for value in (0.0, 1.0)):
+        if any(_accepts_value(vessel, path, value) for value in (0.0, 1.0)):
             return f"; to fit {name}, which this vessel leaves out, write it in [{block}] of a file that extends her"
     return ""
 
 
-def dimensions_of(asked: Sequence[str], settings: Identify) -> set[str]:
+def measured_constants(asked: Sequence[str], settings: Identify) -> set[str]:
     """Dimensions and constants among paths that patterns select, which are measured or known; none written in full."""
     named = {*settings.parameters, *settings.prior, *settings.bounds, *settings.scale}
     named |= {path for group in settings.together for path in group}
@@ -278,7 +278,7 @@ def dimensions_of(asked: Sequence[str], settings: Identify) -> set[str]:
 
 def _without_dimensions(asked: Sequence[str], settings: Identify) -> list[str]:
     """The paths without dimensions and constants; DocumentError where there are no others."""
-    known = dimensions_of(asked, settings)
+    known = measured_constants(asked, settings)
     if known == set(asked):
         message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
         raise DocumentError(message, path=f"{BLOCK}.parameters")
@@ -294,15 +294,15 @@ class _Digested:
 
 
 @lru_cache(maxsize=4096)
-def _least(key: _Digested, path: str) -> float:
+def _smallest_factor(key: _Digested, path: str) -> float:
     """Smallest factor that the vessel's checks accept: -inf; 0 if they refuse the other sign; `POSITIVE` if also 0."""
     vessel, base = key.vessel, key.vessel.parameters[path]
-    if base == 0 or _accepts(vessel, path, -base):
+    if base == 0 or _accepts_value(vessel, path, -base):
         return -math.inf
-    return 0.0 if _accepts(vessel, path, 0.0) else POSITIVE
+    return 0.0 if _accepts_value(vessel, path, 0.0) else POSITIVE
 
 
-def _accepts(vessel: Vessel, path: str, value: float) -> bool:
+def _accepts_value(vessel: Vessel, path: str, value: float) -> bool:
     try:
         vessel.with_values({path: value})
     except DocumentError:
@@ -310,7 +310,7 @@ def _accepts(vessel: Vessel, path: str, value: float) -> bool:
     return True
 
 
-def _groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str, ...]]:
+def _factor_groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str, ...]]:
     """Free paths in the order of the vessel, paths of `together` in one group."""
     of: dict[str, int] = {}
     for number, patterns in enumerate(settings.together):
@@ -339,13 +339,13 @@ def without_zeros(group: Sequence[str], settings: Identify, base: Mapping[str, f
     return kept if any(base[path] != 0 for path in kept) else tuple(group)
 
 
-def overrides_of(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
+def run_overrides(settings: Identify, runs: Sequence[str]) -> dict[str, Any]:
     """The overrides `<run>.<path>` -> value in the settings that belong to some runs."""
     given = documents.document_leaves(settings.runs, lists=False)
     return {key: value for key, value in given if any(key.startswith(f"{run}.") for run in runs)}
 
 
-def overrides(
+def resolve_overrides(
     settings: Identify, runs: Sequence[str], vessel: Vessel, channels: Sequence[str], known: Sequence[str] = ()
 ) -> dict[str, dict[str, float]]:
     """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name.

@@ -44,10 +44,10 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
     series : `FreeRuns.series`. model : the model among its models. dataset : of the runs, for the commands.
     """
     log, mine = (series[series["model"] == name].reset_index(drop=True) for name in (MEASURED, model))
-    helm = _helm(vessel, dataset, log)
+    helm = _mean_helm(vessel, dataset, log)
     begin = ~log.duplicated(["run", "piece"])
     away = {name: mine[name].to_numpy() - log[name].to_numpy() for name in ("u", "v", "r")}
-    seen = ~begin.to_numpy() & np.isfinite(away["r"]) & _measured(dataset, log)
+    seen = ~begin.to_numpy() & np.isfinite(away["r"]) & _instants_with_rows(dataset, log)
     r, speed = log["r"].to_numpy(), np.hypot(log["u"].to_numpy(), log["v"].to_numpy())
     pieces = log.groupby(["run", "piece"], sort=False).ngroup().to_numpy()
     rows = [
@@ -56,15 +56,15 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
             "side": side,
             "rows": int(mask.sum()),
             **{name: float(np.sqrt((values[mask] ** 2).mean())) for name, values in away.items()},
-            **(_turned(away["r"][mask], r[mask], pieces[mask]) if side else {}),
+            **(_turning_error(away["r"][mask], r[mask], pieces[mask]) if side else {}),
         }
-        for group, side, mask in _groups(seen, r, helm, speed)
+        for group, side, mask in _side_groups(seen, r, helm, speed)
         if mask.sum() >= FEWEST
     ]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _measured(dataset: Dataset, log: pd.DataFrame) -> NDArray[np.bool_]:
+def _instants_with_rows(dataset: Dataset, log: pd.DataFrame) -> NDArray[np.bool_]:
     """Instants (N,) of the free runs at which there is a row of the log: between far rows it is only interpolated."""
     seen, steps = np.zeros(len(log), dtype=bool), log.groupby(["run", "piece"], sort=False)["t"].diff()
     for run, rows in log.groupby("run", sort=False):
@@ -73,13 +73,13 @@ def _measured(dataset: Dataset, log: pd.DataFrame) -> NDArray[np.bool_]:
     return seen
 
 
-def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:
+def _turning_error(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str, float]:
     """Relative error of the change of heading, and standard errors from the pieces, which are independent."""
     _, place = np.unique(pieces, return_inverse=True)
     of_row = (away, r, away**2, np.ones_like(r))
     missed, turned, squares, rows = (np.bincount(place, values).astype(float) for values in of_row)
-    share, error = _ratio(missed, turned)
-    square, more = _ratio(squares, rows)
+    share, error = _ratio_of_sums(missed, turned)
+    square, more = _ratio_of_sums(squares, rows)
     rms = float(np.sqrt(square))
     return {
         "turning": share,
@@ -89,14 +89,14 @@ def _turned(away: Array, r: Array, pieces: NDArray[np.integer[Any]]) -> dict[str
     }
 
 
-def _ratio(a: Array, b: Array) -> tuple[float, float]:
+def _ratio_of_sums(a: Array, b: Array) -> tuple[float, float]:
     """Ratio of two sums over pieces, and its standard error; infinite from one piece."""
     share, count = float(a.sum() / b.sum()), len(a)
     error = float(np.sqrt(count / (count - 1) * ((a - share * b) ** 2).sum()) / abs(b.sum())) if count > 1 else np.inf
     return share, error
 
 
-def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array | None:
+def _mean_helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array | None:
     """Mean magnitude (N,) [rad] of the angles that steer, at the rows of the free runs; None where no angle steers."""
     names = [name for name in vessel_dynamics(vessel).commands if is_steering(name)]
     if not names:
@@ -110,7 +110,7 @@ def _helm(vessel: Vessel, dataset: Dataset, log: pd.DataFrame) -> Array | None:
     return helm
 
 
-def _groups(
+def _side_groups(
     seen: NDArray[np.bool_], r: Array, helm: Array | None, speed: Array
 ) -> Iterator[tuple[str, str, NDArray[np.bool_]]]:
     least = TURNING * (np.abs(r[seen]).max(initial=0.0))
@@ -131,7 +131,7 @@ def _groups(
             yield f"speed {speed[here].min():.3g} to {speed[here].max():.3g} m/s", "", here
 
 
-def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
+def uneven_side_warnings(groups: pd.DataFrame) -> tuple[str, ...]:
     """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate.
 
     Each is shown by a t test over the pieces; the level is divided by the number of tests (Bonferroni).
@@ -148,7 +148,7 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
         freedom = min(row["pieces"] for row in of) - 1
         better, worse = sorted(of, key=lambda row: abs(float(row["turning"])))
         apart = abs(worse["turning"]) - abs(better["turning"])
-        chance = _chance(apart, float(np.hypot(worse["error"], better["error"])), freedom)
+        chance = _two_sided_p(apart, float(np.hypot(worse["error"], better["error"])), freedom)
         if chance <= level and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             sentences.append(
                 f"the error of the turning{where} is {percent_text(worse['turning'], signed=True)} to {worse['side']} and "
@@ -157,7 +157,7 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
             )
             continue
         better, worse = sorted(of, key=lambda row: float(row["r"]))
-        chance = _chance(worse["r"] - better["r"], float(np.hypot(worse["r_error"], better["r_error"])), freedom)
+        chance = _two_sided_p(worse["r"] - better["r"], float(np.hypot(worse["r_error"], better["r_error"])), freedom)
         if chance <= level and worse["r"] > WORSE * better["r"]:
             sentences.append(
                 f"the error of the yaw rate{where} is {worse['r'] / better['r']:.1f} times as large to {worse['side']} "
@@ -166,14 +166,14 @@ def uneven(groups: pd.DataFrame) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _chance(apart: float, error: float, freedom: int) -> float:
+def _two_sided_p(apart: float, error: float, freedom: int) -> float:
     """Two-sided p-value of a difference with so many degrees of freedom; 1 where nothing is known of its error."""
     if freedom < 1 or not np.isfinite(error):
         return 1.0
     return float(2 * stdtr(freedom, -apart / error)) if error > 0 else float(apart <= 0)
 
 
-def shown(groups: pd.DataFrame) -> list[list[str]]:
+def side_table_rows(groups: pd.DataFrame) -> list[list[str]]:
     """Rows of a table: group, side, rows, u, v [m/s], r [deg/s], error of the turning [%]."""
     return [
         [
@@ -182,17 +182,17 @@ def shown(groups: pd.DataFrame) -> list[list[str]]:
             str(row["rows"]),
             *(f"{row[name]:.3g}" for name in ("u", "v")),
             f"{row['r'] / DEGREE:.3g}",
-            _turning(float(row["turning"]), float(row["error"])),
+            _turning_error_text(float(row["turning"]), float(row["error"])),
         ]
         for row in groups.to_dict("records")
     ]
 
 
-def _turning(turning: float, error: float) -> str:
+def _turning_error_text(turning: float, error: float) -> str:
     """Return the error of the turning [%] with its standard error, where more than one piece shows it."""
     share = "" if np.isnan(turning) else f"{100 * turning:+.1f}"
     return f"{share} +-{100 * error:.1f}" if share and np.isfinite(error) else share
 
 
 HEADS = ("group", "turning to", "rows", "u [m/s]", "v [m/s]", "r [deg/s]", "turning [%]")
-"""Columns of `shown`."""
+"""Columns of `side_table_rows`."""

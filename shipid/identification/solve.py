@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
-from shipid.identification.covariance import inverted
-from shipid.identification.fit import Point, Progress, Result, evaluate, origin, search
-from shipid.identification.late import COARSE, interval_of
-from shipid.identification.residuals import Problem, build, predict
-from shipid.identification.settings import BLOCK, Identify, columns_of
-from shipid.identification.start import by_inverse_dynamics, grown
-from shipid.identification.statistics import LinearFit, whiteness
+from shipid.identification.covariance import invert_information
+from shipid.identification.fit import Point, Progress, Result, evaluate_factors, initial_point, search_factors
+from shipid.identification.late import COARSE, row_interval
+from shipid.identification.residuals import Problem, build_problem, predict_residuals
+from shipid.identification.settings import BLOCK, Identify, weighted_columns
+from shipid.identification.start import by_inverse_dynamics, grow_horizon
+from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -122,18 +122,20 @@ def identify(
     check_function_or_none("progress", progress)
     runs = as_names("runs", () if runs is None else runs, DataError)
     plain = settings.model_copy(update={"discount": False})
-    solution = _identified(vessel, dataset, runs, plain, start, progress)
+    solution = _fit_dropping_factors(vessel, dataset, runs, plain, start, progress)
     if not settings.discount:
         return solution
     for _ in range(DISCOUNTS):
         if solution.status != "ok":
             break
-        discounted, effective = _discounted(solution)
+        discounted, effective = _discount_residuals(solution)
         before = solution
-        solution = replace(_identified(vessel, dataset, runs, discounted, solution, progress), effective=effective)
+        solution = replace(
+            _fit_dropping_factors(vessel, dataset, runs, discounted, solution, progress), effective=effective
+        )
         solution = replace(solution, seconds=solution.seconds + before.seconds)
-    problem = build(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
-    return replace(solution, objective_start=evaluate(problem, *_begun(problem, start)).objective)
+    problem = build_problem(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
+    return replace(solution, objective_start=evaluate_factors(problem, *_initial_unknowns(problem, start)).objective)
 
 
 def by_log(solution: Solution, dataset: Dataset, other: Dataset) -> Array | None:
@@ -144,8 +146,11 @@ def by_log(solution: Solution, dataset: Dataset, other: Dataset) -> Array | None
     """
     point = solution.point
     here, there = (
-        predict(
-            build(solution.vessel, log, solution.runs, solution.settings), solution.factors, point.nuisances, point.away
+        predict_residuals(
+            build_problem(solution.vessel, log, solution.runs, solution.settings),
+            solution.factors,
+            point.nuisances,
+            point.away,
         )
         for log in (dataset, other)
     )
@@ -156,12 +161,13 @@ def by_log(solution: Solution, dataset: Dataset, other: Dataset) -> Array | None
     return np.asarray(jacobian[:, -1])
 
 
-def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
+def _discount_residuals(solution: Solution) -> tuple[Identify, dict[str, float]]:
     """Settings with the deviations that correlated residuals deserve, and signal -> residuals that they are worth."""
-    settings, seen = solution.settings, whiteness(LinearFit.of(solution))
+    settings, seen = solution.settings, residual_whiteness(LinearFit.of(solution))
     factors = {
         name: max(
-            float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in columns_of(name)])), LEAST
+            float(np.mean([seen[column].level * seen[column].memory ** 0.5 for column in weighted_columns(name)])),
+            LEAST,
         )
         for name in settings.weights
     }
@@ -175,7 +181,7 @@ def _discounted(solution: Solution) -> tuple[Identify, dict[str, float]]:
     return settings.model_copy(update=update), {name: one.effective for name, one in seen.items()}
 
 
-def _identified(
+def _fit_dropping_factors(
     vessel: Vessel,
     dataset: Dataset,
     runs: Sequence[str],
@@ -185,24 +191,26 @@ def _identified(
 ) -> Solution:
     """One fit, and those after each dropped factor."""
     begun = time.perf_counter()
-    problem = build(vessel, dataset, runs, settings)
-    result, objective_start = _searched(problem, dataset, start, progress)
-    solution = _solution(problem, result, objective_start, time.perf_counter() - begun)
+    problem = build_problem(vessel, dataset, runs, settings)
+    result, objective_start = _search_from_starts(problem, dataset, start, progress)
+    solution = _build_solution(problem, result, objective_start, time.perf_counter() - begun)
     targets = solution.centre if settings.drop_to == "base" else np.zeros(len(solution.centre))
     while settings.drop is not None and solution.status in ("ok", "refused"):
-        weakest = _weakest(solution, settings.drop, targets)
+        weakest = _weakest_factor(solution, settings.drop, targets)
         if weakest is None:
             break
-        problem = _without(problem, weakest, targets[weakest])
+        problem = _hold_factor(problem, weakest, targets[weakest])
         dropped = (*solution.dropped, problem.unknown.paths[weakest])
         factors = np.where(np.arange(len(targets)) == weakest, targets, solution.factors)
-        result = search(problem, factors, _point(result), progress, before=result.iterations)
-        solution = replace(_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped)
-    warning = _blurred(vessel, dataset, runs, settings)
+        result = search_factors(problem, factors, _result_point(result), progress, before=result.iterations)
+        solution = replace(
+            _build_solution(problem, result, objective_start, time.perf_counter() - begun), dropped=dropped
+        )
+    warning = _step_warning(vessel, dataset, runs, settings)
     return replace(solution, warnings=(warning,) if warning else ())
 
 
-def _searched(
+def _search_from_starts(
     problem: Problem, dataset: Dataset, start: Mapping[str, float] | Solution | None, progress: Progress | None
 ) -> tuple[Result, float]:
     """Result of the first search that converges (else of the best), and the objective at the initial factors.
@@ -210,23 +218,23 @@ def _searched(
     A search that converges to an objective above that at the initial factors is followed by one from these. Inverse
     dynamics are passed over where the runs are too short for them.
     """
-    factors, point = _begun(problem, start)
-    objective_start = evaluate(problem, factors, point).objective
+    factors, point = _initial_unknowns(problem, start)
+    objective_start = evaluate_factors(problem, factors, point).objective
     ways = ORDER["base"] if start is not None else ORDER[problem.settings.start]
     result, before = None, 0
     for way in ways:
         begin = factors
         if way == "growing":
-            begin, before, stopped = grown(problem, dataset, factors, progress, before)
+            begin, before, stopped = grow_horizon(problem, dataset, factors, progress, before)
             if stopped:
-                value = evaluate(problem, begin, point)
+                value = evaluate_factors(problem, begin, point)
                 return Result(begin, value.at, value.objective, before, "stopped"), objective_start
         elif way == "inverse":
             try:
                 begin = by_inverse_dynamics(problem, dataset)
             except DataError:  # runs too short for a regression
                 continue
-        attempt = search(problem, begin, point, progress, before=before)
+        attempt = search_factors(problem, begin, point, progress, before=before)
         before = attempt.iterations
         if result is None or attempt.status in ("ok", "stopped") or attempt.objective < result.objective:
             result = attempt
@@ -234,14 +242,14 @@ def _searched(
             break
     assert result is not None
     if result.status == "ok" and result.objective > objective_start:  # led away, to an optimum worse than the base
-        attempt = search(problem, factors, point, progress, before=before)
+        attempt = search_factors(problem, factors, point, progress, before=before)
         result = attempt if attempt.objective < result.objective else result
     return result, objective_start
 
 
-def _blurred(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
+def _step_warning(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> str:
     """A warning if the step of the fit is longer than the interval of the log or does not divide it, else no text."""
-    between, length = interval_of(dataset, runs), vessel.length
+    between, length = row_interval(dataset, runs), vessel.length
     if settings.step > COARSE * between:
         return (
             f"rows of the log are {between:.3g} s apart and commands are held over steps of {settings.step:g} s: "
@@ -262,15 +270,15 @@ def _blurred(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Id
     return ""
 
 
-def _begun(problem: Problem, start: Mapping[str, float] | Solution | None) -> tuple[Array, Point]:
+def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | None) -> tuple[Array, Point]:
     """Initial factors within the bounds, and where nuisances and initial states begin."""
     if not isinstance(start, Solution):
-        return _factors(problem, start or {}), origin(problem)
-    factors = _factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
-    return factors, start.point if _fits(start.point, origin(problem)) else origin(problem)
+        return _initial_factors(problem, start or {}), initial_point(problem)
+    factors = _initial_factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+    return factors, start.point if _same_shapes(start.point, initial_point(problem)) else initial_point(problem)
 
 
-def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
+def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
     """Initial factors (n,) within the bounds: those in `start`, the others of the base vessel."""
     unknown = problem.unknown
     factors = unknown.centre.copy()
@@ -282,22 +290,22 @@ def _factors(problem: Problem, start: Mapping[str, float]) -> Array:
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
 
 
-def _fits(point: Point, other: Point) -> bool:
+def _same_shapes(point: Point, other: Point) -> bool:
     """Whether two points have arrays of equal shapes."""
     return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
-def _point(result: Result) -> Point:
+def _result_point(result: Result) -> Point:
     return Point(result.at.nuisances, result.at.away)
 
 
-def _solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
+def _build_solution(problem: Problem, result: Result, objective_start: float, seconds: float) -> Solution:
     unknown, settings, end, word = problem.unknown, problem.settings, result.at, result.status
     factors = result.factors
     at_bound = (unknown.low < unknown.high) & ((factors - unknown.low < NEAR) | (unknown.high - factors < NEAR))
     residuals, jacobian, spent = end.marginal(settings.linear_from)
-    values, sentence = unknown.values(factors), _sentence(problem, result, at_bound)
-    reason = _refusal(problem.vessel, values)
+    values, sentence = unknown.values(factors), _search_sentence(problem, result, at_bound)
+    reason = _estimate_refusal(problem.vessel, values)
     if reason is not None:
         word, sentence = ("refused" if word == "ok" else word), f"{sentence}; {reason}"
     return Solution(
@@ -324,12 +332,12 @@ def _solution(problem: Problem, result: Result, objective_start: float, seconds:
         sentence=sentence,
         at_bound=at_bound,
         held=unknown.low == unknown.high,
-        point=_point(result),
+        point=_result_point(result),
         within=end.within(settings.linear_from),
     )
 
 
-def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
+def _estimate_refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
     """The reason why the vessel's checks refuse the estimated values; None if they accept them."""
     try:
         vessel.with_values(values)
@@ -338,7 +346,7 @@ def _refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
     return None
 
 
-def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
+def _search_sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
     """The status of a search in one sentence, with a remedy."""
     if result.status == "ok":
         limited = [path for path, there in zip(problem.unknown.paths, at_bound, strict=True) if there]
@@ -358,21 +366,21 @@ def _sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> 
     )
 
 
-def _weakest(solution: Solution, threshold: float, targets: Array) -> int | None:
+def _weakest_factor(solution: Solution, threshold: float, targets: Array) -> int | None:
     """Index of the free factor with the smallest |factor - target| / standard error; None if above the threshold."""
     information = solution.jacobian.T @ solution.jacobian + np.diag(1 / solution.prior_widths**2)
     free = ~solution.held
     if not free.any():
         return None
     level = (solution.residuals**2).sum() / max(1, len(solution.residuals) - free.sum())
-    inverse, unseen = inverted(information[np.ix_(free, free)])
+    inverse, unseen = invert_information(information[np.ix_(free, free)])
     errors = np.where(unseen, np.inf, np.sqrt(np.diag(inverse) * level))
     away = np.abs(solution.factors - targets)[free] / np.maximum(errors, 1e-300)
     weakest = int(np.argmin(away))
     return int(np.flatnonzero(free)[weakest]) if away[weakest] < threshold else None
 
 
-def _without(problem: Problem, number: int, target: float) -> Problem:
+def _hold_factor(problem: Problem, number: int, target: float) -> Problem:
     """The problem with factor `number` held at the value `target`."""
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.fit import Progress, Result, origin, search
+from shipid.identification.fit import Progress, Result, initial_point, search_factors
 from shipid.identification.inverse import inverse_dynamics
-from shipid.identification.residuals import Problem, build
+from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.segments import ShootingSegment
-from shipid.identification.settings import ENVIRONMENT, overrides
+from shipid.identification.settings import ENVIRONMENT, resolve_overrides
 
 Array = NDArray[np.float64]
 HORIZONS = (2.0, 5.0, 15.0, 60.0)  # s
@@ -27,7 +27,7 @@ ENOUGH = 20000  # steps of all predictions of a short horizon: more take time an
 ROUGH, MOST = 1e-3, 25  # tolerance and evaluations of a short horizon
 
 
-def grown(
+def grow_horizon(
     problem: Problem, dataset: Dataset, factors: Array, progress: Progress | None = None, before: int = 0
 ) -> tuple[Array, int, bool]:
     """Initial factors by fits over growing horizons, each shorter than the horizon of the fit.
@@ -42,7 +42,7 @@ def grown(
         steps = max(2, round(horizon / problem.settings.step))
         if steps * problem.settings.step >= longest:
             break
-        result = _at(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
+        result = _fit_at_horizon(problem, dataset, factors, steps * problem.settings.step, progress, iterations)
         if result is None or not np.isfinite(result.objective):
             continue
         factors, iterations = result.factors, result.iterations
@@ -51,21 +51,21 @@ def grown(
     return factors, iterations, False
 
 
-def _at(
+def _fit_at_horizon(
     problem: Problem, dataset: Dataset, factors: Array, horizon: float, progress: Progress | None, before: int
 ) -> Result | None:
     """Result of the fit with a shorter horizon [s]; None if the runs cannot be cut into such segments."""
     widths = {name: width for name, width in problem.settings.widths.items() if name != "initial_state"}
     settings = problem.settings.model_copy(update={"horizon": horizon, "nuisance": widths})
     try:
-        short = build(problem.vessel, dataset, problem.runs, settings)
+        short = build_problem(problem.vessel, dataset, problem.runs, settings)
     except DataError:
         return None
-    short = replace(short, unknown=problem.unknown, segments=_spread(short))
-    return search(short, factors, origin(short), progress, before=before, tolerance=ROUGH, most=MOST)
+    short = replace(short, unknown=problem.unknown, segments=_spread_segments(short))
+    return search_factors(short, factors, initial_point(short), progress, before=before, tolerance=ROUGH, most=MOST)
 
 
-def _spread(problem: Problem) -> tuple[ShootingSegment, ...]:
+def _spread_segments(problem: Problem) -> tuple[ShootingSegment, ...]:
     """A subset of the segments at equal distances, at least one of every run, with about `ENOUGH` steps in all."""
     steps = sum(segment.num_steps for segment in problem.segments)
     every = max(1, round(steps / ENOUGH))
@@ -76,7 +76,9 @@ def _spread(problem: Problem) -> tuple[ShootingSegment, ...]:
 def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
     """Initial factors (n,) by inverse dynamics, clipped to the bounds."""
     unknown = problem.unknown
-    given = overrides(problem.settings, problem.runs, problem.vessel, problem.layout.model.environment, dataset.runs)
+    given = resolve_overrides(
+        problem.settings, problem.runs, problem.vessel, problem.layout.model.environment, dataset.runs
+    )
     head = f"{ENVIRONMENT}."
     weather: Mapping[str, Mapping[str, float]] = {
         run: {key.removeprefix(head): value for key, value in values.items() if key.startswith(head)}

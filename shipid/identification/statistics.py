@@ -5,7 +5,7 @@ precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of 
 
     fisher    B = sum over signals of s^2 J_s^T R_s J_s    s^2 is the level of each signal as the residuals show it, not
               as declared; R_s, the correlation in time of a first-order process, is 1 where residuals are white. To be
-              trusted there. A run that is too short for `blocks` has this form, whatever its residuals are.
+              trusted there. A run that is too short for `block_clusters` has this form, whatever its residuals are.
     sandwich  B = sum over clusters of (J_g^T A_g e_g)(...)^T     anything within a cluster, independent clusters.
               A cluster is a run: process noise, model error and colour within it are allowed. A_g = (I - H_gg)^(-1)
               gives the estimates without that run (CR3, the jackknife): a run that decides much draws the estimates to
@@ -40,8 +40,8 @@ from scipy.special import chdtrc, chdtri, stdtrit
 
 from shipid.document import short_names
 from shipid.errors import ShipidError
-from shipid.identification.collinearity import Combination, combinations
-from shipid.identification.covariance import inverted
+from shipid.identification.collinearity import Combination, collinear_sets
+from shipid.identification.covariance import invert_information
 from shipid.units import join_names, significant_digits
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
 _Part = tuple[Array, Array, Array]  # of a cluster: singular values of J_g R, those of A_g J_g R, directions (k, n)
 KINDS: tuple[Kind, ...] = get_args(Kind)
-"""In order of preference: the first trusted form is reported; if none is, `blocks`, or `fisher` with one block only."""
+"""In order of preference: the first trusted form is reported; if none is, `block_clusters`, or `fisher_covariance` with one block only."""
 
 LEVEL = 0.95  # of intervals
 WIDEST = 1.0  # half-width of the 95 % interval of a factor, in base values, from which on it is not identified
@@ -197,7 +197,7 @@ class Statistics:
         return np.asarray(scaled.T @ scaled)
 
 
-def statistics(fit: LinearFit) -> Statistics:
+def fit_statistics(fit: LinearFit) -> Statistics:
     """Compute covariances, 95 % intervals and identifiability of a fit.
 
     A factor is identified if its 95 % interval from the data alone, without its prior, is within +-`WIDEST` base
@@ -207,21 +207,24 @@ def statistics(fit: LinearFit) -> Statistics:
     """
     free = _free_places(fit)
     if not len(free):
-        return _nothing(fit)
-    inner = _free(fit, free)
+        return _statistics_without_factors(fit)
+    inner = _restrict_fit(fit, free)
     basis = _Basis.of(inner)
-    colours = whiteness(inner, basis)
-    covariances = _covariances(inner, basis, colours)
+    colours = residual_whiteness(inner, basis)
+    covariances = _covariance_forms(inner, basis, colours)
     chosen: Kind = next(
-        (kind for kind in KINDS if kind in covariances and covariances[kind].trusted), _last(covariances)
+        (kind for kind in KINDS if kind in covariances and covariances[kind].trusted), _fallback_covariance(covariances)
     )
     best = covariances[chosen]
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
-    alone = _alone(inner, half)
-    together = combinations(inner.jacobian, inner.paths)
+    alone = _half_widths_without_priors(inner, half)
+    together = collinear_sets(inner.jacobian, inner.paths)
     n = len(fit.paths)
-    full = {name: _spread(values, free, n) for name, values in {"errors": errors, "half": half, "alone": alone}.items()}
+    full = {
+        name: _fill_infinite(values, free, n)
+        for name, values in {"errors": errors, "half": half, "alone": alone}.items()
+    }
     identifiable = np.zeros(n, dtype=bool)
     identifiable[free] = alone <= WIDEST
     correlations = np.eye(n)
@@ -238,26 +241,26 @@ def statistics(fit: LinearFit) -> Statistics:
         alone=full["alone"],
         correlations=correlations,
         identifiable=identifiable,
-        sentences=_sentences(fit, full["half"], full["alone"], identifiable, together),
+        sentences=_factor_sentences(fit, full["half"], full["alone"], identifiable, together),
         free=inner.paths,
         combinations=together,
         whiteness=colours,
     )
 
 
-def _last(covariances: Mapping[Kind, Covariance]) -> Kind:
-    """Form to report if none is trusted: `blocks`, but `fisher` for a single block, whose scores sum to 0."""
+def _fallback_covariance(covariances: Mapping[Kind, Covariance]) -> Kind:
+    """Form to report if none is trusted: `block_clusters`, but `fisher_covariance` for a single block, whose scores sum to 0."""
     blocks = covariances.get("blocks")
     return "blocks" if blocks is None or blocks.clusters > 1 else "fisher"
 
 
-def _nothing(fit: LinearFit) -> Statistics:
+def _statistics_without_factors(fit: LinearFit) -> Statistics:
     """Statistics of a fit without a free factor: infinite errors, nothing identified."""
     n = len(fit.paths)
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
     covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free")
-    sentences = _sentences(fit, wide, wide, fixed, ())
-    low, high, levels = fit.factors - wide, fit.factors + wide, whiteness(fit)
+    sentences = _factor_sentences(fit, wide, wide, fixed, ())
+    low, high, levels = fit.factors - wide, fit.factors + wide, residual_whiteness(fit)
     return Statistics(
         fit, {"fisher": covariance}, "fisher", wide, low, high, wide, np.eye(n), fixed, sentences, (), (), levels
     )
@@ -271,9 +274,9 @@ def _free_places(fit: LinearFit) -> Index:
     return np.flatnonzero(~fixed)
 
 
-def _free(fit: LinearFit, free: Index) -> LinearFit:
+def _restrict_fit(fit: LinearFit, free: Index) -> LinearFit:
     """The linearisation with only the columns `free`; all other factors are held."""
-    widths = _widths(fit)[free]
+    widths = _interval_half_widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
     return LinearFit(
         paths, fit.factors[free], fit.residuals, fit.jacobian[:, free], fit.clusters, fit.signals, widths, fit.spent,
@@ -281,11 +284,11 @@ def _free(fit: LinearFit, free: Index) -> LinearFit:
     )  # fmt: skip
 
 
-def _widths(fit: LinearFit) -> Array:
+def _interval_half_widths(fit: LinearFit) -> Array:
     return np.full(len(fit.paths), np.inf) if fit.prior_widths is None else np.asarray(fit.prior_widths, dtype=float)
 
 
-def _spread(values: Array, free: Index, count: int) -> Array:
+def _fill_infinite(values: Array, free: Index, count: int) -> Array:
     """Array (count,) with `values` at the indices `free` and infinity elsewhere."""
     full = np.full(count, np.inf)
     full[free] = values
@@ -309,13 +312,13 @@ class _Basis:
 
     @classmethod
     def of(cls, fit: LinearFit) -> _Basis:
-        prior = 1 / _widths(fit) ** 2
-        inverse, unseen = inverted(fit.jacobian.T @ fit.jacobian + np.diag(prior))
+        prior = 1 / _interval_half_widths(fit) ** 2
+        inverse, unseen = invert_information(fit.jacobian.T @ fit.jacobian + np.diag(prior))
         leverage = np.einsum("mi,ij,mj->m", fit.jacobian, inverse, fit.jacobian)
         return cls(inverse, prior, leverage, unseen, prior > 0)
 
 
-def whiteness(fit: LinearFit, basis: _Basis | None = None) -> dict[str, Whiteness]:
+def residual_whiteness(fit: LinearFit, basis: _Basis | None = None) -> dict[str, Whiteness]:
     """Autocorrelation and level of the residuals of each signal; basis : of the parameters; default: none is free."""
     taken = np.zeros(len(fit.residuals)) if basis is None else basis.leverage
     taken = taken + (0.0 if fit.spent is None else fit.spent)
@@ -326,13 +329,13 @@ def whiteness(fit: LinearFit, basis: _Basis | None = None) -> dict[str, Whitenes
         freedom = max(float(selected.sum() - taken[selected].sum()), 1.0)
         level = float(np.sqrt((fit.residuals[selected] ** 2).sum() / freedom))
         runs = [np.flatnonzero(selected & (fit.clusters == run)) for run in np.unique(fit.clusters[selected])]
-        drift = _drift(fit, runs, basis)
-        probability, memory = _colour([fit.residuals[run] for run in runs], drift)
+        drift = _signal_drift(fit, runs, basis)
+        probability, memory = _correlation_of_runs([fit.residuals[run] for run in runs], drift)
         result[name] = Whiteness(probability, memory, int(selected.sum()), level, freedom, drift.hidden)
     return result
 
 
-def _colour(runs: Sequence[Array], drift: _Drift) -> tuple[float, float]:
+def _correlation_of_runs(runs: Sequence[Array], drift: _Drift) -> tuple[float, float]:
     """Probability that residuals are white, and their integrated correlation time (samples).
 
     The probability is the smaller one of two tests, times two: Ljung-Box, the statistics of independent runs added, and
@@ -341,7 +344,7 @@ def _colour(runs: Sequence[Array], drift: _Drift) -> tuple[float, float]:
     """
     statistic, freedom = 0.0, 0
     for run in runs:
-        size, lagged = len(run), _lagged(run)
+        size, lagged = len(run), _autocovariance_sums(run)
         if size < LEAST_ROWS or lagged[0] == 0:
             continue
         lags = np.arange(1, min(MOST_LAGS, size // 5) + 1)
@@ -349,7 +352,7 @@ def _colour(runs: Sequence[Array], drift: _Drift) -> tuple[float, float]:
         freedom += len(lags)
     if freedom == 0:
         return 1.0, 1.0
-    rho = autocorrelation(runs)
+    rho = pooled_autocorrelation(runs)
     sums = rho[1:-1:2] + rho[2::2]
     until = int(np.argmax(sums <= 0)) if (sums <= 0).any() else len(sums)
     fast, memory = float(chdtrc(freedom, statistic)), float(max(1 + 2 * sums[:until].sum(), 1.0))
@@ -394,18 +397,18 @@ class _Drift:
         return float(chdtri(freedom, WHITE / 2) / freedom - 1) * self.expected / self.squares
 
 
-def _quarters(run: Index) -> list[Index]:
+def _run_quarters(run: Index) -> list[Index]:
     """Rows of each quarter of a run of one signal; none if it is too short."""
     return np.array_split(run, QUARTERS) if len(run) >= QUARTERS * LEAST_ROWS else []
 
 
-def _drift(fit: LinearFit, runs: Sequence[Index], basis: _Basis | None) -> _Drift:
+def _signal_drift(fit: LinearFit, runs: Sequence[Index], basis: _Basis | None) -> _Drift:
     """The means of one signal; runs : rows of each. So a small drift counts that no single correlation shows."""
     total, means = 0.0, []
     for run in runs:
         square = float(fit.residuals[run] @ fit.residuals[run])
         left = len(run) - (0.0 if basis is None else float(basis.leverage[run].sum()))
-        for part in _quarters(run) if square > 0 else []:
+        for part in _run_quarters(run) if square > 0 else []:
             total += float(fit.residuals[part].sum()) ** 2 / len(part) * max(left, 1.0) / square
             means.append(fit.jacobian[part].sum(axis=0) / len(part) ** 0.5)
     count = float(len(means))
@@ -416,12 +419,12 @@ def _drift(fit: LinearFit, runs: Sequence[Index], basis: _Basis | None) -> _Drif
     return _Drift(total, max(count - once, KEPT), max(count - 2 * once + twice, KEPT**2))
 
 
-def autocorrelation(runs: Sequence[Array]) -> Array:
+def pooled_autocorrelation(runs: Sequence[Array]) -> Array:
     """Autocorrelation (longest run,) of the residuals at lags 0, 1, ... samples, pooled over runs; 1 at lag 0."""
     longest = max(len(run) for run in runs)
     products, pairs = np.zeros(longest), np.zeros(longest)
     for run in runs:
-        size, lagged = len(run), _lagged(run)
+        size, lagged = len(run), _autocovariance_sums(run)
         if size >= LEAST_ROWS and lagged[0] > 0:
             products[:size] += lagged
             pairs[:size] += size - np.arange(size)
@@ -430,27 +433,27 @@ def autocorrelation(runs: Sequence[Array]) -> Array:
     return np.asarray(products / np.maximum(pairs, 1) / (products[0] / pairs[0]))
 
 
-def _lagged(run: Array) -> Array:
+def _autocovariance_sums(run: Array) -> Array:
     """Autocovariance sums (N,): sum over i of run[i] run[i + lag], for lags 0 to N - 1."""
     size = len(run)
     return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(run, 2 * size)) ** 2)[:size]) if run.any() else np.zeros(size)
 
 
-def _covariances(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
+def _covariance_forms(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[Kind, Covariance]:
     """The Fisher and sandwich forms, and the block form if neither is trusted."""
-    colours = _felt(fit, basis, colours)
-    result: dict[Kind, Covariance] = {"fisher": fisher(fit, basis, colours)}
-    result["sandwich"] = sandwich(fit, basis, fit.clusters, "sandwich", "runs")
+    colours = _effective_whiteness(fit, basis, colours)
+    result: dict[Kind, Covariance] = {"fisher": fisher_covariance(fit, basis, colours)}
+    result["sandwich"] = sandwich_covariance(fit, basis, fit.clusters, "sandwich", "runs")
     if not any(covariance.trusted for covariance in result.values()):
         length = BLOCK * max(colour.memory for colour in colours.values())
-        clusters, what = blocks(fit, length), f"stretches of {length:.0f} samples"
+        clusters, what = block_clusters(fit, length), f"stretches of {length:.0f} samples"
         if len(np.unique(clusters)) == len(np.unique(fit.clusters)):
             what = f"runs, too short to be cut into {what}"
-        result["blocks"] = sandwich(fit, basis, clusters, "blocks", what)
+        result["blocks"] = sandwich_covariance(fit, basis, clusters, "blocks", what)
     return result
 
 
-def _felt(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[str, Whiteness]:
+def _effective_whiteness(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> dict[str, Whiteness]:
     """Whiteness by signal; white where its correlation changes no standard error, as the yaw rate of straight runs."""
     labels, effect = np.array(fit.signals), (fit.jacobian @ basis.inverse) ** 2
     parts = {name: colour.level**2 * effect[labels == name].sum(axis=0) for name, colour in colours.items()}
@@ -463,7 +466,7 @@ def _felt(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> di
     }
 
 
-def fisher(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
+def fisher_covariance(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> Covariance:
     """Covariance for errors of each signal that have one level, and are correlated in time as its residuals are."""
     labels = np.array(fit.signals)
     parts, freedoms = [], []
@@ -477,7 +480,7 @@ def fisher(fit: LinearFit, basis: _Basis, colours: Mapping[str, Whiteness]) -> C
     coloured = [name for name, colour in colours.items() if not colour.white]
     reason = "residuals are white" if not coloured else f"residuals of {', '.join(coloured)} are correlated in time"
     reason += "; the errors count as a first-order process" * bool(coloured)
-    return Covariance("fisher", matrix, _freedom(total, np.asarray(squares)), not coloured, reason)
+    return Covariance("fisher", matrix, _satterthwaite_freedom(total, np.asarray(squares)), not coloured, reason)
 
 
 def _of_signal(fit: LinearFit, basis: _Basis, rows: NDArray[np.bool_], colour: Whiteness) -> tuple[Array, float]:
@@ -491,7 +494,7 @@ def _of_signal(fit: LinearFit, basis: _Basis, rows: NDArray[np.bool_], colour: W
     runs = [np.flatnonzero(fit.clusters[rows] == run) for run in np.unique(fit.clusters[rows])]
     smooth, power = jacobian.copy(), 0.0
     for run in runs if a else []:
-        smooth[run] = _correlated(jacobian[run], a)
+        smooth[run] = _apply_correlation(jacobian[run], a)
         power += float(len(run) + 2 * (a ** (2 * np.arange(1, len(run)))) @ np.arange(len(run) - 1, 0, -1))
     taken = basis.inverse @ (jacobian.T @ smooth)
     left = max(colour.freedom + float(np.sum(jacobian @ basis.inverse * jacobian) - np.trace(taken)), 1.0)
@@ -501,7 +504,7 @@ def _of_signal(fit: LinearFit, basis: _Basis, rows: NDArray[np.bool_], colour: W
     return level * (basis.inverse @ jacobian.T @ smooth @ basis.inverse), freedom
 
 
-def _correlated(values: Array, a: float) -> Array:
+def _apply_correlation(values: Array, a: float) -> Array:
     """R values (N, n) of the correlation R_ij = a^|i - j|, (N, n)."""
     size = len(values)
     row = a ** np.minimum(np.arange(2 * size), 2 * size - np.arange(2 * size))
@@ -511,7 +514,7 @@ def _correlated(values: Array, a: float) -> Array:
 
 def declared_error(fit: LinearFit, path: str) -> float:
     """Standard error of one factor for independent residuals with the declared standard deviations."""
-    inner = _free(fit, _free_places(fit))
+    inner = _restrict_fit(fit, _free_places(fit))
     inverse = _Basis.of(inner).inverse
     j = inner.paths.index(path)
     return float(np.sqrt(inverse[j, j]))
@@ -523,21 +526,21 @@ def against_priors(fit: LinearFit) -> dict[str, tuple[float, float, float]]:
     The fit without priors is one step of Gauss-Newton away. There a factor is farther from the centre of its prior than
     `CONTRARY` standard deviations of prior and data together.
     """
-    inner = _free(fit, _free_places(fit))
+    inner = _restrict_fit(fit, _free_places(fit))
     centre = np.ones(len(fit.paths)) if fit.centre is None else fit.centre
-    widths, centre = _widths(inner), centre[_free_places(fit)]
+    widths, centre = _interval_half_widths(inner), centre[_free_places(fit)]
     if not np.isfinite(widths).any():
         return {}
-    seen = statistics(_by_data_alone(inner))
+    seen = fit_statistics(_by_data_alone(inner))
     factors, half = seen.fit.factors, (seen.high - seen.low) / 2
     errors = half / stdtrit(np.inf, 0.5 + LEVEL / 2)
     far = np.abs(factors - centre) > CONTRARY * np.hypot(widths, errors)
     return {inner.paths[j]: (float(widths[j]), float(factors[j]), float(half[j])) for j in np.flatnonzero(far)}
 
 
-def decided_alone(fit: LinearFit) -> dict[str, str]:
+def factors_of_single_runs(fit: LinearFit) -> dict[str, str]:
     """Factors that one run of several decides alone: path -> name of the run. Others do not show their errors."""
-    inner, numbers = _free(fit, _free_places(fit)), np.unique(fit.clusters)
+    inner, numbers = _restrict_fit(fit, _free_places(fit)), np.unique(fit.clusters)
     if len(numbers) < 2 or not fit.runs:
         return {}
     inverse = _Basis.of(inner).inverse
@@ -553,26 +556,26 @@ def open_to_drift(judged: Statistics) -> dict[str, float]:
 
     The drift is the one that half of such fits overlook (`Whiteness.hidden`). For a fit with errors of the Fisher form.
     """
-    inner = _free(judged.fit, _free_places(judged.fit))
+    inner = _restrict_fit(judged.fit, _free_places(judged.fit))
     effect, labels = inner.jacobian @ _Basis.of(inner).inverse, np.array(inner.signals)
     added = np.zeros(len(inner.paths))
     for name, colour in judged.whiteness.items():
         runs = [np.flatnonzero((labels == name) & (inner.clusters == run)) for run in np.unique(inner.clusters)]
-        means = [effect[part].sum(axis=0) / len(part) ** 0.5 for run in runs for part in _quarters(run)]
+        means = [effect[part].sum(axis=0) / len(part) ** 0.5 for run in runs for part in _run_quarters(run)]
         added += colour.level**2 * colour.hidden * np.square(means).sum(axis=0)
     stated = judged.covariances["fisher"].errors ** 2
     times = np.sqrt(1 + added / np.where(stated > 0, stated, np.inf))
     return {path: float(times[j]) for j, path in enumerate(inner.paths) if times[j] > OPEN}
 
 
-def _freedom(total: Array, squares: Array) -> Array:
+def _satterthwaite_freedom(total: Array, squares: Array) -> Array:
     """Satterthwaite: total^2 / sum(part^2 / its freedom); infinite where a variance is known exactly."""
     return np.asarray(np.where(squares > 0, total**2 / np.where(squares > 0, squares, 1.0), 1e9))
 
 
-def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: str) -> Covariance:
+def sandwich_covariance(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: str) -> Covariance:
     """Cluster-robust covariance by the jackknife (CR3) with Satterthwaite's degrees of freedom."""
-    root, parts, scores = _root(basis.inverse), [], []
+    root, parts, scores = _matrix_root(basis.inverse), [], []
     for number in np.unique(clusters):
         rows = clusters == number
         # H_gg = left values^2 left^T
@@ -581,13 +584,13 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
         grown = np.where(rest > KEPT, values / np.maximum(rest, KEPT), 0.0)
         parts.append((values, grown, axes))
         scores.append((grown * (left.T @ fit.residuals[rows])) @ axes)  # root^T J_g^T A_g e_g
-    scale, alone = _scale(parts, np.array(scores))
+    scale, alone = _jackknife_scale(parts, np.array(scores))
     influences = np.array(scores) @ root.T * scale  # change of the estimate without each cluster
     spread_of_data = influences.T @ influences + root @ alone @ root.T
     of_prior = (basis.inverse * basis.prior) @ basis.inverse
     matrix = spread_of_data + of_prior
-    free = np.array([_satterthwaite(parts, row) for row in root])
-    freedom = np.maximum(_freedom(np.diag(matrix), np.diag(spread_of_data) ** 2 / free), 1.0)
+    free = np.array([_freedom_of_scores(parts, row) for row in root])
+    freedom = np.maximum(_satterthwaite_freedom(np.diag(matrix), np.diag(spread_of_data) ** 2 / free), 1.0)
     by_data = np.diag(spread_of_data) >= np.diag(of_prior)  # a prior has any number of degrees of freedom
     typical = float(np.median(freedom[by_data] if by_data.any() else freedom))
     trusted = bool(typical >= LEAST_FREEDOM)
@@ -597,7 +600,7 @@ def sandwich(fit: LinearFit, basis: _Basis, clusters: Index, kind: Kind, what: s
     return Covariance(kind, matrix, freedom, trusted, reason, len(parts))
 
 
-def _root(matrix: Array) -> Array:
+def _matrix_root(matrix: Array) -> Array:
     """R with R R^T = matrix, of a positive semidefinite matrix whose scales differ."""
     scale = np.sqrt(np.diag(matrix))
     scale = np.where(scale > 0, scale, 1.0)
@@ -605,7 +608,7 @@ def _root(matrix: Array) -> Array:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _scale(parts: Sequence[_Part], scores: Array) -> tuple[float, Array]:
+def _jackknife_scale(parts: Sequence[_Part], scores: Array) -> tuple[float, Array]:
     """What to multiply scores (clusters, n) by, and the covariance (n, n) along directions that one cluster decides.
 
     The sum of the squared scores of independent errors is compared with their variance in each principal direction. The
@@ -624,7 +627,7 @@ def _scale(parts: Sequence[_Part], scores: Array) -> tuple[float, Array]:
     return float(np.sqrt(np.median(true[several] / sizes[several]))), np.asarray(level * alone @ alone.T)
 
 
-def _satterthwaite(parts: Sequence[_Part], weights: Array) -> float:
+def _freedom_of_scores(parts: Sequence[_Part], weights: Array) -> float:
     """(tr B)^2 / tr(B^2) of a sum of squared scores along weights (n,), as a form B in independent errors.
 
     The scores are those without bias (CR2), A_g = (I - H_gg)^(-1/2): CR3 would count twice that runs are unequal.
@@ -639,7 +642,7 @@ def _satterthwaite(parts: Sequence[_Part], weights: Array) -> float:
     return float((diagonal.sum() - taken.sum()) ** 2 / squares) if squares > 0 else 1.0
 
 
-def blocks(fit: LinearFit, length: float) -> Index:
+def block_clusters(fit: LinearFit, length: float) -> Index:
     """Clusters (m,) of about `length` samples each: runs cut into equal stretches of the same times for all signals."""
     labels, result, count = np.array(fit.signals), np.zeros(len(fit.residuals), dtype=np.int64), 0
     for run in np.unique(fit.clusters):
@@ -655,37 +658,37 @@ def blocks(fit: LinearFit, length: float) -> Index:
 
 def _by_data_alone(fit: LinearFit) -> LinearFit:
     """The linearisation of the fit without priors, which is one step of Gauss-Newton away; every factor is free."""
-    step = -inverted(fit.jacobian.T @ fit.jacobian)[0] @ (fit.jacobian.T @ fit.residuals)
+    step = -invert_information(fit.jacobian.T @ fit.jacobian)[0] @ (fit.jacobian.T @ fit.residuals)
     left = fit.residuals + fit.jacobian @ step
     return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=None)
 
 
-def _alone(fit: LinearFit, half: Array) -> Array:
+def _half_widths_without_priors(fit: LinearFit, half: Array) -> Array:
     """Half-widths (n,) without priors; half : (n,) those with them. Every factor of the fit is free.
 
     The form of covariance is that of the fit without priors: where these decide, all forms agree with them, and none
     shows what correlated residuals would do to the data alone.
     """
-    if not np.isfinite(_widths(fit)).any():
+    if not np.isfinite(_interval_half_widths(fit)).any():
         return half
-    seen = statistics(_by_data_alone(fit))
+    seen = fit_statistics(_by_data_alone(fit))
     return np.asarray((seen.high - seen.low) / 2)
 
 
-def _shared(fit: LinearFit, free: Index) -> Array:
+def _width_inflation(fit: LinearFit, free: Index) -> Array:
     """How many times wider the interval of each factor (n,) is than if all others were known."""
     information, times = fit.jacobian[:, free].T @ fit.jacobian[:, free], np.ones(len(fit.paths))
     if len(free):
-        times[free] = np.sqrt(np.maximum(np.diag(inverted(information)[0]) * np.diag(information), 1.0))
+        times[free] = np.sqrt(np.maximum(np.diag(invert_information(information)[0]) * np.diag(information), 1.0))
     return times
 
 
-def _sentences(
+def _factor_sentences(
     fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], sets: Sequence[Combination]
 ) -> tuple[str, ...]:
     """One sentence for each factor: its interval, or the reason why it has none."""
     free, sentences = _free_places(fit), list[str]()
-    shared = _shared(fit, free)
+    shared = _width_inflation(fit, free)
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in sets if path in combination.paths), None)
         of_what = "its base value" if fit.centre is None or fit.centre[j] else "its scale"

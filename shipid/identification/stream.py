@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
-from shipid.identification.covariance import inverted
-from shipid.identification.residuals import CURRENT, build, predict
-from shipid.identification.settings import ENVIRONMENT, overrides_of
+from shipid.identification.covariance import invert_information
+from shipid.identification.residuals import CURRENT, build_problem, predict_residuals
+from shipid.identification.settings import ENVIRONMENT, run_overrides
 from shipid.identification.solve import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import percent_text, significant_digits
@@ -47,19 +47,19 @@ class Stream:
         return bool(np.sqrt(scatter) <= ALIKE * np.hypot(*mean))
 
 
-def streams(solution: Solution, dataset: Dataset) -> Stream | None:
+def estimate_currents(solution: Solution, dataset: Dataset) -> Stream | None:
     """The currents after one step of Gauss-Newton with the factors; None where they are known or cannot be computed."""
     if len(solution.runs) < LEAST_RUNS or "current" in solution.settings.widths or _is_set(solution):
         return None
-    slopes = _slopes(solution, dataset)
+    slopes = _current_slopes(solution, dataset)
     if slopes is None:
         return None
     of_run = solution.clusters[:, None] == np.arange(len(solution.runs))  # (m, R)
     added = (of_run[:, :, None] * slopes[:, None, :]).reshape(len(slopes), -1)
     signals = np.array(solution.signals)
     steady = np.stack([np.where(signals == name, 1.0, 0.0) for name in ("u", "v")], axis=1)
-    step, left = _step(solution, added)
-    before = _step(solution, steady)[1]
+    step, left = _gauss_newton_step(solution, added)
+    before = _gauss_newton_step(solution, steady)[1]
     return Stream(step.reshape(-1, 2), 1 - left / before if before > 0 else 0.0)
 
 
@@ -71,7 +71,7 @@ def current_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
     slow = (one.memory * len(solution.runs) / one.samples >= LONG for one in judged.whiteness.values() if not one.white)
     if not any(slow):
         return ""
-    seen = streams(solution, dataset)
+    seen = estimate_currents(solution, dataset)
     if seen is None or seen.explained < EXPLAINED:
         return ""
     which = "a current, about the same in all runs" if seen.same else "another current in each run"
@@ -85,27 +85,27 @@ def current_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
 
 def _is_set(solution: Solution) -> bool:
     """Whether the settings have the current of a run; no log has one."""
-    given = overrides_of(solution.settings, solution.runs)
+    given = run_overrides(solution.settings, solution.runs)
     return any(key.endswith(f".{ENVIRONMENT}.{name}") for key in given for name in CURRENT)
 
 
-def _slopes(solution: Solution, dataset: Dataset) -> Array | None:
+def _current_slopes(solution: Solution, dataset: Dataset) -> Array | None:
     """(m, 2) d residual / d current of its run, to north and to east [s/m]; None where a prediction diverges."""
     vessel, point = solution.vessel, solution.point
     if "current" not in vessel.document:
         vessel = vessel.with_values({"current.kind": "uniform"})
-    before = build(solution.vessel, dataset, solution.runs, solution.settings).model.node
+    before = build_problem(solution.vessel, dataset, solution.runs, solution.settings).model.node
     residuals = []
     for V_c, beta_c in ((0.0, 0.0), (TRIAL, 0.0), (TRIAL, np.pi / 2)):
-        runs = overrides_of(solution.settings, solution.runs)
+        runs = run_overrides(solution.settings, solution.runs)
         for name, value in zip(CURRENT, (V_c, beta_c), strict=True):
             runs |= {f"{run}.{ENVIRONMENT}.{name}": value for run in solution.runs}
-        problem = build(vessel, dataset, solution.runs, solution.settings.model_copy(update={"runs": runs}))
+        problem = build_problem(vessel, dataset, solution.runs, solution.settings.model_copy(update={"runs": runs}))
         away = point.away
         if away.size:  # in a current the heading counts, too
             away = np.zeros((len(away), len(problem.model.node)))
             away[:, [problem.model.node.index(name) for name in before]] = point.away
-        residuals.append(predict(problem, solution.factors, point.nuisances, away))
+        residuals.append(predict_residuals(problem, solution.factors, point.nuisances, away))
     here, *there = residuals
     changes = np.stack([one.r - here.r for one in there], axis=1) / TRIAL
     if not np.isfinite(changes).all():
@@ -114,12 +114,12 @@ def _slopes(solution: Solution, dataset: Dataset) -> Array | None:
     return np.asarray(with_changes.marginal(solution.settings.linear_from, solution.within)[1][:, -2:])
 
 
-def _step(solution: Solution, added: Array) -> tuple[Array, float]:
+def _gauss_newton_step(solution: Solution, added: Array) -> tuple[Array, float]:
     """One step of Gauss-Newton in further unknowns (m, k) beside the factors: (k,), and the squares that it leaves."""
     free = ~(solution.held | solution.at_bound)
     J = np.hstack([solution.jacobian[:, free], added])
     prior = np.append(solution.prior_widths[free], np.full(added.shape[1], np.inf))
-    inverse = inverted(J.T @ J + np.diag(prior**-2.0))[0]
+    inverse = invert_information(J.T @ J + np.diag(prior**-2.0))[0]
     step = -inverse[:, -added.shape[1] :] @ (added.T @ solution.residuals)  # the factors are at their optimum
     left = solution.residuals + J @ step
     return step[-added.shape[1] :], float(left @ left)

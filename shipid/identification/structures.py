@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from shipid import document as documents
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
-from shipid.identification.inverse import equations
-from shipid.identification.settings import Identify, dimensions_of, without_zeros
+from shipid.identification.inverse import force_equations
+from shipid.identification.settings import Identify, measured_constants, without_zeros
 from shipid.physics.signals import is_steering
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
@@ -49,11 +49,11 @@ class Structure:
     rudder: tuple[str, ...] = ()
 
 
-def _named(block: str, *names: str) -> tuple[str, ...]:
+def _coefficient_names(block: str, *names: str) -> tuple[str, ...]:
     return tuple(f"hull.{block}.{name}" for name in names)
 
 
-def _both(*monomials: str) -> tuple[str, ...]:
+def _two_sided_names(*monomials: str) -> tuple[str, ...]:
     return tuple(f"{axis}_{monomial}" for axis in "YN" for monomial in monomials)
 
 
@@ -62,24 +62,30 @@ _STEERING = ("delta", "udelta", "deltadeltadelta", "vvdelta", "vdeltadelta", "rr
 STRUCTURES: dict[str, Structure] = {
     "mmg": Structure(
         "third order in v / U and r L / U (MMG)",
-        _named("mmg", "R_0", *_ALONG, "X_vvvv", *_both("u", "v", "r", "vvv", "vvr", "vrr", "rrr")),
+        _coefficient_names(
+            "mmg", "R_0", *_ALONG, "X_vvvv", *_two_sided_names("u", "v", "r", "vvv", "vvr", "vrr", "rrr")
+        ),
     ),
     "modulus": Structure(
         "second order with moduli in v / U and r L / U",
-        _named("mmg", "R_0", *_ALONG, *_both("u", "v", "r", "|v|v", "|v|r", "|r|v", "|r|r")),
+        _coefficient_names("mmg", "R_0", *_ALONG, *_two_sided_names("u", "v", "r", "|v|v", "|v|r", "|r|v", "|r|r")),
     ),
     "cubic": Structure(
         "third order in v and r, whatever the speed",
-        _named("derivatives", "X_u|u|", *_ALONG, *_both("uu", "uv", "ur", "vvv", "vvr", "vrr", "rrr")),
+        _coefficient_names(
+            "derivatives", "X_u|u|", *_ALONG, *_two_sided_names("uu", "uv", "ur", "vvv", "vvr", "vrr", "rrr")
+        ),
     ),
     "abkowitz": Structure(
         "third order about the service speed, with rudder derivatives (Abkowitz)",
         (
             "hull.resistance.R_0",
-            *_named("abkowitz", *_ALONG, *_both("v", "uv", "r", "ur", "vvv", "vvr", "vrr", "rrr")),
-            *_named("derivatives", *_both("uu")),
+            *_coefficient_names(
+                "abkowitz", *_ALONG, *_two_sided_names("v", "uv", "r", "ur", "vvv", "vvr", "vrr", "rrr")
+            ),
+            *_coefficient_names("derivatives", *_two_sided_names("uu")),
         ),
-        ("X_deltadelta", "X_vdelta", "X_rdelta", *_both(*_STEERING)),
+        ("X_deltadelta", "X_vdelta", "X_rdelta", *_two_sided_names(*_STEERING)),
     ),
 }
 """Name -> structure. Each also has a side force and a moment of straight running, which a single screw makes."""
@@ -113,7 +119,9 @@ def check_structures(names: Sequence[str]) -> None:
             raise ShipidError(f"{name!r} is named twice", path="structures")
 
 
-def exchange(vessel: Vessel, name: str, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Exchanged:
+def exchange_structure(
+    vessel: Vessel, name: str, dataset: Dataset, runs: Sequence[str], settings: Identify
+) -> Exchanged:
     """Exchange the hull of a vessel for that of a structure, with starting values that make the same forces.
 
     Parameters
@@ -131,19 +139,19 @@ def exchange(vessel: Vessel, name: str, dataset: Dataset, runs: Sequence[str], s
     if name == PRESENT:
         return Exchanged(vessel, settings, dict.fromkeys(AXES, 0.0))
     structure = STRUCTURES[name]
-    rudders = _rudders(vessel) if structure.rudder else {}
+    rudders = _rudders_behind_propellers(vessel) if structure.rudder else {}
     paths = [*structure.hull, *(f"{rudder}.{term}" for rudder in rudders for term in structure.rudder)]
-    states = _states(vessel, dataset, runs)
-    bare = _bare(vessel, structure, rudders, paths, float(np.median(states["u"])))
-    c, sizes, misfit = _fitted(vessel, bare, paths, states)
+    states = _sample_states(vessel, dataset, runs)
+    bare = _vessel_without_coefficients(vessel, structure, rudders, paths, float(np.median(states["u"])))
+    c, sizes, misfit = _fit_coefficients(vessel, bare, paths, states)
     begun = np.where(np.abs(c) < TINY * sizes, 0.0, c)
     positive = np.array([path.endswith("hull.mmg.R_0") for path in paths])
     begun = np.where(positive, np.maximum(c, LEAST * sizes), begun)
     result = bare.with_values(dict(zip(paths, begun.tolist(), strict=True)))
-    return Exchanged(result, _settings(vessel, result, settings, rudders, paths, begun, sizes), misfit)
+    return Exchanged(result, _settings_of_exchange(vessel, result, settings, rudders, paths, begun, sizes), misfit)
 
 
-def _rudders(vessel: Vessel) -> dict[str, Mapping[str, Any]]:
+def _rudders_behind_propellers(vessel: Vessel) -> dict[str, Mapping[str, Any]]:
     """Dotted path -> block of every rudder behind a propeller."""
     return {
         f"thruster.{name}": block
@@ -152,14 +160,18 @@ def _rudders(vessel: Vessel) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def _bare(
+def _vessel_without_coefficients(
     vessel: Vessel, structure: Structure, rudders: Mapping[str, Mapping[str, Any]], paths: Sequence[str], speed: float
 ) -> Vessel:
     """The vessel with the blocks of the structure, every coefficient about nothing."""
     document = dict(vessel.document)
     blocks = {path.split(".")[1] for path in structure.hull}
     hull = {key: block for key, block in document.get("hull", {}).items() if key not in REPLACED}
-    hull |= {key: _left(block) for key, block in document.get("hull", {}).items() if _stays(key, block, blocks)}
+    hull |= {
+        key: _strip_coefficients(block)
+        for key, block in document.get("hull", {}).items()
+        if _keeps_number(key, block, blocks)
+    }
     if "resistance" in hull:
         hull["resistance"] = {**hull["resistance"], "R_0": 0.0}
     document["hull"] = hull
@@ -179,20 +191,20 @@ def _bare(
     return check_document(documents.replace_values(document, small), vessel.file)
 
 
-def _stays(key: str, block: Mapping[str, Any], blocks: Collection[str]) -> bool:
+def _keeps_number(key: str, block: Mapping[str, Any], blocks: Collection[str]) -> bool:
     """Whether a block that a structure replaces has a number that stays; blocks : those of the structure."""
     heeling = any(name[:2] in COEFFICIENTS and not PLANAR.fullmatch(name) for name in block)
     replaced = key in REPLACED and key != "crossflow" and not block.get("off", False)
     return replaced and (key in blocks or heeling)
 
 
-def _left(block: Mapping[str, Any]) -> dict[str, Any]:
+def _strip_coefficients(block: Mapping[str, Any]) -> dict[str, Any]:
     """A block without the coefficients that a structure replaces: those of heave, roll, pitch and heel, constants."""
     kept = {name: value for name, value in block.items() if not isinstance(value, str) and not PLANAR.fullmatch(name)}
     return {**kept, "R_0": NOTHING} if "R_0" in kept else kept
 
 
-def _states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, Array]:
+def _sample_states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, Array]:
     """u, v, r and commands (N,): rows of the runs, and as many drawn from ranges; those of v, r and helm are wider."""
     names = ("u", "v", "r", *vessel_dynamics(vessel).commands)
     missing = next((name for name in names if name not in dataset.frame), None)
@@ -213,7 +225,7 @@ def _states(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, 
     return result
 
 
-def _forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], zero: bool) -> tuple[Array, Array]:
+def _hull_forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], zero: bool) -> tuple[Array, Array]:
     """Surge, sway and yaw force (3, N) [N, N m] at rest of everything else, and its derivatives (3, N, n) to `free`.
 
     zero : with 0 for all of `free`.
@@ -221,7 +233,7 @@ def _forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], ze
     model, count = vessel_dynamics(vessel), len(states["u"])
     names = list(vessel.parameters)
     values = np.array([0.0 if zero and name in free else value for name, value in vessel.parameters.items()])
-    function = equations(model, tuple(names.index(path) for path in free))
+    function = force_equations(model, tuple(names.index(path) for path in free))
     still = np.zeros(count)
     inputs = [
         np.array([states.get(name, still) for name in group]).reshape(len(group), count)
@@ -234,12 +246,12 @@ def _forces(vessel: Vessel, states: Mapping[str, Array], free: Sequence[str], ze
     return np.array(force)[rows], by_free[rows]
 
 
-def _fitted(
+def _fit_coefficients(
     vessel: Vessel, bare: Vessel, paths: Sequence[str], states: Mapping[str, Array]
 ) -> tuple[Array, Array, dict[str, float]]:
     """Coefficients (n,) that make the forces of the vessel, the size (n,) of each that alone makes all, and misfits."""
-    wanted, _ = _forces(vessel, states, (), False)
-    without, slopes = _forces(bare, states, paths, True)
+    wanted, _ = _hull_forces(vessel, states, (), False)
+    without, slopes = _hull_forces(bare, states, paths, True)
     target = wanted - without
     level = np.maximum(np.sqrt((target**2).mean(axis=1)), 1e-12)
     weight = np.where(np.arange(target.shape[1]) < target.shape[1] - SAMPLES, 1.0, DRAWN) / level[:, None]
@@ -254,7 +266,7 @@ def _fitted(
     return c, sizes, dict(zip(AXES, left.tolist(), strict=True))
 
 
-def _settings(
+def _settings_of_exchange(
     vessel: Vessel,
     result: Vessel,
     settings: Identify,
@@ -276,7 +288,7 @@ def _settings(
         ]  # fmt: skip
 
     asked = kept(settings.parameters)
-    fixed = {*kept(settings.fixed), *dimensions_of(asked, settings)}
+    fixed = {*kept(settings.fixed), *measured_constants(asked, settings)}
     free = [path for path in asked if path not in fixed]
 
     def translated(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,17 +21,17 @@ SHORTER = 3.0  # correlation times of the residuals of whole runs, that a predic
 SLOWEST = 0.01  # m/s: a ship at rest is taken for one of this speed
 
 
-def growth_in(dataset: Dataset, runs: Sequence[str], vessel: Vessel) -> float:
+def yaw_growth_rate(dataset: Dataset, runs: Sequence[str], vessel: Vessel) -> float:
     """Growth rate [1/s] of a small yaw at the median speed and orders of runs, see `shipid.vessel.stability`."""
     rows = dataset.frame[dataset.frame["run"].isin(runs)]
     speed = max(float(np.median(np.hypot(rows["u"], rows["v"]))), SLOWEST)
     return yaw_growth(vessel, speed, {name: float(rows[name].median()) for name in vessel_dynamics(vessel).commands})
 
 
-def grows(rate: float, longest: float, memory: float) -> str:
+def growth_warning(rate: float, longest: float, memory: float) -> str:
     """A sentence where predictions of the `longest` run [s] let random forces grow; empty where they do not.
 
-    rate : [1/s] as of `growth_in`. memory : correlation time of the residuals [s].
+    rate : [1/s] as of `yaw_growth_rate`. memory : correlation time of the residuals [s].
     """
     if rate * longest < GROWN or SHORTER * memory >= longest:
         return ""

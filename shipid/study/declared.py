@@ -11,7 +11,7 @@ from shipid import document as documents
 from shipid.errors import DocumentError, suggest_name
 from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
-from shipid.identification.settings import Identify, unknowns
+from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, bank
 from shipid.study.schema import ROLES, Study, separate_family
 from shipid.vessel.load import Vessel, load_vessel
@@ -164,7 +164,7 @@ def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Pa
     default = {"horizon": ahead.ahead, "step": ahead.step, "method": ahead.integrator}
     settings: Identify = documents.parse_model(Identify, default | (family.identify or {}), file, prefix)
     try:
-        unknowns(vessel, settings)
+        free_factors(vessel, settings)
     except DocumentError as error:
         where = (error.path or "identify").replace("identify", prefix, 1)
         raise DocumentError(error.message, file=file, path=where) from None

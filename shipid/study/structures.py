@@ -24,23 +24,23 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
-from shipid.identification.bands import Measure, bands, check_level, refusal
-from shipid.identification.free_run import ALL, FreeRuns, check_length, free_runs
+from shipid.identification.bands import Measure, band_refusal, check_level, measure_bands
+from shipid.identification.free_run import ALL, FreeRuns, check_length, simulate_free_runs
 from shipid.identification.outcome import (
     ERRORS_OF,
     TRIED,
     pick_runs,
     residual_spacing,
     unmeasured,
-    unrecorded,
+    unrecorded_time_warning,
     without_shared,
 )
-from shipid.identification.reach import Reach, beyond, of_log, reach_of
+from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import Identify
-from shipid.identification.sides import by_group, uneven
+from shipid.identification.sides import by_group, uneven_side_warnings
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LEVEL, LinearFit, Statistics, statistics
-from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange
+from shipid.identification.statistics import LEVEL, LinearFit, Statistics, fit_statistics
+from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import MeasuredManoeuvre, measure_all
 from shipid.study.new import proposed_horizon
@@ -175,7 +175,7 @@ def compare_structures(
 
     Parameters
     ----------
-    settings : numbers outside of the hull that are free, weights, horizon and solver; see `exchange`.
+    settings : numbers outside of the hull that are free, weights, horizon and solver; see `exchange_structure`.
     names : of `shipid.identification.structures.STRUCTURES`, or `present`.
     runs, held_out : names or patterns, as `pick_runs` takes them; runs held out choose nothing.
     ahead : length of the free runs [s], 0 for whole runs; default: the horizon that a new study would have.
@@ -221,7 +221,7 @@ def compare_structures(
     chosen = str(table["structure"].iloc[0])
     equal = [str(name) for name in table.loc[table["equal"], "structure"]]
     report("standard manoeuvres")
-    reach = reach_of(vessel, dataset, fitted)
+    reach = data_reach(vessel, dataset, fitted)
     manoeuvres, far = _manoeuvre_table(fits, chosen, reach, equal, level)
     groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
     return StructureComparison(
@@ -229,7 +229,11 @@ def compare_structures(
         runs=fitted,
         test=tested,
         digest=digest,
-        shared=(*shared, *unmeasured(vessel, dataset, fitted, settings), *unrecorded(dataset, fitted, settings)),
+        shared=(
+            *shared,
+            *unmeasured(vessel, dataset, fitted, settings),
+            *unrecorded_time_warning(dataset, fitted, settings),
+        ),
         ahead=length,
         level=level,
         errors=every,
@@ -240,7 +244,7 @@ def compare_structures(
         spread=_spread_of_measures(manoeuvres, equal),
         beyond=far,
         groups=groups,
-        uneven=uneven(groups),
+        uneven=uneven_side_warnings(groups),
     )
 
 
@@ -294,7 +298,7 @@ def _errors_and_fit(
         """A fit to some runs; the others decide nothing in it, neither its start nor its priors."""
         report(f"{name}: {len(runs)} of {len(fitted)} runs")
         seen, runs, _ = without_shared(dataset, runs, others)
-        other = exchange(vessel, name, seen, runs, settings)
+        other = exchange_structure(vessel, name, seen, runs, settings)
         solution = identify(other.vessel, seen, runs, other.settings)
         if solution.status != "ok":
             raise ShipidError(solution.sentence)
@@ -304,15 +308,15 @@ def _errors_and_fit(
     frames, series = [], []
     for part in parts:
         rest = [run for run in fitted if run not in part]
-        replayed = free_runs({name: fit(rest, part)[0]}, dataset, part, settings, ahead)
+        replayed = simulate_free_runs({name: fit(rest, part)[0]}, dataset, part, settings, ahead)
         frames.append(replayed.errors[replayed.errors["run"] != ALL])
         series.append(replayed.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
     if tested:
-        test: FreeRuns = free_runs({name: whole}, dataset, tested, settings, ahead)
+        test: FreeRuns = simulate_free_runs({name: whole}, dataset, tested, settings, ahead)
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
-    judged = statistics(LinearFit.of(solution))
-    caution = refusal(solution, judged, residual_spacing(solution))
+    judged = fit_statistics(LinearFit.of(solution))
+    caution = band_refusal(solution, judged, residual_spacing(solution))
     return errors, FittedStructure(whole, solution, judged, caution), pd.concat(series, ignore_index=True)
 
 
@@ -412,7 +416,7 @@ def _manoeuvre_table(
             continue
         units = {row["measure"]: row["unit"] for one in done.values() for row in one.measures}
         if name == chosen:
-            far += [beyond(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
+            far += [extrapolation_sentence(title, of_log(fit.vessel, one.frame), reach) for title, one in done.items()]
         if level is None or name not in equal:
             frames: list[Any] = [
                 {"manoeuvre": title, "measure": measure, "value": value}
@@ -422,7 +426,9 @@ def _manoeuvre_table(
         else:
             known = {fit.vessel.digest: done}
             measures = [(title, _measures_of_trial(title, known)) for title in done]
-            frames = bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level).to_dict("records")
+            frames = measure_bands(fit.solution.vessel, fit.solution, fit.statistics, measures, level).to_dict(
+                "records"
+            )
         missing = {"measure": "", "structure": name, "note": "diverges"}
         rows += [{"manoeuvre": title, **missing} for title in TRIAL_TITLES if title not in done]
         rows += [{"note": "", **row, "structure": name, "unit": units.get(row["measure"], "")} for row in frames]

@@ -25,12 +25,12 @@ from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.method import Case, Corrector, Method, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.identification.bands import bands as of_manoeuvres
-from shipid.identification.bands import refusal
-from shipid.identification.outcome import COMPARED, _measured
+from shipid.identification.bands import band_refusal
+from shipid.identification.bands import measure_bands as of_manoeuvres
+from shipid.identification.outcome import COMPARED, _measure_manoeuvre
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, statistics
+from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.metrics import coverage_by_run, coverage_share
 from shipid.predictor import limits_of
 from shipid.study.plan import Batch, model_label, read_plan, whole_unit
@@ -311,8 +311,8 @@ def identified_figures(replicates: int = 30) -> dict[str, Any]:
             settings = Identify(parameters=paths, weights=coverage.NOISE, horizon=horizon,
                                 nuisance=["initial_state"], start="base")  # fmt: skip
             solution = identify(ship, data, data.runs, settings)
-            judged = statistics(LinearFit.of(solution))
-            if refusal(solution, judged, 1.0):
+            judged = fit_statistics(LinearFit.of(solution))
+            if band_refusal(solution, judged, 1.0):
                 refused += 1
                 continue
             rows = of_manoeuvres(ship, solution, judged, [("all", measure)], 0.9)
@@ -330,7 +330,7 @@ def _slopes(ship: Vessel, paths: Sequence[str]) -> tuple[dict[str, Array], dict[
     def measure(one: Vessel) -> dict[str, float]:
         slopes = {}
         for kind, angles in (("zigzag", (20, 20)), ("turning", (35,))):
-            rows = _measured(one, kind, angles)
+            rows = _measure_manoeuvre(one, kind, angles)
             slopes |= {name: float(rows[name]["value"]) for name in COMPARED[kind]}
         return slopes
 

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shipid.data.dataset import Dataset, write_dataset
-from shipid.identification.residuals import Problem, build
+from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.vessel.dynamics import vessel_dynamics
@@ -45,7 +45,7 @@ def run() -> dict[str, Any]:
         _noisy(vessel, RUNS),
         Identify(parameters=["hull.derivatives.*"], weights=NOISE, horizon=0, start="base"),
     )
-    fit = build(vessel, data, data.runs, settings)
+    fit = build_problem(vessel, data, data.runs, settings)
     begin = 1 + 0.2 * np.sin(np.arange(fit.num_factors))
     start = dict(zip(fit.unknown.paths, begin.tolist(), strict=True))
     first = clock(lambda: identify(vessel, data, data.runs, settings, start=start))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.antenna import antenna, antenna_fit
-from shipid.identification.antenna import turned as turned_share
+from shipid.identification.antenna import antenna_fit, locate_antenna
+from shipid.identification.antenna import heading_share as turned_share
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, statistics
+from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import RANGES, changed, trials
 
@@ -46,7 +46,7 @@ def fitted(log: Dataset, vessel: Vessel = SHIP, **more: object) -> Solution:
 
 
 def sentence(solution: Solution, log: Dataset) -> str:
-    return antenna_fit(solution, log, statistics(LinearFit.of(solution)))
+    return antenna_fit(solution, log, fit_statistics(LinearFit.of(solution)))
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_an_antenna_away_from_the_origin_is_named_with_its_place(x: float, y: fl
     """Before, the estimates were far outside of their intervals, and no sentence gave the reason."""
     log = log_of(1, x, y)
     solution = fitted(log)
-    seen = antenna(solution, log)
+    seen = locate_antenna(solution, log)
     assert seen is not None
     assert (seen.x / LENGTH, seen.y / LENGTH) == pytest.approx((x, y), abs=0.02)
     said = sentence(solution, log)
@@ -78,7 +78,7 @@ def test_sound_logs_and_those_whose_antenna_is_estimated_are_not_blamed(seed: in
     ahead = log_of(seed, 0.3)
     mended = fitted(ahead, nuisance={"lever_arm": 0.3 * LENGTH})
     assert np.abs(mended.factors - 1).max() < 0.1
-    assert antenna(mended, ahead) is None
+    assert locate_antenna(mended, ahead) is None
     assert sentence(mended, ahead) == ""
 
 
@@ -87,7 +87,7 @@ def test_huber_moves_no_antenna(x: float, times: float) -> None:
     """It drew the antenna to the trial point at 0.1 lengths, for only residuals within the threshold moved."""
     log = log_of(3, x)
     weights = {name: times * deviation for name, deviation in NOISE.items()}
-    seen = antenna(fitted(log, loss="huber", weights=weights), log)
+    seen = locate_antenna(fitted(log, loss="huber", weights=weights), log)
     assert seen is not None
     assert seen.x / LENGTH == pytest.approx(x, abs=0.02)
     assert seen.shown == (x > 0)
@@ -97,7 +97,7 @@ def test_a_ship_that_never_turns_shows_no_antenna() -> None:
     log = log_of(1, 0.3)
     straight = changed(log, r=np.zeros(len(log.frame)))
     solution = fitted(straight)
-    seen = antenna(solution, straight)
+    seen = locate_antenna(solution, straight)
     assert seen is None or not seen.shown
     assert sentence(solution, straight) == ""
 
@@ -108,7 +108,7 @@ def test_priors_that_pull_the_estimates_do_not_hide_or_make_an_antenna() -> None
     for x in (0.0, 0.3):
         log = log_of(1, x)
         solution = fitted(log, off, prior=dict.fromkeys(FEW, 0.02))
-        seen = antenna(solution, log)
+        seen = locate_antenna(solution, log)
         assert seen is not None
         assert (seen.x / LENGTH, seen.y / LENGTH) == pytest.approx((x, 0), abs=0.05)
         assert bool(sentence(solution, log)) == bool(x)
@@ -131,7 +131,7 @@ def test_a_heading_that_is_off_is_not_taken_for_an_antenna(
     log = changed(sound, psi=(rows["psi"] + b).to_numpy(), **measured)
     free = [f"hull.prime_derivatives.{name}" for name in ("N_r", "N_v", "Y_v")]
     solution = fitted(log, ship, parameters=free, weights=noise, horizon=75, step=3.0)
-    seen = antenna(solution, log)
+    seen = locate_antenna(solution, log)
     assert seen is not None
     assert seen.shown
     assert bool(sentence(solution, log)) == named

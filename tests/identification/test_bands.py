@@ -10,11 +10,11 @@ import pytest
 from scipy import stats
 
 from shipid.errors import DataError, ShipidError
-from shipid.identification.bands import bands, principal, refusal, short_horizon
+from shipid.identification.bands import band_refusal, measure_bands, principal_axes, short_horizon
 from shipid.identification.outcome import run_identification
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.test_outcome import FEW, NOISE, noisy
 from tests.identification.trials import trials
@@ -37,7 +37,7 @@ def linear(vessel: Vessel) -> Mapping[str, float]:
 def judged(seed: int) -> tuple[Solution, Statistics]:
     data = noisy(trials(SHIP, runs=5, steps=40), seed)
     solution = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
-    return solution, statistics(LinearFit.of(solution))
+    return solution, fit_statistics(LinearFit.of(solution))
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def fitted() -> tuple[Solution, Statistics]:
 
 def test_of_a_linear_measure_it_is_the_propagated_covariance(fitted: tuple[Solution, Statistics]) -> None:
     solution, known = fitted
-    rows = bands(SHIP, solution, known, [("all", linear)], 0.8).set_index("measure")
+    rows = measure_bands(SHIP, solution, known, [("all", linear)], 0.8).set_index("measure")
     best = known.covariances[known.chosen]
     slopes = SLOPES[[FEW.index(path) for path in solution.paths]]
     deviation = np.sqrt(slopes @ best.matrix @ slopes)
@@ -55,7 +55,7 @@ def test_of_a_linear_measure_it_is_the_propagated_covariance(fitted: tuple[Solut
     assert rows["deviation"]["one"] == pytest.approx(deviation, rel=1e-3)
     assert (rows["high"]["one"] - rows["low"]["one"]) / 2 == pytest.approx(half, rel=1e-3)
     assert rows["high"]["other"] - rows["low"]["other"] == pytest.approx(2000 * half, rel=1e-3)
-    wider = bands(SHIP, solution, known, [("all", linear)], 0.95).set_index("measure")
+    wider = measure_bands(SHIP, solution, known, [("all", linear)], 0.95).set_index("measure")
     assert (wider["low"] < rows["low"]).all()
     assert (wider["high"] > rows["high"]).all()
 
@@ -67,7 +67,7 @@ def test_of_a_bent_measure_it_has_the_moments_of_a_normal_error(
     """2 z + b z^2 of a standard normal z has the mean b and the variance 4 + 2 b^2: the band moves to one side."""
     solution, known = fitted
     best = known.covariances[known.chosen]
-    axis = principal(best.matrix)[:, 0]
+    axis = principal_axes(best.matrix)[:, 0]
     base = np.array([SHIP.parameters[path] for path in solution.paths])
 
     def bent(vessel: Vessel) -> Mapping[str, float]:
@@ -75,7 +75,7 @@ def test_of_a_bent_measure_it_has_the_moments_of_a_normal_error(
         z = float(axis @ (factors - solution.factors)) / float(axis @ axis)
         return {"bent": 2 * z + bend * z**2}
 
-    row = bands(SHIP, solution, known, [("one", bent)], 0.8).iloc[0]
+    row = measure_bands(SHIP, solution, known, [("one", bent)], 0.8).iloc[0]
     half = np.sqrt(4.5) * stats.t.ppf(0.9, np.median(best.freedom))
     assert row["deviation"] == pytest.approx(np.sqrt(4.5), rel=1e-6)
     assert (row["low"], row["high"]) == pytest.approx((-half + min(bend, 0), half + max(bend, 0)), rel=1e-6)
@@ -84,23 +84,23 @@ def test_of_a_bent_measure_it_has_the_moments_of_a_normal_error(
 def test_bands_hold_the_truth_of_simulated_trials() -> None:
     truth, held = linear(SHIP)["one"], []
     for seed in range(12):
-        rows = bands(SHIP, *judged(seed), [("all", linear)], 0.8)
+        rows = measure_bands(SHIP, *judged(seed), [("all", linear)], 0.8)
         held.append(float(rows["low"][0]) <= truth <= float(rows["high"][0]))
     assert sum(held) >= 7  # 12 of 0.8: fewer than 7 has a chance of 0.4 %
 
 
 def test_axes_make_up_the_covariance() -> None:
     root = np.random.default_rng(0).normal(size=(4, 4))
-    axes = principal(root @ root.T)
+    axes = principal_axes(root @ root.T)
     np.testing.assert_allclose(axes @ axes.T, root @ root.T, atol=1e-9)
-    assert principal(np.diag([1.0, 0.0, 1e-12])).shape == (3, 1)
+    assert principal_axes(np.diag([1.0, 0.0, 1e-12])).shape == (3, 1)
 
 
 def test_a_manoeuvre_that_cannot_be_performed_says_why(fitted: tuple[Solution, Statistics]) -> None:
     def never(_: Vessel) -> Mapping[str, float]:
         raise ShipidError("no shaft speed gives it 9 m/s")
 
-    rows = bands(SHIP, *fitted, [("fast", never), ("all", linear)])
+    rows = measure_bands(SHIP, *fitted, [("fast", never), ("all", linear)])
     assert rows["note"][0] == "no shaft speed gives it 9 m/s"
     assert np.isfinite(rows["low"][1])
 
@@ -110,16 +110,18 @@ def test_short_horizons_with_coloured_residuals_are_refused(fitted: tuple[Soluti
     coloured = {name: replace(one, memory=4.0, probability=0.0) for name, one in known.whiteness.items()}
     bad = replace(known, whiteness=coloured)
     short = replace(solution, settings=settings(horizon=20.0))
-    assert refusal(solution, known, 1.0) == ""
-    assert "the horizon of 20 s is short against residuals that are correlated over 4 s" in refusal(short, bad, 1.0)
+    assert band_refusal(solution, known, 1.0) == ""
+    assert "the horizon of 20 s is short against residuals that are correlated over 4 s" in band_refusal(
+        short, bad, 1.0
+    )
     assert short_horizon(replace(solution, settings=settings(horizon=50.0)), bad, 1.0) == ""
     assert short_horizon(solution, bad, 1.0) == ""  # whole runs
     best = replace(known.covariances[known.chosen], trusted=False, reason="3 runs")
     vague = replace(known, covariances={known.chosen: best})
-    assert refusal(solution, vague, 1.0) == "the standard errors are not to be trusted: 3 runs"
+    assert band_refusal(solution, vague, 1.0) == "the standard errors are not to be trusted: 3 runs"
     silent = replace(known, errors=np.where(np.arange(len(FEW)) == 1, np.inf, known.errors))
     name = FEW[1].rpartition(".")[2]
-    assert refusal(solution, silent, 1.0) == f"the data do not determine {name}: give priors, or fix some"
+    assert band_refusal(solution, silent, 1.0) == f"the data do not determine {name}: give priors, or fix some"
 
 
 def test_a_level_that_is_none_is_refused_before_the_fit() -> None:

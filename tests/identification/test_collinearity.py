@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.identification.collinearity import MOST_COLLINEAR, combinations
+from shipid.identification.collinearity import MOST_COLLINEAR, collinear_sets
 
 RNG = np.random.default_rng(0)
 FREE = np.linalg.qr(RNG.normal(size=(200, 6)))[0]
@@ -19,22 +19,22 @@ def correlated(cosine: float) -> np.ndarray:
 @pytest.mark.parametrize("cosine", [0.996, 0.9999])
 def test_index_of_two_columns_is_known(cosine: float) -> None:
     """gamma = 1 / sqrt(1 - cosine) (Brun et al. 2001, eq. 10)."""
-    (pair,) = combinations(correlated(cosine), "ab")
+    (pair,) = collinear_sets(correlated(cosine), "ab")
     assert pair.gamma == pytest.approx(1 / np.sqrt(1 - cosine))
 
 
 def test_a_set_has_an_index_above_the_limit() -> None:
     """gamma = 15 at a cosine of 1 - 1 / 225."""
     limit = 1 - 1 / MOST_COLLINEAR**2
-    assert combinations(correlated(limit - 1e-5), "ab") == ()
-    assert len(combinations(correlated(limit + 1e-5), "ab")) == 1
+    assert collinear_sets(correlated(limit - 1e-5), "ab") == ()
+    assert len(collinear_sets(correlated(limit + 1e-5), "ab")) == 1
 
 
 def test_nothing_depends_on_units() -> None:
     """b = a, and c has no effect: the weights of the set are those of the factors."""
     jacobian = np.column_stack([correlated(0.9999), np.zeros(200), FREE[:, 2]])
     scale = np.array([0.01, 30.0, 1.0, 100.0])
-    for one, other in zip(combinations(jacobian, "abcd"), combinations(jacobian * scale, "abcd"), strict=True):
+    for one, other in zip(collinear_sets(jacobian, "abcd"), collinear_sets(jacobian * scale, "abcd"), strict=True):
         assert one.names == other.names
         assert one.gamma == pytest.approx(other.gamma, rel=1e-6)
         if len(one.names) == 2:
@@ -44,14 +44,14 @@ def test_nothing_depends_on_units() -> None:
 
 def test_a_small_effect_beside_a_great_one_is_an_effect() -> None:
     """Resistance over long exact runs moves residuals 1e6 times as far as a coefficient that is known to 30 %."""
-    assert combinations(FREE[:, :2] * [3e6, 3.0], "ab") == ()
-    (pair,) = combinations(np.column_stack([correlated(0.9999) * [1.0, 1e-6], FREE[:, 2]]), "abc")
+    assert collinear_sets(FREE[:, :2] * [3e6, 3.0], "ab") == ()
+    (pair,) = collinear_sets(np.column_stack([correlated(0.9999) * [1.0, 1e-6], FREE[:, 2]]), "abc")
     assert pair.names == ("a", "b")
 
 
 def test_the_weights_move_the_residuals_as_little_as_the_index_says() -> None:
     jacobian = correlated(0.999) * np.array([1.0, 20.0])
-    (pair,) = combinations(jacobian, "ab")
+    (pair,) = collinear_sets(jacobian, "ab")
     moved = np.array(pair.weights)
     seen = np.linalg.norm(jacobian @ moved) / np.linalg.norm(moved * [1.0, 20.0])
     assert seen == pytest.approx(1 / pair.gamma)
@@ -61,7 +61,7 @@ def test_sets_are_as_small_as_they_can_be() -> None:
     """b = a, and e = c + d / 2: two sets, and f in neither."""
     a, c, d, f = FREE[:, :4].T
     jacobian = np.stack([a, a + 1e-4 * FREE[:, 4], c, d, c + 0.5 * d + 1e-4 * FREE[:, 5], f], axis=1)
-    sets = combinations(jacobian, "abcdef")
+    sets = collinear_sets(jacobian, "abcdef")
     assert {entry.paths for entry in sets} == {("a", "b"), ("c", "d", "e")}
     three = next(entry for entry in sets if len(entry.paths) == 3)
     weights = np.array(three.weights) / three.weights[2]
@@ -69,13 +69,13 @@ def test_sets_are_as_small_as_they_can_be() -> None:
 
 
 def test_columns_at_right_angles_have_no_set_and_each_silent_one_has_one() -> None:
-    assert combinations(FREE, "abcdef") == ()
+    assert collinear_sets(FREE, "abcdef") == ()
     silent = np.column_stack([FREE[:, :2], np.zeros(200)])
-    (silent_one,) = combinations(silent, "abc")
+    (silent_one,) = collinear_sets(silent, "abc")
     assert silent_one.sentence() == "c has no effect on these data"
     assert silent_one.gamma == float("inf")
 
 
 def test_a_pair_is_named_in_one_sentence() -> None:
-    (pair,) = combinations(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
+    (pair,) = collinear_sets(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
     assert pair.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"

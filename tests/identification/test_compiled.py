@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from shipid.engine.native import compiler_target, find_compiler
-from shipid.identification.compiled import pack, run_compiled
-from shipid.identification.sensitivities import Layout, run_machine, variation
+from shipid.identification.compiled import pack_lanes, run_compiled
+from shipid.identification.sensitivities import FitLayout, build_variation, run_machine
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 
@@ -18,7 +18,7 @@ def test_packing_groups_predictions_and_repeats_the_last() -> None:
     lanes = compiler_target().lanes
     count = lanes + 1
     array = np.arange(count * 6, dtype=float).reshape(count, 3, 2)
-    packed = pack(array)
+    packed = pack_lanes(array)
     assert packed.shape == (2, 3, 2, lanes)
     assert packed.flags.c_contiguous
     back = np.moveaxis(packed, -1, 1).reshape(-1, 3, 2)
@@ -28,8 +28,8 @@ def test_packing_groups_predictions_and_repeats_the_last() -> None:
 
 @pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 def test_compiled_outputs_are_those_of_the_virtual_machine() -> None:
-    layout = Layout(vessel_dynamics(SHIP), (("inertia.m",),), ("u", "r"), (), (), 0, 0.5, "euler")
-    model, rng, count, steps = variation(layout), np.random.default_rng(0), compiler_target().lanes + 2, 3
+    layout = FitLayout(vessel_dynamics(SHIP), (("inertia.m",),), ("u", "r"), (), (), 0, 0.5, "euler")
+    model, rng, count, steps = build_variation(layout), np.random.default_rng(0), compiler_target().lanes + 2, 3
     x = np.zeros((count, model.size))
     x[:, :3] = rng.uniform([3.0, -0.1, -0.02], [5.0, 0.1, 0.02], (count, 3))
     x[:, 3:12] = np.eye(3).ravel()
@@ -38,7 +38,7 @@ def test_compiled_outputs_are_those_of_the_virtual_machine() -> None:
     known = rng.uniform(0.5, 2.0, (count, steps, model.rates.size1_in(3)))
     seen = np.concatenate([np.zeros((count, steps, 2)), np.ones((count, steps, 2))], axis=-1)
     expected = run_machine(layout, x, fixed, known, seen)[0]
-    record = run_compiled(layout, x, fixed, pack(known), pack(seen))
+    record = run_compiled(layout, x, fixed, pack_lanes(known), pack_lanes(seen))
     result = record.reshape(-1, *record.shape[2:])[:count]
     assert np.abs(expected).max() > 1
     assert np.allclose(result, expected, rtol=1e-9, atol=1e-12)

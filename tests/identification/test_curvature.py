@@ -14,14 +14,21 @@ from scipy.optimize import least_squares
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification import curvature
-from shipid.identification.curvature import MOST, SHORT, Beside, curved, ends, sentence
-from shipid.identification.fit import beside, evaluate
+from shipid.identification.curvature import (
+    MOST,
+    SHORT,
+    Beside,
+    curvature_sentence,
+    curvature_warning,
+    interval_end_ratios,
+)
+from shipid.identification.fit import evaluate_factors, local_linearisation
 from shipid.identification.outcome import run_identification
-from shipid.identification.profile import profile, variance_ratio
-from shipid.identification.residuals import build
+from shipid.identification.profile import profile_factor, variance_ratio
+from shipid.identification.residuals import build_problem
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, Statistics, statistics
+from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.linear import design, fitted, labels, noise
 from tests.identification.trials import changed, trials
@@ -37,7 +44,7 @@ def test_a_linear_fit_is_not_named(seed: int, prior: float | None) -> None:
     error = noise(np.random.default_rng(seed), 6, 40, 0.0)
     widths = np.full(n, np.inf if prior is None else prior)
     fit = fitted(jacobian, error, clusters, signals, prior_widths=widths)
-    judged = statistics(fit)
+    judged = fit_statistics(fit)
 
     def at(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         priors = (fit.factors + change - 1) / widths
@@ -46,10 +53,10 @@ def test_a_linear_fit_is_not_named(seed: int, prior: float | None) -> None:
             np.vstack([fit.jacobian, np.diag(1 / widths)]),
         )
 
-    seen = ends(judged, at)
+    seen = interval_end_ratios(judged, at)
     assert seen
     np.testing.assert_allclose(list(seen.values()), 1.0, rtol=1e-6)
-    assert sentence(judged, seen) == ""
+    assert curvature_sentence(judged, seen) == ""
 
 
 def test_a_single_factor_has_the_rise_of_its_formula() -> None:
@@ -64,7 +71,7 @@ def test_a_single_factor_has_the_rise_of_its_formula() -> None:
 
     judged = _judged(("a",), np.ones(1), at)
     h = float(judged.high[0] - 1)
-    assert ends(judged, at)["a"] == pytest.approx((h / (1 - np.exp(-h)), h / (np.exp(h) - 1)), rel=1e-6)
+    assert interval_end_ratios(judged, at)["a"] == pytest.approx((h / (1 - np.exp(-h)), h / (np.exp(h) - 1)), rel=1e-6)
 
 
 def test_growth_that_is_cut_short_is_named_and_its_profile_bears_it_out() -> None:
@@ -74,10 +81,10 @@ def test_growth_that_is_cut_short_is_named_and_its_profile_bears_it_out() -> Non
         rng = np.random.default_rng(seed)
         a, b, error = rng.uniform(0.8, 1.2), rng.uniform(0.8, 1.2), 0.04 * rng.normal(size=40)
         judged, at, _ = _growth(np.linspace(0.2, 6, 40), a, b, error)
-        assert sentence(judged, ends(judged, at)) == ""
+        assert curvature_sentence(judged, interval_end_ratios(judged, at)) == ""
         judged, at, residuals = _growth(np.linspace(0.05, 0.9, 40), a, b, error)
-        seen = ends(judged, at)
-        named += bool(sentence(judged, seen))
+        seen = interval_end_ratios(judged, at)
+        named += bool(curvature_sentence(judged, seen))
         for path, times in seen.items():
             j, factors = judged.fit.paths.index(path), judged.fit.factors
             true = np.abs(np.array(_profile_of(path, judged, residuals)) - factors[j]) / (judged.high[j] - factors[j])
@@ -94,10 +101,10 @@ def test_an_end_that_diverges_is_outside_and_one_that_is_flat_is_far() -> None:
         e, J = _line(change)
         return (e * np.nan, J) if change[0] > 0 else (e, J)
 
-    assert ends(judged, diverging)["a"] == pytest.approx((1.0, 0.0))
-    seen = ends(judged, lambda change: _line(np.minimum(change, 0.01)))
+    assert interval_end_ratios(judged, diverging)["a"] == pytest.approx((1.0, 0.0))
+    seen = interval_end_ratios(judged, lambda change: _line(np.minimum(change, 0.01)))
     assert seen["a"] == pytest.approx((1.0, MOST))
-    assert "estimates: a upwards 3; compare with --profile a, or" in sentence(judged, seen)
+    assert "estimates: a upwards 3; compare with --profile a, or" in curvature_sentence(judged, seen)
 
 
 def _line(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,12 +121,12 @@ def test_a_factor_that_has_a_profile_costs_no_prediction() -> None:
         asked.append(change)
         return at(change)
 
-    both = ends(judged, at)
+    both = interval_end_ratios(judged, at)
     assert both.keys() == {"a", "b"}
-    assert ends(judged, counted, ["a"]) == {"b": both["b"]}
+    assert interval_end_ratios(judged, counted, ["a"]) == {"b": both["b"]}
     assert len(asked) == 3  # the estimate and two ends
     asked.clear()
-    assert ends(judged, counted, ["a", "b"]) == {}
+    assert interval_end_ratios(judged, counted, ["a", "b"]) == {}
     assert not asked
 
 
@@ -128,7 +135,7 @@ def test_ctrl_c_ends_the_look_at_the_ends(monkeypatch: pytest.MonkeyPatch) -> No
     asked = 0
 
     def pressed(*arguments: Any) -> Beside:
-        at = beside(*arguments)
+        at = local_linearisation(*arguments)
 
         def counted(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             nonlocal asked
@@ -138,7 +145,7 @@ def test_ctrl_c_ends_the_look_at_the_ends(monkeypatch: pytest.MonkeyPatch) -> No
 
         return counted
 
-    monkeypatch.setattr(curvature, "beside", pressed)
+    monkeypatch.setattr(curvature, "local_linearisation", pressed)
     monkeypatch.setattr(curvature, "NARROW", 0.0)
     vessel = load_vessel("gunnerus-28.9")
     data = trials(vessel, 2, 40)
@@ -163,17 +170,17 @@ def test_the_fit_beside_the_estimate(more: dict[str, Any]) -> None:
         **{"parameters": paths, "weights": sizes, "nuisance": ["initial_state"], "start": "base", **more}
     )
     solution = identify(vessel, data, data.runs, settings)
-    problem = build(solution.vessel, data, solution.runs, solution.settings)
-    at = beside(problem, solution.factors, solution.point)
+    problem = build_problem(solution.vessel, data, solution.runs, solution.settings)
+    at = local_linearisation(problem, solution.factors, solution.point)
     e, J = at(np.zeros(3))
     assert e @ e == pytest.approx(solution.objective, rel=1e-7)
     change = 1e-5 * np.array([1.0, -2.0, 3.0])
     assert np.square(at(change)[0]).sum() - e @ e == pytest.approx(
         2 * e @ J @ change + np.square(J @ change).sum(), abs=1e-6
     )
-    judged = statistics(LinearFit.of(solution))
-    assert curved(solution, data, judged) == ""
-    for times in ends(judged, at).values():
+    judged = fit_statistics(LinearFit.of(solution))
+    assert curvature_warning(solution, data, judged) == ""
+    for times in interval_end_ratios(judged, at).values():
         np.testing.assert_allclose(times, 1.0, atol=0.1)
 
 
@@ -188,19 +195,19 @@ def test_a_ship_that_hardly_changes_her_turn_is_named() -> None:
     base, data, settings = _turn(20.0, 0.2)
     solution = identify(base, data, data.runs, settings)
     assert solution.status == "ok"
-    assert curved(solution, data, statistics(LinearFit.of(solution))) == ""
+    assert curvature_warning(solution, data, fit_statistics(LinearFit.of(solution))) == ""
 
 
 def _as_with_starts_at_their_optimum(solution: Solution, data: Dataset, judged: Statistics) -> None:
     """One step for the unknowns of the runs gives the ends that all their steps give."""
-    problem = build(solution.vessel, data, solution.runs, solution.settings)
+    problem = build_problem(solution.vessel, data, solution.runs, solution.settings)
 
     def settled(change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        there = evaluate(problem, solution.factors + change, solution.point)
+        there = evaluate_factors(problem, solution.factors + change, solution.point)
         return there.f, there.J
 
-    by_one = ends(judged, beside(problem, solution.factors, solution.point))
-    for path, times in ends(judged, settled).items():
+    by_one = interval_end_ratios(judged, local_linearisation(problem, solution.factors, solution.point))
+    for path, times in interval_end_ratios(judged, settled).items():
         assert by_one[path] == pytest.approx(times, rel=0.06)
 
 
@@ -235,7 +242,7 @@ def _turn(helm: float, share: float) -> tuple[Vessel, Dataset, Identify]:
 def _judged(paths: tuple[str, ...], factors: np.ndarray, at: Beside) -> Statistics:
     e, J = at(np.zeros(len(paths)))
     m = len(e)
-    return statistics(LinearFit(paths, factors, e, J, np.zeros(m, dtype=int), ("u",) * m))
+    return fit_statistics(LinearFit(paths, factors, e, J, np.zeros(m, dtype=int), ("u",) * m))
 
 
 def _growth(t: np.ndarray, a: float, b: float, error: np.ndarray) -> tuple[Statistics, Beside, Residuals]:
@@ -268,7 +275,7 @@ def _profile_of(path: str, judged: Statistics, residuals: Residuals) -> tuple[fl
         return 2 * float(other.cost), factors(other.x)
 
     fit = judged.fit
-    curve = profile(
+    curve = profile_factor(
         path, fit.factors, j, float(fit.residuals @ fit.residuals), refit,
         half_width=float(judged.high[j] - fit.factors[j]),
         freedom=float(judged.covariances[judged.chosen].freedom[j]), ratio=variance_ratio(judged, path),

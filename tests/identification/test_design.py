@@ -15,13 +15,13 @@ from shipid.identification.design import (
     Candidate,
     Informed,
     Limits,
-    _cut,
-    allowed,
-    candidates,
-    informed,
-    informed_of_possible,
-    rank,
-    recorded,
+    _cut_predictions,
+    candidate_manoeuvres,
+    information_of_candidates,
+    information_where_possible,
+    rank_candidates,
+    recorded_limits,
+    within_limits,
 )
 from shipid.simulation.manoeuvre import (
     ApproachedManoeuvre,
@@ -43,13 +43,13 @@ SHIP = load_vessel("gunnerus-28.9")
 WEIGHTS = {"u": 0.1, "v": 0.1, "r": 0.0035}
 PATHS = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "Y_ur", "N_ur", "N_r|r|"))
 GROUPS = [[path] for path in PATHS]
-CHOICE = candidates(SHIP, [3.0])
+CHOICE = candidate_manoeuvres(SHIP, [3.0])
 
 
 @cache
 def informed_choice() -> list[Informed]:
     """What each candidate tells of the four factors."""
-    return informed(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
+    return information_of_candidates(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
 
 
 def kind(title: str) -> str:
@@ -60,7 +60,7 @@ def alone(path: str, by: str) -> list[str]:
     """Manoeuvres in order, for one factor that is the only one unknown."""
     j = PATHS.index(path)
     single = [Informed(one.candidate, one.information[j : j + 1, j : j + 1]) for one in informed_choice()]
-    return list(rank(single, (path,)).sort_values(by, ascending=False)["manoeuvre"])
+    return list(rank_candidates(single, (path,)).sort_values(by, ascending=False)["manoeuvre"])
 
 
 def test_what_excites_a_parameter_ranks_first_for_it() -> None:
@@ -79,12 +79,12 @@ def test_a_speed_run_says_nothing_of_yaw() -> None:
 
 def test_information_adds() -> None:
     """Two runs bring what the first and then the second bring; more never harms; the second of a kind brings less."""
-    table = rank(informed_choice(), PATHS).set_index("manoeuvre")
+    table = rank_candidates(informed_choice(), PATHS).set_index("manoeuvre")
     first = informed_choice()[0]
-    then = rank(informed_choice(), PATHS, first.information).set_index("manoeuvre")
+    then = rank_candidates(informed_choice(), PATHS, first.information).set_index("manoeuvre")
     other = informed_choice()[1]
     both = Informed(other.candidate, first.information + other.information)
-    assert rank([both], PATHS)["gain"][0] == pytest.approx(
+    assert rank_candidates([both], PATHS)["gain"][0] == pytest.approx(
         table["gain"][first.candidate.title] + then["gain"][other.candidate.title]
     )
     assert (table["gain"] > 0).all()
@@ -95,15 +95,15 @@ def test_ranks_do_not_depend_on_scales_of_factors() -> None:
     """Gains are ratios of determinants: with the present information scaled alike, they are the same."""
     scale, there = np.diag([1e3, 1.0, 1e-2, 5.0]), np.diag([4.0, 25.0, 9.0, 1e4])
     scaled = [Informed(one.candidate, scale @ one.information @ scale) for one in informed_choice()]
-    one = rank(informed_choice(), PATHS, there - np.eye(4))
-    other = rank(scaled, PATHS, scale @ there @ scale - np.eye(4))
+    one = rank_candidates(informed_choice(), PATHS, there - np.eye(4))
+    other = rank_candidates(scaled, PATHS, scale @ there @ scale - np.eye(4))
     assert list(one["manoeuvre"]) == list(other["manoeuvre"])
     np.testing.assert_allclose(one["gain"], other["gain"], rtol=1e-6)
 
 
 def test_twice_the_value_is_twice_the_sensitivity() -> None:
     """The unknown is a factor on `scale`: information goes with its square."""
-    double = informed(
+    double = information_of_candidates(
         SHIP, CHOICE[:1], GROUPS, scale=[[2 * SHIP.parameters[path]] for path in PATHS], weights=WEIGHTS
     )  # fmt: skip
     np.testing.assert_allclose(double[0].information, 4 * informed_choice()[0].information, rtol=1e-2)
@@ -111,15 +111,17 @@ def test_twice_the_value_is_twice_the_sensitivity() -> None:
 
 def test_the_gain_of_one_factor_is_what_its_standard_error_shrinks_by() -> None:
     single = [Informed(one.candidate, one.information[:1, :1]) for one in informed_choice()]
-    table = rank(single, PATHS[:1])
+    table = rank_candidates(single, PATHS[:1])
     np.testing.assert_allclose(table["gain"], np.log2(table["before"] / table["after"]), rtol=1e-6)
     assert table["per_hour"].is_monotonic_decreasing
 
 
 def test_sensitivities_are_those_of_the_trajectory() -> None:
     """Free starts cost information; half the standard deviation brings four times as much; longer predictions more."""
-    short = informed(SHIP, CHOICE[:1], GROUPS, weights=WEIGHTS, horizon=5.0)[0].information
-    sharp = informed(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[0].information
+    short = information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights=WEIGHTS, horizon=5.0)[0].information
+    sharp = information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[
+        0
+    ].information
     assert (np.diag(short) < np.diag(informed_choice()[0].information)).all()
     np.testing.assert_allclose(sharp, 4 * informed_choice()[0].information, rtol=1e-9)
 
@@ -127,20 +129,22 @@ def test_sensitivities_are_those_of_the_trajectory() -> None:
 def test_what_the_ship_cannot_perform_is_left_out_and_the_others_are_as_they_were() -> None:
     wild = SHIP.with_values({"hull.derivatives.N_rrr": 2e10})  # she spins up in a hard turn
     with pytest.raises(ShipidError, match="diverges"):
-        informed(wild, CHOICE, GROUPS, weights=WEIGHTS)
-    some = informed_of_possible(wild, CHOICE, GROUPS, weights=WEIGHTS)
+        information_of_candidates(wild, CHOICE, GROUPS, weights=WEIGHTS)
+    some = information_where_possible(wild, CHOICE, GROUPS, weights=WEIGHTS)
     titles = {kind(one.candidate.title) for one in some}
     assert "speed" in titles
     assert "turning" not in titles
     speed = next(one for one in some if kind(one.candidate.title) == "speed")
-    alone = informed(wild, [speed.candidate], GROUPS, weights=WEIGHTS)[0]
+    alone = information_of_candidates(wild, [speed.candidate], GROUPS, weights=WEIGHTS)[0]
     np.testing.assert_allclose(speed.information, alone.information, rtol=1e-9)
     with pytest.raises(ShipidError, match="diverges"):
-        informed_of_possible(wild, [one for one in CHOICE if kind(one.title) == "turning"], GROUPS, weights=WEIGHTS)
+        information_where_possible(
+            wild, [one for one in CHOICE if kind(one.title) == "turning"], GROUPS, weights=WEIGHTS
+        )
 
 
 def test_limits_of_the_actuators_hold() -> None:
-    weak = candidates(SHIP, [3.0], Limits(angle_deg=15.0, n_rpm=120.0))
+    weak = candidate_manoeuvres(SHIP, [3.0], Limits(angle_deg=15.0, n_rpm=120.0))
     angles = [getattr(one.manoeuvre, "angle_deg", 0.0) for one in weak]
     time = np.linspace(0, 100, 200)
     assert max(angles) <= 15.0
@@ -162,9 +166,9 @@ def test_limits_of_the_actuators_hold() -> None:
 )
 def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, helm: float, rpm: float) -> None:
     assert manoeuvre.greatest_orders == pytest.approx((helm, rpm))
-    assert allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))
-    assert not allowed(manoeuvre, Limits(angle_deg=helm, n_rpm=0.99 * rpm))
-    assert not helm or not allowed(manoeuvre, Limits(angle_deg=0.99 * helm))
+    assert within_limits(manoeuvre, Limits(angle_deg=helm, n_rpm=rpm))
+    assert not within_limits(manoeuvre, Limits(angle_deg=helm, n_rpm=0.99 * rpm))
+    assert not helm or not within_limits(manoeuvre, Limits(angle_deg=0.99 * helm))
     time = np.linspace(0, manoeuvre.length, 1000)
     assert np.abs(manoeuvre.helm(time)).max() <= np.radians(helm) + 1e-9
     assert np.abs(manoeuvre.shaft(time)).max() <= rpm / 60 + 1e-9
@@ -176,7 +180,7 @@ def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
     ship = variety()[name]
     one = TurningCircle(n_rpm=180, approach="rest", duration=60)
     log = perform_manoeuvres(ship, [one], step=0.2, environment={})
-    cut = _cut(ship, log, 50, 5)
+    cut = _cut_predictions(ship, log, 50, 5)
     how = {"step": 0.2, "num_steps": 50, "method": "rk4", "memory": cut.memory or None}
     path = rollout(ship, cut.start, cut.commands, cut.environment, **how)  # type: ignore[arg-type]
     for state in ("u", "v", "r"):
@@ -186,23 +190,26 @@ def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
 def test_position_and_heading_and_whole_runs_count() -> None:
     more = {**WEIGHTS, "psi": 0.01, "position": 1.0}
     zigzag = Candidate("zigzag", define_standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
-    one = informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
-    all_ = informed(SHIP, [zigzag], GROUPS, weights=more, horizon=0.0)[0].information
+    one = information_of_candidates(SHIP, [zigzag], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
+    all_ = information_of_candidates(SHIP, [zigzag], GROUPS, weights=more, horizon=0.0)[0].information
     assert np.linalg.eigvalsh(all_ - one).min() > -1e-6 * np.trace(one)
     assert all_[2, 2] > 1.1 * one[2, 2]
 
 
 def test_mistakes_are_reported() -> None:
     with pytest.raises(ShipidError, match="position"):
-        informed(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
+        information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
     with pytest.raises(ShipidError, match="within the limits"):
-        informed(SHIP, candidates(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
+        information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
 
 
 def test_a_zigzag_is_replayed_as_logged() -> None:
     """Copies get the orders of the log: the helmsman would answer each copy differently, at whole steps."""
     zigzag = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
-    fine, coarse = (informed(SHIP, [zigzag], GROUPS, weights=WEIGHTS, step=step)[0].information for step in (0.1, 0.2))
+    fine, coarse = (
+        information_of_candidates(SHIP, [zigzag], GROUPS, weights=WEIGHTS, step=step)[0].information
+        for step in (0.1, 0.2)
+    )
     np.testing.assert_allclose(np.diag(fine), np.diag(coarse), rtol=0.05)
 
 
@@ -212,6 +219,6 @@ def test_recorded_limits_are_those_of_the_shafts_that_drive_the_ship() -> None:
     rows = {"run": ["a", "a", "b"], "propeller.n": [1.0, 2.0, 3.0], "bow.n": [0.0, -10.0, 0.0]}
     rest = dict.fromkeys(("north", "east", "psi", "r"), 0.0)
     frame = pd.DataFrame({**rows, "t": [0.0, 1.0, 2.0], "u": [3.0, 4.0, 9.0], "v": [4.0, 3.0, 0.0], **rest, "flags": 0})
-    speed, limits = recorded(ship, Dataset(frame, {}), ["a"])
+    speed, limits = recorded_limits(ship, Dataset(frame, {}), ["a"])
     assert limits.n_rpm == pytest.approx(120.0)
     assert speed == pytest.approx(5.0)

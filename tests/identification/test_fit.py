@@ -10,8 +10,8 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification import fit
-from shipid.identification.fit import Point, _Value, evaluate, loss, origin, search
-from shipid.identification.residuals import Problem, build
+from shipid.identification.fit import Point, _Evaluation, evaluate_factors, huber_loss, initial_point, search_factors
+from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.settings import Identify
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
@@ -28,7 +28,7 @@ def problem(**more: object) -> Problem:
         data, **{k: data.frame[k] + rng.normal(0, s, len(data.frame)) for k, s in (("u", 0.05), ("r", 3e-3))}
     )
     settings = Identify(**{"parameters": PATHS, "horizon": 0, "weights": {"u": 0.05, "v": 0.05, "r": 0.003}, **more})
-    return build(SHIP, noisy, noisy.runs, settings)
+    return build_problem(SHIP, noisy, noisy.runs, settings)
 
 
 @pytest.mark.parametrize("loss_kind", ["squared", "huber"])
@@ -37,10 +37,10 @@ def test_the_gradient_is_that_of_the_objective(nuisance: list[str], loss_kind: s
     """With the unknowns of the runs eliminated anew at each place, priors of the factors included."""
     task = problem(nuisance=nuisance, loss=loss_kind, prior={"hull.*": 0.5})
     factors = np.array([1.1, 0.9, 1.05])
-    here = evaluate(task, factors, origin(task))
+    here = evaluate_factors(task, factors, initial_point(task))
     point = Point(here.at.nuisances, here.at.away)
     for j, unit in enumerate(np.eye(3)):
-        ends = [evaluate(task, factors + sign * 1e-5 * unit, point).objective for sign in (1, -1)]
+        ends = [evaluate_factors(task, factors + sign * 1e-5 * unit, point).objective for sign in (1, -1)]
         assert 2 * (here.J.T @ here.f)[j] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-2)
 
 
@@ -48,17 +48,17 @@ def test_a_prior_is_about_the_base_vessel_also_where_that_is_zero() -> None:
     task, factors = problem(), np.array([0.4, 0.9, 1.05])
     centre, prior = np.array([0.0, 1.0, 1.0]), np.array([0.5, 0.25, np.inf])
     believed = replace(task, unknown=replace(task.unknown, centre=centre, prior=prior))
-    costs = [evaluate(each, factors, origin(each)).objective for each in (task, believed)]
+    costs = [evaluate_factors(each, factors, initial_point(each)).objective for each in (task, believed)]
     assert costs[1] - costs[0] == pytest.approx((0.4 / 0.5) ** 2 + (0.1 / 0.25) ** 2)
 
 
 def test_the_unknowns_of_the_runs_are_where_they_are_best() -> None:
     task, rng = problem(nuisance=["initial_state", "velocity_bias"]), np.random.default_rng(1)
     factors = np.array([1.1, 0.9, 1.05])
-    best = evaluate(task, factors, origin(task))
+    best = evaluate_factors(task, factors, initial_point(task))
     for _ in range(5):
         moved = task.whole, rng.normal(0, 0.05, best.at.nuisances.shape), rng.normal(0, 0.05, best.at.away.shape)
-        again = evaluate(task, factors, Point(best.at.nuisances + moved[1], best.at.away + moved[2]))
+        again = evaluate_factors(task, factors, Point(best.at.nuisances + moved[1], best.at.away + moved[2]))
         assert again.objective == pytest.approx(best.objective, rel=1e-8)
 
 
@@ -68,40 +68,47 @@ def test_a_straight_run_of_a_ship_whose_yaw_would_grow_has_a_best_start(growing:
     data = trials(SHIP, runs=1, steps=120)
     still = np.zeros(len(data.frame))
     straight = changed(data, u=still + 3.0, **dict.fromkeys(("v", "r", "port.alpha", "starboard.alpha"), still))
-    task = build(SHIP, straight, straight.runs, Identify(parameters=PATHS, horizon=0, nuisance=["initial_state"]))
-    costs = [evaluate(task, np.array([1.0, 1.0, factor]), origin(task)).objective for factor in (1.0, growing)]
+    task = build_problem(
+        SHIP, straight, straight.runs, Identify(parameters=PATHS, horizon=0, nuisance=["initial_state"])
+    )
+    costs = [
+        evaluate_factors(task, np.array([1.0, 1.0, factor]), initial_point(task)).objective for factor in (1.0, growing)
+    ]
     assert costs[1] == pytest.approx(costs[0], rel=1e-6)
 
 
 def test_rows_that_scipy_sees_do_not_grow_with_the_log() -> None:
     task = problem()
-    value = evaluate(task, np.ones(3), origin(task))
+    value = evaluate_factors(task, np.ones(3), initial_point(task))
     assert value.f.shape == (3 * 4,)  # of each run one row a factor and one for what is left
     assert value.objective == pytest.approx(float((value.at.r**2).sum()), rel=1e-12)
 
 
 def test_the_loss_is_linear_beyond_its_threshold() -> None:
     r = np.array([-5.0, -1.0, 0.0, 2.0, 3.0])
-    value, weight = loss(r, 2.0)
+    value, weight = huber_loss(r, 2.0)
     assert value.tolist() == [16.0, 1.0, 0.0, 4.0, 8.0]
     np.testing.assert_allclose(weight, [0.4, 1.0, 1.0, 1.0, 2 / 3])
 
 
 def test_a_factor_that_is_pushed_ends_at_its_bound() -> None:
     task = problem(bounds={PATHS[0]: (1.2, 3.0)})
-    end = search(task, np.array([2.0, 1.0, 1.0]), origin(task))
+    end = search_factors(task, np.array([2.0, 1.0, 1.0]), initial_point(task))
     assert end.status == "ok"
     assert end.factors[0] == 1.2
-    slope = evaluate(task, end.factors, origin(task)).J.T @ evaluate(task, end.factors, origin(task)).f
+    slope = (
+        evaluate_factors(task, end.factors, initial_point(task)).J.T
+        @ evaluate_factors(task, end.factors, initial_point(task)).f
+    )
     assert slope[0] > 0
     assert np.abs(slope[1:]).max() < 1e-3 * slope[0]
 
 
 def test_it_ends_where_whoever_looks_on_asks() -> None:
     task, begin = problem(), np.array([1.5, 0.5, 1.5])
-    end = search(task, begin, origin(task), progress=lambda iteration, _: iteration == 4, before=3)
+    end = search_factors(task, begin, initial_point(task), progress=lambda iteration, _: iteration == 4, before=3)
     assert (end.status, end.iterations) == ("stopped", 4)
-    none = search(task, begin, origin(task), progress=lambda *_: True)
+    none = search_factors(task, begin, initial_point(task), progress=lambda *_: True)
     assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
 
 
@@ -109,15 +116,15 @@ def test_it_ends_where_whoever_looks_on_asks() -> None:
 def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """(1 + slope |y - x|)^2 + (x - 3)^2 / 9 is least at (3, 3); from (0, 0) every step of one side's slope goes up."""
 
-    def kinked(_: object, at: np.ndarray, __: object) -> _Value:
+    def kinked(_: object, at: np.ndarray, __: object) -> _Evaluation:
         side = 1.0 if at[1] >= at[0] else -1.0
         f = np.array([1 + slope * side * (at[1] - at[0]), (at[0] - 3) / 3])
         J = np.array([[-slope * side, slope * side], [1 / 3, 0.0]])
-        return _Value(at, SimpleNamespace(nuisances=None, away=None), f, J)  # type: ignore[arg-type]
+        return _Evaluation(at, SimpleNamespace(nuisances=None, away=None), f, J)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(fit, "evaluate", kinked)
+    monkeypatch.setattr(fit, "evaluate_factors", kinked)
     unknown = SimpleNamespace(low=np.full(2, -10.0), high=np.full(2, 10.0))
-    end = search(SimpleNamespace(unknown=unknown, names=()), np.zeros(2), Point(np.zeros(0), np.zeros(0)))  # type: ignore[arg-type]
+    end = search_factors(SimpleNamespace(unknown=unknown, names=()), np.zeros(2), Point(np.zeros(0), np.zeros(0)))  # type: ignore[arg-type]
     assert end.status == "ok"
     assert end.objective < 1.05
     np.testing.assert_allclose(end.factors, 3, atol=0.7)
@@ -130,18 +137,18 @@ def test_a_search_does_not_end_where_a_gauss_newton_step_still_goes_down() -> No
     log = perform_manoeuvres(SHIP, runs, step=0.1, interval=1.0)
     data = Dataset(log[[name for name in log if not name.startswith("actual.")]], {"clock": "run", "flags": []})
     settings = Identify(parameters=["hull.derivatives.*"], weights={"u": 0.05, "v": 0.05, "r": 0.002}, horizon=0)
-    here = build(SHIP, data, data.runs, settings)
+    here = build_problem(SHIP, data, data.runs, settings)
     ended = 0
     for seed in range(3):
         factors = np.random.default_rng(seed).uniform(0, 2, here.num_factors)
-        result = search(here, factors, origin(here))
+        result = search_factors(here, factors, initial_point(here))
         if result.status != "ok":
             continue
         ended += 1
         point = Point(result.at.nuisances, result.at.away)
-        best = evaluate(here, result.factors, point)
+        best = evaluate_factors(here, result.factors, point)
         scale = np.maximum(np.linalg.norm(best.J, axis=0), 1e-300)
         step = np.linalg.lstsq(best.J / scale, best.f, rcond=1e-9)[0] / scale
-        trials = [evaluate(here, result.factors - 0.5**k * step, point).objective for k in range(8)]
+        trials = [evaluate_factors(here, result.factors - 0.5**k * step, point).objective for k in range(8)]
         assert min(trials) >= best.objective * (1 - 1e-5), seed
     assert ended

@@ -9,7 +9,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.hybrid.physics import assumed
-from shipid.identification.free_run import ALL, MEASURED, free_runs, unfelt
+from shipid.identification.free_run import ALL, MEASURED, missing_inputs, simulate_free_runs
 from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
 from tests.conftest import variety
@@ -22,7 +22,7 @@ SETTINGS = Identify(parameters=["hull.derivatives.N_ur"])
 
 
 def test_the_simulating_vessel_reproduces_its_log() -> None:
-    errors = free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS).errors
+    errors = simulate_free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS).errors
     assert errors["run"].tolist() == [ALL, *DATA.runs]
     assert errors["samples"].tolist() == [60, 30, 30]
     assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-9
@@ -32,7 +32,7 @@ def test_a_piece_begins_where_the_actuators_are() -> None:
     """Rudders and shafts that lag are in motion where a piece begins; the log holds their orders."""
     ship = variety()["actuators"]
     data = trials(ship, runs=2, steps=30)
-    errors = free_runs({"true": ship}, data, data.runs, SETTINGS, length=7.0).errors
+    errors = simulate_free_runs({"true": ship}, data, data.runs, SETTINGS, length=7.0).errors
     assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-6
 
 
@@ -42,12 +42,12 @@ def test_a_ship_that_heels_reproduces_her_horizontal_log(length: float) -> None:
     ship = variety()["roll"]
     data = trials(ship, runs=2, steps=30)
     assert np.abs(data.frame["phi"]).max() > 0.02
-    errors = free_runs({"true": ship}, data, data.runs, SETTINGS, length=length).errors
+    errors = simulate_free_runs({"true": ship}, data, data.runs, SETTINGS, length=length).errors
     assert errors[["u", "v", "r", "position"]].to_numpy().max() < 1e-9
 
 
 def test_errors_are_root_mean_squares_of_the_series() -> None:
-    result = free_runs({"other": OTHER}, DATA, DATA.runs, SETTINGS)
+    result = simulate_free_runs({"other": OTHER}, DATA, DATA.runs, SETTINGS)
     log, other = (result.series[result.series["model"] == name].set_index(["run", "t"]) for name in (MEASURED, "other"))
     away = other.select_dtypes(float) - log.select_dtypes(float)
     away["position"] = np.hypot(away["north"], away["east"])
@@ -63,7 +63,7 @@ def test_errors_are_root_mean_squares_of_the_series() -> None:
 
 
 def test_every_piece_begins_at_the_measured_state() -> None:
-    series = free_runs({"other": OTHER}, DATA, DATA.runs[:1], SETTINGS, length=10.0).series
+    series = simulate_free_runs({"other": OTHER}, DATA, DATA.runs[:1], SETTINGS, length=10.0).series
     assert series["piece"].nunique() == 3
     for _, piece in series.groupby("piece"):
         log, other = (piece[piece["model"] == name].iloc[0] for name in (MEASURED, "other"))
@@ -73,22 +73,22 @@ def test_every_piece_begins_at_the_measured_state() -> None:
 
 def test_a_piece_shorter_than_two_steps_is_refused() -> None:
     with pytest.raises(DataError, match="must hold two steps of 1 s"):
-        free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS, length=1.0)
+        simulate_free_runs({"true": SHIP}, DATA, DATA.runs, SETTINGS, length=1.0)
 
 
 def test_what_nobody_measured_is_named_unless_it_is_estimated_or_set() -> None:
     """A current or wind that is taken as 0 goes into the errors, and into the numbers of a fit."""
     ship = SHIP.with_values({"current.kind": "uniform"})
     calm = Dataset(DATA.frame.drop(columns=["V_w", "beta_w"], errors="ignore"), DATA.metadata)
-    assert unfelt(ship, calm, SETTINGS, DATA.runs) == ["V_w", "beta_w", "V_c", "beta_c"]
+    assert missing_inputs(ship, calm, SETTINGS, DATA.runs) == ["V_w", "beta_w", "V_c", "beta_c"]
     estimated = SETTINGS.model_copy(update={"nuisance": {"current": 0.2}})
-    assert unfelt(ship, calm, estimated, DATA.runs) == ["V_w", "beta_w"]
+    assert missing_inputs(ship, calm, estimated, DATA.runs) == ["V_w", "beta_w"]
     wind = {"environment": {"V_w": 3.0, "beta_w": 0.5}}
     one, both = (SETTINGS.model_copy(update={"runs": dict.fromkeys(runs, wind)}) for runs in (DATA.runs[:1], DATA.runs))
-    assert unfelt(ship, calm, one, DATA.runs) == ["V_w", "beta_w", "V_c", "beta_c"]
-    assert unfelt(ship, calm, both, DATA.runs) == ["V_c", "beta_c"]
+    assert missing_inputs(ship, calm, one, DATA.runs) == ["V_w", "beta_w", "V_c", "beta_c"]
+    assert missing_inputs(ship, calm, both, DATA.runs) == ["V_c", "beta_c"]
     measured = Dataset(calm.frame.assign(V_w=3.0, beta_w=0.5), DATA.metadata)
-    assert unfelt(SHIP, measured, SETTINGS, DATA.runs) == []
+    assert missing_inputs(SHIP, measured, SETTINGS, DATA.runs) == []
 
 
 def test_a_state_whose_column_has_another_name_is_measured() -> None:
@@ -96,10 +96,10 @@ def test_a_state_whose_column_has_another_name_is_measured() -> None:
     six = variety()["six"]
     log = trials(six, runs=1, steps=5)
     weather = ["V_w", "beta_w", "V_c", "beta_c"]
-    assert unfelt(six, log, SETTINGS, log.runs) == weather
+    assert missing_inputs(six, log, SETTINGS, log.runs) == weather
     assert assumed(six, dict.fromkeys(log.frame, np.empty(0))) == weather
     flat = Dataset(log.frame.drop(columns="z"), log.metadata)
-    assert unfelt(six, flat, SETTINGS, log.runs) == ["z", *weather]
+    assert missing_inputs(six, flat, SETTINGS, log.runs) == ["z", *weather]
 
 
 def test_a_short_run_does_not_diverge_because_a_longer_one_is_in_company() -> None:
@@ -108,7 +108,7 @@ def test_a_short_run_does_not_diverge_because_a_longer_one_is_in_company() -> No
     long, short = (trials(SHIP, runs=1, steps=steps).frame.assign(run=name) for steps, name in ((600, "a"), (30, "b")))
     both = Dataset(pd.concat([long, short]), DATA.metadata)
     (alone,), together = (
-        free_runs({"wild": wild}, data, data.runs, SETTINGS).errors.query("run == 'b'").to_dict("records")
+        simulate_free_runs({"wild": wild}, data, data.runs, SETTINGS).errors.query("run == 'b'").to_dict("records")
         for data in (both.select(["b"]), both)
     )
     assert np.isfinite(alone["position"])
@@ -121,7 +121,7 @@ def test_a_run_of_another_displacement_is_predicted() -> None:
     heavier = {name: 1.1 * SHIP.parameters[name] for name in ("inertia.m", "inertia.I_z")}
     assert SHIP.parameters["inertia.x_G"] == 0
     asked = SETTINGS.model_copy(update={"runs": {f"M01.{name}": value for name, value in heavier.items()}})
-    loaded = free_runs({"loaded": SHIP}, DATA, DATA.runs, asked).errors.set_index("run")
-    alone = free_runs({"loaded": SHIP.with_values(heavier)}, DATA, ["M01"], SETTINGS).errors.set_index("run")
+    loaded = simulate_free_runs({"loaded": SHIP}, DATA, DATA.runs, asked).errors.set_index("run")
+    alone = simulate_free_runs({"loaded": SHIP.with_values(heavier)}, DATA, ["M01"], SETTINGS).errors.set_index("run")
     assert loaded["v"]["M01"] == pytest.approx(alone["v"]["M01"], rel=1e-9)
     assert loaded["v"]["M02"] < 1e-9 < loaded["v"]["M01"]

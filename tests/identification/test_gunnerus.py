@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.free_run import ALL, free_runs
+from shipid.identification.free_run import ALL, simulate_free_runs
 from shipid.identification.solve import identify
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
@@ -46,7 +46,7 @@ def test_half_of_the_trials_predict_the_other(trials: Dataset) -> None:
         assert solution.status == "ok"
         unseen = without(trials, list(others), list(fitted))
         vessels = {"before": template, "after": solution.identified}
-        runs = free_runs(vessels, unseen, unseen.runs, settings, LENGTH).errors
+        runs = simulate_free_runs(vessels, unseen, unseen.runs, settings, LENGTH).errors
         errors.append(runs[runs["run"] == ALL].set_index("model"))
     mean = sum(table.loc["after", list(GOAL)].to_numpy(dtype=float) for table in errors) / 2
     for name, value in zip(GOAL, mean, strict=True):

@@ -8,8 +8,8 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.collinearity import combinations
-from shipid.identification.inverse import _Problem, _solved, inverse_dynamics
+from shipid.identification.collinearity import collinear_sets
+from shipid.identification.inverse import _Problem, _solve_weighted, inverse_dynamics
 from shipid.simulation.truth import Truth, simulate_truth
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -148,7 +148,7 @@ def test_a_start_can_be_simulated() -> None:
     pair = [["hull.derivatives.Y_v|r|"], ["hull.derivatives.Y_r|v|"]]
     estimate = inverse_dynamics(SHIP, noisy(1, 0.1), LOG.runs, pair)
     assert np.abs(estimate.factors - 1).max() < 2
-    assert combinations(estimate.jacobian, estimate.paths)
+    assert collinear_sets(estimate.jacobian, estimate.paths)
 
 
 def test_order_of_groups_and_rows_of_other_runs_are_of_no_account() -> None:
@@ -190,7 +190,7 @@ class Bent(_Problem):
 def test_a_step_that_lowers_nothing_is_not_taken(slope: float) -> None:
     """The last of the halved steps was taken, whatever it did to the cost."""
     problem, centre = Bent(slope), np.array([0.51])
-    factors, _, settled = _solved(problem, centre, np.array([1.0]), linear=False)
+    factors, _, settled = _solve_weighted(problem, centre, np.array([1.0]), linear=False)
     before, after = (float(np.sum(problem.evaluate(one)[0] ** 2)) for one in (centre, factors))
     assert after <= before
     assert settled == (slope > 0)

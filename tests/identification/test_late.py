@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.data.dataset import Dataset
-from shipid.identification.late import CONSIDERABLE, between_rows, held_over_steps, late_commands
+from shipid.identification.late import CONSIDERABLE, held_over_steps, interpolate_commands, late_commands
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import variety
@@ -47,8 +47,8 @@ def test_at_the_rows_and_in_the_middle_between_them() -> None:
     rng, t = np.random.default_rng(1), np.array([0.0, 1.0, 2.5, 3.0])
     rows = {name: rng.normal(size=4) for name in vessel_dynamics(ship).commands}
     at_rows, later = (
-        between_rows(ship, {"t": t, **rows}, t),
-        between_rows(ship, {"t": t, **rows}, np.array([[1.74, 1.76]])),
+        interpolate_commands(ship, {"t": t, **rows}, t),
+        interpolate_commands(ship, {"t": t, **rows}, np.array([[1.74, 1.76]])),
     )
     for name, values in rows.items():
         np.testing.assert_array_equal(at_rows[name], values)

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.fit import evaluate
-from shipid.identification.late_fit import _earlier, late_fit, lateness
-from shipid.identification.residuals import build
+from shipid.identification.fit import evaluate_factors
+from shipid.identification.late_fit import _advance_commands, command_lateness, late_fit
+from shipid.identification.residuals import build_problem
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, statistics
+from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import Vessel
@@ -69,7 +69,7 @@ def fitted(log: Dataset, step: float, commands: str = "held", vessel: Vessel | N
 
 
 def sentence(solution: Solution, log: Dataset) -> str:
-    return late_fit(solution, log, statistics(LinearFit.of(solution)))
+    return late_fit(solution, log, fit_statistics(LinearFit.of(solution)))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -78,10 +78,10 @@ def test_orders_between_slow_rows_are_named_with_the_change_that_the_remedy_make
     log = log_of(seed, 0.05, 1.0)
     held, mended = fitted(log, 1.0), fitted(log, 0.5, "between")
     off, left = np.abs(held.factors - 1), np.abs(mended.factors - 1)
-    late = lateness(held, log)
+    late = command_lateness(held, log)
     assert late is not None
     place = FEW.index("hull.mmg.N_v")
-    noise = statistics(LinearFit.of(mended)).errors[place]
+    noise = fit_statistics(LinearFit.of(mended)).errors[place]
     assert left[place] < 0.4 * off[place] + noise
     assert late.changes[place] == pytest.approx(1 - held.factors[place], abs=0.5 * off[place])
     assert sentence(held, log).startswith("commands count from their row, on average 0.5 s late")
@@ -104,7 +104,7 @@ def test_sound_logs_are_not_blamed_where_huber_cuts_many_residuals(seed: int) ->
     declared = {name: 0.3 * deviation for name, deviation in NOISE.items()}
     solution = fitted(log, 1.0, loss="huber", weights=declared)
     assert max(solution.within.values()) < 0.6
-    late = lateness(solution, log)
+    late = command_lateness(solution, log)
     assert late is not None
     assert abs(late.rows) < 0.2
     assert late.explained < 0.01
@@ -129,7 +129,7 @@ def test_commands_that_the_log_has_late_or_early_are_named_with_what_that_does(s
         (late_by(0, log, orders), bare, "later", "the vessel lacks an actuator"),
     ):
         solution = fitted(given, 1.0, vessel=vessel)
-        found, late = sentence(solution, given), lateness(solution, given)
+        found, late = sentence(solution, given), command_lateness(solution, given)
         assert late is not None
         assert f"rows) {when} than in the log: that moves" in found
         assert cause in found
@@ -141,7 +141,7 @@ def test_commands_that_the_log_has_late_or_early_are_named_with_what_that_does(s
     between = log_of(seed, 0.05, 1.0)
     slow = late_by(3, between, between.frame["rudder.delta"])
     solution = fitted(slow, 0.5, "between")
-    seen = lateness(solution, slow)
+    seen = command_lateness(solution, slow)
     assert seen is not None
     assert seen.rows == pytest.approx(3, abs=0.4)
     assert "rows) earlier than in the log" in sentence(solution, slow)
@@ -154,10 +154,12 @@ def test_priors_that_pull_the_estimates_do_not_pull_the_delay() -> None:
     off = ferry().with_values({path: 0.8 * ferry().parameters[path] for path in FEW})
     how = {"parameters": FEW, "weights": NOISE, "horizon": 66, "step": 1.0, "start": "base"}
     solution = identify(off, log, log.runs, Identify(**how, prior=dict.fromkeys(FEW, width)))
-    shifted = evaluate(build(off, _earlier(log), solution.runs, solution.settings), solution.factors, solution.point).at
+    shifted = evaluate_factors(
+        build_problem(off, _advance_commands(log), solution.runs, solution.settings), solution.factors, solution.point
+    ).at
     change = (shifted.marginal()[0] - solution.residuals)[:, None]
     A = np.block([[solution.jacobian, change], [np.eye(len(FEW)) / width, np.zeros((len(FEW), 1))]])
     rows = np.linalg.lstsq(A, -np.append(solution.residuals, (solution.factors - 1) / width), rcond=None)[0][-1]
-    late = lateness(solution, log)
+    late = command_lateness(solution, log)
     assert late is not None
     assert late.rows == pytest.approx(rows, rel=1e-3)

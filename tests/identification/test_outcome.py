@@ -20,7 +20,7 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.identification import outcome
 from shipid.identification.contents import identification_content
 from shipid.identification.design import Candidate, Informed
-from shipid.identification.free_run import ALL, CHANNELS, MEASURED, free_runs
+from shipid.identification.free_run import ALL, CHANNELS, MEASURED, simulate_free_runs
 from shipid.identification.outcome import (
     AFTER,
     BEFORE,
@@ -31,10 +31,10 @@ from shipid.identification.outcome import (
     run_identification,
     write_patch,
 )
-from shipid.identification.residuals import build, predict
-from shipid.identification.settings import Identify, unknowns
+from shipid.identification.residuals import build_problem, predict_residuals
+from shipid.identification.settings import Identify, free_factors
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, statistics
+from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.report.identification import estimates
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
@@ -124,7 +124,7 @@ def test_it_tells_what_the_parts_tell(identified: Identified, log: Dataset) -> N
     alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
     assert identified.runs == alone.runs
     assert identified.held_out == ("M05",)
-    known = statistics(LinearFit.of(alone))
+    known = fit_statistics(LinearFit.of(alone))
     assert np.allclose(identified.estimates["factor"], alone.factors, rtol=1e-6)
     assert np.allclose(identified.estimates["factor_error"], known.errors, rtol=1e-4)
     for row in identified.estimates.to_dict("records"):
@@ -156,7 +156,7 @@ def test_measures_before_and_after_are_those_of_the_vessels(
     table = identified.manoeuvres
     assert set(table["manoeuvre"]) == {"zigzag 10/10", "zigzag 20/20", "turning 35"}
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    truth = outcome._manoeuvres({BEFORE: off(), AFTER: SHIP})
+    truth = outcome._compare_manoeuvres({BEFORE: off(), AFTER: SHIP})
     both = table[: len(truth)]
     assert list(both["measure"]) == list(truth["measure"])
     assert np.allclose(both["before"], truth["before"])
@@ -168,7 +168,7 @@ def test_measures_before_and_after_are_those_of_the_vessels(
 @pytest.mark.usefixtures("one_manoeuvre")
 def test_a_manoeuvre_that_cannot_be_is_a_note() -> None:
     without = Vessel({key: value for key, value in SHIP.document.items() if key != "particulars"}, SHIP.file)
-    table = outcome._manoeuvres({BEFORE: without, AFTER: SHIP})
+    table = outcome._compare_manoeuvres({BEFORE: without, AFTER: SHIP})
     assert table["before"].isna().all()
     assert np.isfinite(table["after"]).all()
     assert table["note"].str.contains("L_pp").all()
@@ -177,8 +177,8 @@ def test_a_manoeuvre_that_cannot_be_is_a_note() -> None:
 def test_manoeuvres_that_neither_vessel_performs_are_one_row_each() -> None:
     """A craft without an angle that steers has no zigzag: said once, not for every measure and both vessels."""
     craft = load_vessel("otter")
-    table = outcome._manoeuvres({BEFORE: craft, AFTER: craft})
-    assert list(table["manoeuvre"]) == [outcome._title(kind, angles) for kind, angles in outcome.TRIED]
+    table = outcome._compare_manoeuvres({BEFORE: craft, AFTER: craft})
+    assert list(table["manoeuvre"]) == [outcome._manoeuvre_title(kind, angles) for kind, angles in outcome.TRIED]
     assert (table["measure"] == "").all()
     assert table["note"].nunique() == 1
     assert not table["note"].str.contains("before").any()
@@ -229,8 +229,8 @@ def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: 
     again = load_vessel(write_patch(found, tmp_path / "patch.toml"))
     assert again.parameters == tanker.parameters | {odd: 4.4}
     assert again.document["unusual"] == [odd]
-    assert "on the same side" in outcome._odd(tanker.with_values({odd: 4.4}))[odd]
-    assert not outcome._odd(again)
+    assert "on the same side" in outcome._unusual_numbers(tanker.with_values({odd: 4.4}))[odd]
+    assert not outcome._unusual_numbers(again)
     assert "unusual" not in tomllib.loads(identified.patch(tmp_path / "usual.toml"))
 
 
@@ -288,9 +288,9 @@ def test_the_programme_is_ranked(identified: Identified) -> None:
 
 def test_free_runs_are_what_the_residuals_of_a_fit_see(log: Dataset) -> None:
     """The rollout of a free run and the predictions of a fit are the same numbers, up to what compilers round."""
-    runs = free_runs({BEFORE: off()}, log, ["M02", "M04"], settings(), 20.0)
-    fit = build(off(), log, ["M02", "M04"], settings(horizon=20))
-    at = predict(fit, np.ones(3), np.zeros((2, 0)))
+    runs = simulate_free_runs({BEFORE: off()}, log, ["M02", "M04"], settings(), 20.0)
+    fit = build_problem(off(), log, ["M02", "M04"], settings(horizon=20))
+    at = predict_residuals(fit, np.ones(3), np.zeros((2, 0)))
     rms = runs.errors[runs.errors["run"] == ALL].iloc[0]
     for name, width in NOISE.items():
         assert rms[name] == pytest.approx(np.sqrt(np.mean((width * at.r[at.signals == name]) ** 2)), rel=1e-6)
@@ -301,16 +301,16 @@ def test_free_runs_are_what_the_residuals_of_a_fit_see(log: Dataset) -> None:
 
 
 def test_free_runs_take_what_is_set_for_a_run(log: Dataset) -> None:
-    calm = free_runs({BEFORE: SHIP}, log, ["M01", "M02"], settings()).errors.set_index("run")["u"]
+    calm = simulate_free_runs({BEFORE: SHIP}, log, ["M01", "M02"], settings()).errors.set_index("run")["u"]
     windy = settings(runs={"M02": {"environment": {"V_w": 15.0}}})
-    errors = free_runs({BEFORE: SHIP}, log, ["M01", "M02"], windy).errors.set_index("run")["u"]
+    errors = simulate_free_runs({BEFORE: SHIP}, log, ["M01", "M02"], windy).errors.set_index("run")["u"]
     assert errors["M01"] == calm["M01"]
     assert errors["M02"] != calm["M02"]
 
 
 def test_a_free_run_that_diverges_is_no_number(log: Dataset) -> None:
     wild = SHIP.with_values({"hull.derivatives.X_u|u|": -100 * SHIP.parameters["hull.derivatives.X_u|u|"]})
-    runs = free_runs({BEFORE: SHIP, AFTER: wild}, log, ["M01"], settings())
+    runs = simulate_free_runs({BEFORE: SHIP, AFTER: wild}, log, ["M01"], settings())
     rows = runs.errors[runs.errors["run"] == ALL].set_index("model")
     assert rows.loc[AFTER, ["u", "v", "r", "position"]].isna().all()
     assert np.isfinite(rows["u"][BEFORE])
@@ -389,13 +389,13 @@ def test_a_fit_that_fails_is_its_sentence(log: Dataset, monkeypatch: pytest.Monk
 @pytest.mark.usefixtures("one_manoeuvre")
 def test_ctrl_c_is_ctrl_c_wherever_it_comes(log: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
     """Libraries turn an interrupt into other errors; here it comes while they are at work."""
-    real = outcome._measured
+    real = outcome._measure_manoeuvre
 
     def interrupted(*given: object) -> object:
         os.kill(os.getpid(), signal.SIGINT)
         return real(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(outcome, "_measured", interrupted)
+    monkeypatch.setattr(outcome, "_measure_manoeuvre", interrupted)
     with pytest.raises(KeyboardInterrupt):
         run_identification(off(), log, settings())
 
@@ -482,7 +482,7 @@ def test_a_profile_holds_its_factor_whatever_bounds_it_has(
     tried: list[tuple[float, float]] = []
 
     def fitted(vessel: Vessel, _data: Dataset, _runs: object, asked: Identify, **_: object) -> Solution:
-        limits = unknowns(vessel, asked)
+        limits = free_factors(vessel, asked)
         here = limits.paths.index(FEW[0])
         tried.append((float(limits.low[here]), float(limits.high[here])))
         return replace(solution, objective=solution.objective + 1e6)
@@ -541,7 +541,7 @@ def test_free_runs_that_are_worse_say_by_how_much_and_a_little_more_is_not_worse
     """Before, 0.3 % more error was worse, without a number."""
     before = {"u": 0.2, "v": 0.1, "r": 0.002, "position": 8.0}
     after = {**before, "v": v * before["v"], "position": position * before["position"]}
-    assert outcome._worse(pd.DataFrame([before, after], index=[BEFORE, AFTER])) == worse
+    assert outcome._worse_signals(pd.DataFrame([before, after], index=[BEFORE, AFTER])) == worse
 
 
 @pytest.mark.usefixtures("one_manoeuvre")
@@ -571,7 +571,7 @@ def test_whole_runs_are_advised_to_stable_ships_alone(
     horizon: float, rate: float, there: str, absent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The residuals are correlated: the log has an error that comes and goes."""
-    monkeypatch.setattr(outcome, "growth_in", lambda *_: rate)
+    monkeypatch.setattr(outcome, "yaw_growth_rate", lambda *_: rate)
     log = trials(SHIP, 3, 100)
     drift = np.sin(log.frame["t"].to_numpy() / 3)
     shaken = changed(log, **{name: log.frame[name] + size * drift for name, size in NOISE.items()})

@@ -10,10 +10,10 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
-from shipid.identification.residuals import Problem, build, predict
+from shipid.identification.residuals import Problem, build_problem, predict_residuals
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
-from shipid.identification.statistics import LinearFit, statistics
+from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.simulation.manoeuvre import Excitation
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import Vessel, load_vessel
@@ -82,7 +82,7 @@ def errors(settings: Identify, data: Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Factors, and their standard errors, of a fit that begins 20 % off."""
     solution = identify(tanker(), data, data.runs, settings, start=START)
     assert solution.status == "ok"
-    return solution.factors, statistics(LinearFit.of(solution)).errors
+    return solution.factors, fit_statistics(LinearFit.of(solution)).errors
 
 
 def test_measured_thrust_separates_the_propeller_from_the_resistance() -> None:
@@ -101,7 +101,7 @@ def test_intervals_of_resistance_and_propeller_cover_the_truth() -> None:
     for seed in range(40):
         data = trials(seed, steady=True)
         solution = identify(tanker(), data, data.runs, with_weights(SPEED, "propeller.thrust"), start=START)
-        judged = statistics(LinearFit.of(solution))
+        judged = fit_statistics(LinearFit.of(solution))
         inside += [(low <= 1 <= high) for low, high in zip(judged.low, judged.high, strict=True)]
     assert np.mean(inside) >= 0.85  # 34 of 40: below it once in 200 such tests
 
@@ -151,7 +151,7 @@ def problem(**more: object) -> Problem:
             **more,
         }
     )
-    return build(tanker(), trials(), trials().runs[:2], settings)
+    return build_problem(tanker(), trials(), trials().runs[:2], settings)
 
 
 @pytest.mark.parametrize(
@@ -166,23 +166,23 @@ def problem(**more: object) -> Problem:
 def test_derivatives_of_outputs_are_those_of_differences(more: dict[str, object]) -> None:
     one = problem(**more)
     factors, q = np.full(one.num_factors, 1.05), np.full((2, len(one.names)), 0.3)
-    found, h = predict(one, factors, q), 1e-6
+    found, h = predict_residuals(one, factors, q), 1e-6
     for j in range(one.num_factors):
-        high, low = (predict(one, factors + s * h * np.eye(len(factors))[j], q).r for s in (1, -1))
+        high, low = (predict_residuals(one, factors + s * h * np.eye(len(factors))[j], q).r for s in (1, -1))
         np.testing.assert_allclose(
             found.by_factor[:, j], (high - low) / (2 * h), atol=1e-4 * np.abs(found.by_factor).max()
         )
     for j in range(len(one.names)):
         step = np.zeros_like(q)
         step[:, j] = h
-        slope = (predict(one, factors, q + step).r - predict(one, factors, q - step).r) / (2 * h)
+        slope = (predict_residuals(one, factors, q + step).r - predict_residuals(one, factors, q - step).r) / (2 * h)
         np.testing.assert_allclose(found.by_nuisance[:, j], slope, atol=1e-4 * np.abs(slope).max())
 
 
 def test_residuals_of_outputs_are_those_of_the_simulated_ones() -> None:
     """At the true numbers, from true states, what is left is the noise of the instruments."""
     one = problem()
-    found = predict(one, np.ones(one.num_factors), np.zeros((2, 0)))
+    found = predict_residuals(one, np.ones(one.num_factors), np.zeros((2, 0)))
     for name in ("propeller.thrust", "propeller.torque", "rudder.normal_force"):
         settled = (found.signals == name) & (found.time > 4)  # a recorded shaft is taken for settled where a run begins
         assert np.std(found.r[settled]) == pytest.approx(1.0, abs=0.25)
@@ -191,13 +191,13 @@ def test_residuals_of_outputs_are_those_of_the_simulated_ones() -> None:
 def test_what_is_fitted_must_be_predicted_and_measured() -> None:
     data = trials()
     with pytest.raises(DocumentError, match=r"weights.port.thrust: .* predicts no port.thrust"):
-        build(tanker(), data, data.runs, SPEED.model_copy(update={"weights": {"port.thrust": 1.0}}))
+        build_problem(tanker(), data, data.runs, SPEED.model_copy(update={"weights": {"port.thrust": 1.0}}))
     with pytest.raises(DocumentError, match="K_Q"):
-        build(
+        build_problem(
             load_vessel("kvlcc2-l7"), data, data.runs, SPEED.model_copy(update={"weights": {"propeller.torque": 1.0}})
         )
     less = Dataset(pd.DataFrame(data.frame.drop(columns="propeller.thrust")), data.metadata)
     with pytest.raises(DataError, match=r"propeller.thrust: was not measured; .* propeller.torque"):
-        build(tanker(), less, less.runs, SPEED.model_copy(update={"weights": {"propeller.thrust": 1.0}}))
+        build_problem(tanker(), less, less.runs, SPEED.model_copy(update={"weights": {"propeller.thrust": 1.0}}))
     with pytest.raises(DocumentError, match=r"weights.thrust is no valid name: .*<component>.<signal>"):
         Identify(parameters=["hull.mmg.R_0"], weights={"thrust": 1.0})

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from shipid.identification.plausible import KINDS, NEAR, outside, verdict, within
+from shipid.identification.plausible import KINDS, NEAR, implausibility, implausible_paths, plausible_factors
 from shipid.vessel.load import Vessel, check_document, load_vessel
 
 
 def test_every_bundled_vessel_is_a_ship(bundled_vessel: Vessel) -> None:
-    assert [objection for path in bundled_vessel.parameters if (objection := verdict(bundled_vessel, path, {}))] == []
+    assert [
+        objection for path in bundled_vessel.parameters if (objection := implausibility(bundled_vessel, path, {}))
+    ] == []
 
 
 @pytest.mark.parametrize(
@@ -28,7 +30,7 @@ def test_every_bundled_vessel_is_a_ship(bundled_vessel: Vessel) -> None:
 )
 def test_what_no_ship_has_is_reported(path: str, factor: float, message: str) -> None:
     vessel = load_vessel("kvlcc2-l7")
-    sentence = verdict(vessel, path, {path: factor * vessel.parameters[path]})
+    sentence = implausibility(vessel, path, {path: factor * vessel.parameters[path]})
     assert message in sentence
     assert sentence.startswith(path)
     assert "\n" not in sentence
@@ -38,26 +40,26 @@ def test_what_no_ship_has_is_reported(path: str, factor: float, message: str) ->
 def test_a_signed_square_is_damping_however_it_is_written(path: str) -> None:
     """Before, ranges kept the sign of Y_|v|v and not that of Y_v|v|."""
     vessel = load_vessel("gunnerus-28.9")
-    assert within(vessel, path)[0] == pytest.approx(0, abs=1e-9)
-    assert "of ships below 0" in verdict(vessel, path, {path: -vessel.parameters[path]})
+    assert plausible_factors(vessel, path)[0] == pytest.approx(0, abs=1e-9)
+    assert "of ships below 0" in implausibility(vessel, path, {path: -vessel.parameters[path]})
 
 
 @pytest.mark.parametrize("path", ["hull.abkowitz.Y_v", "hull.abkowitz.N_r"])
 def test_a_damping_of_abkowitz_that_changes_its_sign_is_reported(path: str) -> None:
     """A fit of logs in a current made Y_v -0.145 times what it is, and no line said so."""
     vessel = load_vessel("mariner")
-    assert "of ships below 0" in verdict(vessel, path, {path: -0.145 * vessel.parameters[path]})
-    assert verdict(vessel, path, {path: 0.5 * vessel.parameters[path]}) == ""
+    assert "of ships below 0" in implausibility(vessel, path, {path: -0.145 * vessel.parameters[path]})
+    assert implausibility(vessel, path, {path: 0.5 * vessel.parameters[path]}) == ""
 
 
 def test_added_mass_is_judged_by_the_mass_that_was_fitted_too() -> None:
     vessel = load_vessel("kvlcc2-l7")
     heavier = {"inertia.m": 5 * vessel.parameters["inertia.m"]}
-    assert "added mass in sway" in verdict(vessel, "added_mass.Y_vdot", heavier)
+    assert "added mass in sway" in implausibility(vessel, "added_mass.Y_vdot", heavier)
 
 
 def test_what_has_no_range_is_not_judged() -> None:
-    assert verdict(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr", {"hull.mmg.Y_vvr": 1e6}) == ""
+    assert implausibility(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr", {"hull.mmg.Y_vvr": 1e6}) == ""
     assert all(kind.low < kind.high for kind in KINDS)
 
 
@@ -66,33 +68,33 @@ def test_what_has_no_range_is_not_judged() -> None:
 )
 def test_factors_within_the_range_have_no_complaint_and_those_beyond_have(path: str) -> None:
     vessel = load_vessel("kvlcc2-l7")
-    low, high = within(vessel, path)
+    low, high = plausible_factors(vessel, path)
     assert low < 1 < high
     for end, sense in ((low, -1), (high, 1)):
         if abs(end) < 1e3:
             inside, outside = ((end - sense * share) * vessel.parameters[path] for share in (1e-3, -1e-3))
-            assert "no ship" not in verdict(vessel, path, {path: inside})
-            assert "no ship" in verdict(vessel, path, {path: outside})
+            assert "no ship" not in implausibility(vessel, path, {path: inside})
+            assert "no ship" in implausibility(vessel, path, {path: outside})
 
 
 @pytest.mark.parametrize("path", ["added_mass.Y_vdot", "thruster.rudder.ell_R"])
 def test_only_what_is_near_an_end_is_said_to_be_at_it(path: str) -> None:
     """Numbers whose ratio to those of ships is linear."""
     vessel = load_vessel("kvlcc2-l7")
-    low, high = within(vessel, path)
+    low, high = plausible_factors(vessel, path)
     for share, there in ((NEAR / 2, True), (2 * NEAR, False), (0.5, False)):
         for place in (share, 1 - share):
             value = (low + place * (high - low)) * vessel.parameters[path]
-            assert ("at the end of the range" in verdict(vessel, path, {path: value})) == there
+            assert ("at the end of the range" in implausibility(vessel, path, {path: value})) == there
 
 
 def test_what_has_no_range_or_no_length_to_judge_by_has_no_bounds() -> None:
-    assert within(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr") == (-float("inf"), float("inf"))
+    assert plausible_factors(load_vessel("kvlcc2-l7"), "hull.mmg.Y_vvr") == (-float("inf"), float("inf"))
     document = load_vessel("gunnerus-28.9").document
     sizes = {name: size for name, size in document["particulars"].items() if name != "L_pp"}
     without = check_document({**document, "particulars": sizes}, "without L_pp")
-    assert within(without, "inertia.I_z") == (-float("inf"), float("inf"))
-    assert verdict(without, "inertia.I_z", {"inertia.I_z": 1.0}) == ""
+    assert plausible_factors(without, "inertia.I_z") == (-float("inf"), float("inf"))
+    assert implausibility(without, "inertia.I_z", {"inertia.I_z": 1.0}) == ""
 
 
 @pytest.mark.parametrize("factor", [0.02, 0.3, 0.9, 1.1, 3.0, 30.0, -1.0])
@@ -100,4 +102,4 @@ def test_outside_is_what_the_verdict_says_no_ship_has(factor: float) -> None:
     ship = load_vessel("kvlcc2-l7")
     for path, base in ship.parameters.items():
         values = {path: factor * base}
-        assert (outside(ship, values) == {path}) == ("no ship has that" in verdict(ship, path, values))
+        assert (implausible_paths(ship, values) == {path}) == ("no ship has that" in implausibility(ship, path, values))

@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 from scipy.optimize import least_squares
 
-from shipid.identification.profile import profile, variance_ratio
-from shipid.identification.statistics import statistics
+from shipid.identification.profile import profile_factor, variance_ratio
+from shipid.identification.statistics import fit_statistics
 from tests.identification.linear import design, fitted, labels, noise
 
 Residuals = Callable[[np.ndarray], np.ndarray]
@@ -33,13 +33,13 @@ def test_a_linear_profile_is_the_interval(phi: float) -> None:
     jacobian, (clusters, signals) = design(12, 40, 3), labels(12, 40)
     error = noise(np.random.default_rng(0), 12, 40, phi)
     fit = fitted(jacobian, error, clusters, signals)
-    estimates = statistics(fit)
+    estimates = fit_statistics(fit)
 
     def residuals(factors: np.ndarray) -> np.ndarray:
         return fit.residuals - jacobian @ (factors - fit.factors)
 
     freedom = estimates.covariances[estimates.chosen].freedom[0]
-    curve = profile(
+    curve = profile_factor(
         "p0", fit.factors, 0, float(fit.residuals @ fit.residuals), refit_of(residuals),
         half_width=estimates.high[0] - fit.factors[0], freedom=freedom, ratio=variance_ratio(estimates, "p0"),
     )  # fmt: skip
@@ -53,7 +53,7 @@ def test_a_linear_profile_is_the_interval(phi: float) -> None:
 def test_a_skewed_profile_has_the_ends_of_its_formula() -> None:
     """One residual (exp(f) - 1) / w: the interval is ln(1 -+ t w), which the standard error does not know."""
     t, w = stats.t.ppf(0.975, 30), 0.3
-    curve = profile(
+    curve = profile_factor(
         "a", np.zeros(1), 0, 0.0, refit_of(lambda f: (np.exp(f) - 1) / w), half_width=t * w, freedom=30.0
     )  # fmt: skip
     assert curve.low == pytest.approx(np.log(1 - t * w), rel=0.05)
@@ -64,18 +64,20 @@ def test_a_skewed_profile_has_the_ends_of_its_formula() -> None:
         objective, factors = refit_of(lambda f: (np.exp(f) - 1) / w)(path, value, start)
         return objective + 700.0, factors
 
-    other = profile("a", np.zeros(1), 0, 700.0, worse, half_width=t * w, freedom=30.0)  # what no factor explains
+    other = profile_factor("a", np.zeros(1), 0, 700.0, worse, half_width=t * w, freedom=30.0)  # what no factor explains
     assert (other.low, other.high) == pytest.approx((curve.low, curve.high))
     assert other.sentence == curve.sentence
 
 
 def test_open_ends_are_reported() -> None:
     """Residual (1 - exp(-5 f)) / 0.4 never exceeds 2.5 on the right but for t = 2; here 0.6: open upwards."""
-    one = profile("a", np.zeros(1), 0, 0.0, refit_of(lambda f: (1 - np.exp(-5 * f)) / 0.6), half_width=0.2, freedom=100)
+    one = profile_factor(
+        "a", np.zeros(1), 0, 0.0, refit_of(lambda f: (1 - np.exp(-5 * f)) / 0.6), half_width=0.2, freedom=100
+    )
     assert np.isfinite(one.low)
     assert np.isinf(one.high)
     assert "upwards it is open" in one.sentence
-    flat = profile("a", np.ones(1), 0, 0.0, refit_of(lambda f: 0 * f), half_width=np.inf, freedom=100)
+    flat = profile_factor("a", np.ones(1), 0, 0.0, refit_of(lambda f: 0 * f), half_width=np.inf, freedom=100)
     assert (flat.low, flat.high) == (-np.inf, np.inf)
     assert "not identified" in flat.sentence
 
@@ -87,7 +89,7 @@ def test_a_bound_is_never_passed() -> None:
         asked.append(value)
         return 0.0, start
 
-    curve = profile("a", np.ones(1), 0, 0.0, refit, half_width=0.1, freedom=100, bounds=(0.5, 1.2))
+    curve = profile_factor("a", np.ones(1), 0, 0.0, refit, half_width=0.1, freedom=100, bounds=(0.5, 1.2))
     assert min(asked) == 0.5
     assert max(asked) == 1.2
     assert np.isinf(curve.high)
@@ -98,7 +100,7 @@ def test_a_bound_is_never_passed() -> None:
 def test_a_factor_far_from_its_base_value_has_the_interval_of_its_estimate(size: float) -> None:
     """1.6 % at a thousand times the base value are sixteen base values; both sides were called open."""
     half = 0.016 * abs(size) * stats.norm.ppf(0.975)
-    curve = profile(
+    curve = profile_factor(
         "a", np.array([size]), 0, 0.0, refit_of(lambda f: (f - size) / (0.016 * abs(size))), half_width=half,
         freedom=1e6, unit="its scale",
     )  # fmt: skip
@@ -107,7 +109,7 @@ def test_a_factor_far_from_its_base_value_has_the_interval_of_its_estimate(size:
 
 
 def test_a_better_fit_on_the_way_is_reported() -> None:
-    curve = profile("a", np.ones(1), 0, 6.25, refit_of(lambda f: (f - 1.5) / 0.2), half_width=0.4, freedom=1e6)
+    curve = profile_factor("a", np.ones(1), 0, 6.25, refit_of(lambda f: (f - 1.5) / 0.2), half_width=0.4, freedom=1e6)
     assert "the fit had not converged" in curve.sentence
     assert curve.high == pytest.approx(1.5 + 1.96 * 0.2, abs=0.03)
 
@@ -119,7 +121,7 @@ def test_a_refit_that_fails_counts_as_outside() -> None:
         asked.append(value)
         return (np.inf if value > 1.3 else ((value - 1) / 0.5) ** 2), start
 
-    curve = profile("a", np.ones(1), 0, 0.0, refit, half_width=1.0, freedom=1e6)
+    curve = profile_factor("a", np.ones(1), 0, 0.0, refit, half_width=1.0, freedom=1e6)
     assert curve.high == pytest.approx(1.3, abs=0.02)
     assert curve.failed > 0
     assert "failed" in curve.sentence

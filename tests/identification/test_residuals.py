@@ -8,7 +8,7 @@ import pytest
 from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.identification import residuals
-from shipid.identification.residuals import Predictions, build, predict
+from shipid.identification.residuals import Predictions, build_problem, predict_residuals
 from shipid.identification.settings import NUISANCES, Identify
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -35,12 +35,12 @@ def test_slopes_are_differences(name: str) -> None:
     slow = 0.2 if name == "kvlcc2-l7" else 1.0
     dataset = trials(vessel, runs=2, steps=12, step=slow)
     wanted = Identify(parameters=CASES[name], weights=EVERY, nuisance=nuisance, horizon=0, step=slow)
-    fit = build(vessel, dataset, dataset.runs, wanted)
+    fit = build_problem(vessel, dataset, dataset.runs, wanted)
     rng = np.random.default_rng(3)
     factors = fit.unknown.centre + rng.normal(0, 0.02, fit.num_factors)
     nuisances = np.abs(rng.normal(0.5, 0.1, (2, len(fit.names))))
     away = rng.normal(0, 1e-2, (2, len(fit.model.node)))
-    here = predict(fit, factors, nuisances, away)
+    here = predict_residuals(fit, factors, nuisances, away)
     columns = [(here.by_factor[:, i], _moved(i), 0) for i in range(fit.num_factors)]
     columns += [(here.by_nuisance[:, i], 0, _moved(i)) for i in range(len(fit.names))]
     for slope, by_factor, by_nuisance in columns:
@@ -52,11 +52,11 @@ def test_slopes_are_differences(name: str) -> None:
                 factor[by_factor - 1] += sense * 1e-5
             if by_nuisance:
                 other[:, by_nuisance - 1] += sense * 1e-5
-            ends.append(predict(fit, factor, other, away).r)
+            ends.append(predict_residuals(fit, factor, other, away).r)
         difference = (ends[0] - ends[1]) / 2e-5
         assert np.abs(slope - difference).max() < 1e-5 * (1 + np.abs(difference).max())
     for i, unit in enumerate(np.eye(len(fit.node_scale))):
-        ends = [predict(fit, factors, nuisances, away + sense * 1e-5 * unit).r for sense in (1, -1)]
+        ends = [predict_residuals(fit, factors, nuisances, away + sense * 1e-5 * unit).r for sense in (1, -1)]
         difference = (ends[0] - ends[1]) / 2e-5
         assert np.abs(here.by_start[:, i] - difference).max() < 1e-5 * (1 + np.abs(difference).max())
 
@@ -69,8 +69,8 @@ def test_residuals_are_those_of_the_rollout() -> None:
     vessel = load_vessel("gunnerus-28.9")
     dataset = trials(vessel, runs=2, steps=30)
     other = vessel.with_values({"hull.derivatives.N_ur": 1.3 * vessel.parameters["hull.derivatives.N_ur"]})
-    fit = build(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
-    prediction = predict(fit, np.array([1.3]), np.zeros((2, 0)))
+    fit = build_problem(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
+    prediction = predict_residuals(fit, np.array([1.3]), np.zeros((2, 0)))
     for number, (_, rows) in enumerate(dataset.frame.groupby("run")):
         start = {name: rows[name].to_numpy()[:1] for name in vessel_dynamics(other).state}
         commands = {name: rows[name].to_numpy()[:-1, None] for name in dataset.commands}
@@ -87,7 +87,7 @@ def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     vessel = variety()[name]
     dataset = trials(vessel, runs=3, steps=20)
     wanted = Identify(parameters=["hull.derivatives.N_u*"], nuisance=["current", "latency", "lever_arm"], horizon=0)
-    fit = build(vessel, dataset, dataset.runs, wanted)
+    fit = build_problem(vessel, dataset, dataset.runs, wanted)
     evaluated = []
     for least in (np.inf, 0.0):
         monkeypatch.setattr(residuals, "COMPILE_FROM", least)
@@ -104,10 +104,10 @@ def test_engines_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_no_signal_feels_is_left_out() -> None:
     vessel = load_vessel("gunnerus-28.9")
     dataset = trials(vessel, runs=1, steps=10)
-    plain = build(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.*"], horizon=0))
+    plain = build_problem(vessel, dataset, dataset.runs, Identify(parameters=["hull.derivatives.*"], horizon=0))
     assert plain.model.node == ("u", "v", "r")
     wanted = Identify(parameters=["hull.derivatives.*"], horizon=0, weights={"position": 1.0})
-    assert build(vessel, dataset, dataset.runs, wanted).model.node == ("north", "east", "psi", "u", "v", "r")
+    assert build_problem(vessel, dataset, dataset.runs, wanted).model.node == ("north", "east", "psi", "u", "v", "r")
 
 
 @pytest.mark.parametrize("name", NUISANCES)
@@ -116,8 +116,8 @@ def test_every_nuisance_may_stand_alone(name: str) -> None:
     vessel = load_vessel("gunnerus-28.9")
     dataset = trials(vessel, runs=2, steps=24)
     wanted = Identify(parameters=["hull.derivatives.N_ur"], weights=EVERY, nuisance=[name], horizon=0)
-    fit = build(vessel, dataset, dataset.runs, wanted)
-    here = predict(fit, np.ones(1), np.full((2, len(fit.names)), 0.1))
+    fit = build_problem(vessel, dataset, dataset.runs, wanted)
+    here = predict_residuals(fit, np.ones(1), np.full((2, len(fit.names)), 0.1))
     assert here.by_nuisance.shape == (len(here.r), len(fit.names))
     assert np.isfinite(here.by_nuisance).all()
     assert len(fit.names) == len(NUISANCES[name])

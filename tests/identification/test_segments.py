@@ -7,7 +7,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.residuals import Predictions, build, predict
+from shipid.identification.residuals import Predictions, build_problem, predict_residuals
 from shipid.identification.segments import cut_segments, too_short
 from shipid.identification.settings import Identify
 from shipid.vessel.dynamics import vessel_dynamics
@@ -76,14 +76,14 @@ def test_a_break_parts_a_run() -> None:
 def test_what_was_not_measured_does_not_count() -> None:
     frame = DATA.frame[DATA.frame["t"] % 5 == 0].reset_index(drop=True)
     sparse = Dataset(frame, DATA.metadata)
-    fit = build(SHIP, sparse, sparse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
-    at = predict(fit, np.ones(1), np.zeros((2, 0)))
+    fit = build_problem(SHIP, sparse, sparse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
+    at = predict_residuals(fit, np.ones(1), np.zeros((2, 0)))
     assert sorted(set(at.time)) == [5.0 * i for i in range(1, 11)]
     assert np.abs(at.r).max() < 1e-9  # orders are held over ten steps: nothing is lost with the rows
 
 
 def test_a_shorter_segment_is_padded_without_weight() -> None:
-    fit = build(SHIP, DATA, DATA.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=30))
+    fit = build_problem(SHIP, DATA, DATA.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=30))
     side_by_side = Predictions(fit)
     assert side_by_side.weight.shape == (4, 30, 3)  # 30 + 20 steps, twice
     assert (side_by_side.weight > 0).all(axis=2).sum(axis=1).tolist() == [30, 20] * 2
@@ -97,8 +97,8 @@ def test_wind_that_was_logged_is_felt() -> None:
     wanted = Identify(parameters=["hull.derivatives.N_ur"], horizon=0)
     worst = []
     for data in (logged, windy):
-        fit = build(SHIP, data, data.runs, wanted)
-        worst.append(np.abs(predict(fit, np.ones(1), np.zeros((2, 0))).r).max())
+        fit = build_problem(SHIP, data, data.runs, wanted)
+        worst.append(np.abs(predict_residuals(fit, np.ones(1), np.zeros((2, 0))).r).max())
     assert worst[0] < 1e-9
     assert worst[1] > 0.1
 
@@ -116,7 +116,7 @@ def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
     data = trials(vessel, runs=2, steps=40)
     assert np.abs(data.frame["phi"]).max() > 0.02
     wanted = Identify(parameters=["hull.derivatives.N_uv"], horizon=10, weights={"u": 1e-3, "v": 1e-3, "r": 1e-4})
-    at = predict(build(vessel, data, data.runs, wanted), np.ones(1), np.zeros((2, 0)))
+    at = predict_residuals(build_problem(vessel, data, data.runs, wanted), np.ones(1), np.zeros((2, 0)))
     assert np.abs(at.r).max() < 1e-6
 
 
@@ -131,8 +131,8 @@ def test_actuators_lag_as_in_each_run() -> None:
     worst = []
     for runs in ({}, overrides):
         for free in ("hull.derivatives.N_uv", "thruster.starboard.actuator.*"):  # memory as given, and carried
-            fit = build(vessel, data, data.runs, Identify(parameters=[free], horizon=7, runs=runs))
-            worst.append(np.abs(predict(fit, np.ones(fit.num_factors), np.zeros((2, 0))).r).max())
+            fit = build_problem(vessel, data, data.runs, Identify(parameters=[free], horizon=7, runs=runs))
+            worst.append(np.abs(predict_residuals(fit, np.ones(fit.num_factors), np.zeros((2, 0))).r).max())
     assert min(worst[:2]) > 1e-3
     assert max(worst[2:]) < 1e-6
 
@@ -153,8 +153,8 @@ def test_every_segment_begins_at_a_row_and_no_row_is_left_out() -> None:
     coarse = Dataset(DATA.frame[DATA.frame["t"] % 5 == 0], DATA.metadata)
     segments = cut_segments(SHIP, coarse, coarse.runs[:1], 1.0, 12.0)
     assert [(one.t[0], one.t[-1]) for one in segments] == [(0, 12), (10, 22), (20, 32), (30, 42), (40, 50)]
-    fit = build(SHIP, coarse, coarse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=12))
-    at = predict(fit, np.ones(1), np.zeros((2, 0)))
+    fit = build_problem(SHIP, coarse, coarse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=12))
+    at = predict_residuals(fit, np.ones(1), np.zeros((2, 0)))
     assert sorted(set(at.time)) == [5.0 * i for i in range(1, 11)]
     assert np.abs(at.r).max() < 1e-9
     with pytest.raises(DataError, match=r"rows of 'M01' are so far apart that no prediction of 4 s holds two of them"):

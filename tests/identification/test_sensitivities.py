@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.engine.rollout import rollout
-from shipid.identification.sensitivities import Layout, is_thrust, run_machine, variation
+from shipid.identification.sensitivities import FitLayout, build_variation, is_thrust, run_machine
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.drawn_ships import drawn_ship
@@ -17,8 +17,8 @@ SHIP = load_vessel("gunnerus-28.9")
 PATH = "hull.derivatives.N_ur"
 
 
-def layout(signals: tuple[str, ...] = ("u", "v", "r"), nuisances: tuple[str, ...] = (), step: float = 0.5) -> Layout:
-    return Layout(vessel_dynamics(SHIP), ((PATH,),), signals, nuisances, (), 0, step, "rk4")
+def layout(signals: tuple[str, ...] = ("u", "v", "r"), nuisances: tuple[str, ...] = (), step: float = 0.5) -> FitLayout:
+    return FitLayout(vessel_dynamics(SHIP), ((PATH,),), signals, nuisances, (), 0, step, "rk4")
 
 
 def test_thrust_coefficients_are_recognised() -> None:
@@ -53,22 +53,22 @@ def thrusters(ship: Vessel) -> list[tuple[str, dict[str, Any]]]:
 
 
 def test_only_states_that_influence_a_signal_are_integrated() -> None:
-    assert set(variation(layout()).states) == {"u", "v", "r"}
-    assert {"north", "east", "psi"} <= set(variation(layout((*layout().signals, "north", "east"))).states)
+    assert set(build_variation(layout()).states) == {"u", "v", "r"}
+    assert {"north", "east", "psi"} <= set(build_variation(layout((*layout().signals, "north", "east"))).states)
 
 
 def test_nuisances_that_change_the_motion_are_columns() -> None:
     one = layout(nuisances=("current_north", "current_east", "heading_bias"))
     assert one.num_moving == 2
-    assert variation(one).num_columns == len(variation(one).node) + 1 + 2
+    assert build_variation(one).num_columns == len(build_variation(one).node) + 1 + 2
 
 
 def test_one_layout_is_built_once() -> None:
-    assert variation(layout()) is variation(layout())
+    assert build_variation(layout()) is build_variation(layout())
 
 
 def test_outputs_of_a_step_are_those_of_a_rollout() -> None:
-    model, nx = variation(layout()), 3
+    model, nx = build_variation(layout()), 3
     start = {"north": 0.0, "east": 0.0, "psi": 0.3, "u": 4.0, "v": 0.1, "r": 0.01}
     commands = {name: 2.0 if name.endswith(".n") else 0.2 for name in model.layout.model.commands}
     factor, base = 1.1, np.array(list(SHIP.parameters.values()))

@@ -16,8 +16,8 @@ from shipid.identification.settings import (
     UNITS_OF_NUISANCES,
     WIDE,
     Identify,
-    overrides,
-    unknowns,
+    free_factors,
+    resolve_overrides,
 )
 from shipid.vessel.load import load_vessel
 
@@ -56,7 +56,7 @@ def test_nuisances_have_default_widths_in_a_fixed_order() -> None:
 
 
 def test_factors_have_the_bounds_of_the_vessel_checks() -> None:
-    free = unknowns(SHIP, Identify(parameters=[MASS, YAW], prior={YAW: 0.5}))
+    free = free_factors(SHIP, Identify(parameters=[MASS, YAW], prior={YAW: 0.5}))
     place = {path: i for i, path in enumerate(free.paths)}
     assert free.low[place[MASS]] == POSITIVE
     assert free.low[place[YAW]] == -math.inf
@@ -68,16 +68,16 @@ def test_factors_have_the_bounds_of_the_vessel_checks() -> None:
 
 def test_tied_paths_share_one_factor() -> None:
     pair = ["thruster.port.k_T", "thruster.starboard.k_T"]
-    free = unknowns(SHIP, Identify(parameters=pair, together=[pair]))
+    free = free_factors(SHIP, Identify(parameters=pair, together=[pair]))
     assert free.groups == (tuple(pair),)
     with pytest.raises(DocumentError, match="is in two groups"):
-        unknowns(SHIP, Identify(parameters=pair, together=[pair, pair[:1]]))
+        free_factors(SHIP, Identify(parameters=pair, together=[pair, pair[:1]]))
 
 
 def test_zeros_of_a_table_that_is_tied_by_a_pattern_stay_zero() -> None:
     """A side force at 0 and 180 deg is 0: one factor on the table leaves them, and was refused."""
     table, zeros = "wind.C_Y.*", {"wind.C_Y.0", "wind.C_Y.18"}
-    free = unknowns(SHIP, Identify(parameters=[table], together=[[table]], prior={table: 0.3}))
+    free = free_factors(SHIP, Identify(parameters=[table], together=[[table]], prior={table: 0.3}))
     (group,) = free.groups
     assert set(group) == {path for path in SHIP.parameters if path.startswith("wind.C_Y.")} - zeros
     assert free.prior.tolist() == [0.3]
@@ -87,28 +87,28 @@ def test_zeros_of_a_table_that_is_tied_by_a_pattern_stay_zero() -> None:
     assert twice["wind.C_Y.9"] == 2 * SHIP.parameters["wind.C_Y.9"]
     named = ["wind.C_Y.0", "wind.C_Y.9"]
     with pytest.raises(DocumentError, match="some are 0 and some are not"):
-        unknowns(SHIP, Identify(parameters=named, together=[named]))
+        free_factors(SHIP, Identify(parameters=named, together=[named]))
 
 
 def test_overrides_belong_to_one_run() -> None:
     settings = Identify(parameters=[YAW], runs={"a": {"inertia": {"m": 7e5}, "environment": {"V_w": 3}}})
-    assert overrides(settings, ["a", "b"], SHIP, ["V_w"]) == {"a": {MASS: 7e5, "environment.V_w": 3.0}, "b": {}}
+    assert resolve_overrides(settings, ["a", "b"], SHIP, ["V_w"]) == {"a": {MASS: 7e5, "environment.V_w": 3.0}, "b": {}}
     with pytest.raises(DocumentError, match="does not begin with the name of a run"):
-        overrides(settings, ["b"], SHIP, ["V_w"])
+        resolve_overrides(settings, ["b"], SHIP, ["V_w"])
     with pytest.raises(DocumentError, match="cannot be set for a run"):
-        overrides(settings, ["a"], SHIP, [])
+        resolve_overrides(settings, ["a"], SHIP, [])
 
 
 def test_a_pattern_selects_no_constant_and_no_dimension() -> None:
     """Density and length are known; a fit to them and to their coefficient has no answer."""
     otter = load_vessel("otter")
-    paths = unknowns(otter, Identify(parameters=["hull.*"])).paths
+    paths = free_factors(otter, Identify(parameters=["hull.*"])).paths
     assert "hull.crossflow.C_d" in paths
     assert not {f"hull.crossflow.{name}" for name in ("rho", "T", "x_aft", "x_fwd")} & set(paths)
     some = Identify(parameters=["hull.*", "hull.crossflow.T"], fixed=["hull.crossflow.x_*"])
-    assert set(unknowns(otter, some).paths) - set(paths) == {"hull.crossflow.T"}
+    assert set(free_factors(otter, some).paths) - set(paths) == {"hull.crossflow.T"}
     with pytest.raises(DocumentError, match=r"dimensions and constants only.*hull\.crossflow\.x_aft"):
-        unknowns(otter, Identify(parameters=["hull.crossflow.x_*"]))
+        free_factors(otter, Identify(parameters=["hull.crossflow.x_*"]))
 
 
 @pytest.mark.parametrize("path", ["hull.derivatives.N_v", "inertia.z_G"])
@@ -117,17 +117,17 @@ def test_what_the_vessel_leaves_out_is_free_once_it_is_written(path: str, tmp_pa
     block, _, name = path.rpartition(".")
     settings = Identify(parameters=[path], scale={path: 1.0})
     with pytest.raises(DocumentError, match=re.escape(f"write it in [{block}] of a file that extends her")):
-        unknowns(SHIP, settings)
+        free_factors(SHIP, settings)
     file = tmp_path / "ship.toml"
     file.write_text(f'extends = "gunnerus-28.9"\n[{block}]\n{name} = 0.0\n')
-    assert unknowns(load_vessel(file), settings).paths == (path,)
+    assert free_factors(load_vessel(file), settings).paths == (path,)
     with pytest.raises(DocumentError) as error:
-        unknowns(SHIP, Identify(parameters=["hull.derivatives.Q_q"]))
+        free_factors(SHIP, Identify(parameters=["hull.derivatives.Q_q"]))
     assert "extends" not in str(error.value)
 
 
 def test_the_time_constant_of_an_actuator_is_no_draught() -> None:
-    paths = unknowns(load_vessel("otter"), Identify(parameters=["thruster.*.actuator.*"])).paths
+    paths = free_factors(load_vessel("otter"), Identify(parameters=["thruster.*.actuator.*"])).paths
     assert {"thruster.port.actuator.n.T", "thruster.starboard.actuator.n.T"} <= set(paths)
 
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.identification.sides import HEADS, _ratio, by_group, shown, uneven
+from shipid.identification.sides import HEADS, _ratio_of_sums, by_group, side_table_rows, uneven_side_warnings
 from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 
@@ -42,7 +42,7 @@ def test_the_error_of_the_turning_is_that_of_each_side() -> None:
     assert of["r"]["port"] == pytest.approx(0.14 * 0.03)
     assert {"helm about 10 deg", "helm about 30 deg"} <= set(groups["group"])
     assert sum(name.startswith("speed ") for name in groups["group"]) == 3
-    assert all(len(row) == len(HEADS) for row in shown(groups))
+    assert all(len(row) == len(HEADS) for row in side_table_rows(groups))
 
 
 @pytest.mark.parametrize("after", [0.0, 0.3, 0.999])
@@ -69,7 +69,7 @@ def test_an_error_that_comes_with_a_helm_is_found_at_that_helm_alone(seed: int, 
 
 
 def test_one_side_that_is_worse_is_reported_with_what_to_run_next() -> None:
-    sentences = uneven(compared(port=-0.14, starboard=0.02))
+    sentences = uneven_side_warnings(compared(port=-0.14, starboard=0.02))
     assert sentences[0].startswith("the error of the turning is -14 % to port and +2 % to starboard")
     assert any(
         "at helm about 30 deg" in sentence and "to run next: turns to both sides" in sentence for sentence in sentences
@@ -78,7 +78,7 @@ def test_one_side_that_is_worse_is_reported_with_what_to_run_next() -> None:
 
 @pytest.mark.parametrize(("port", "starboard", "noise"), [(-0.14, -0.13, 0.0), (0.01, 0.0, 0.003), (0.0, 0.0, 0.02)])
 def test_sides_alike_and_noise_are_not_reported(port: float, starboard: float, noise: float) -> None:
-    assert uneven(compared(port, starboard, noise)) == ()
+    assert uneven_side_warnings(compared(port, starboard, noise)) == ()
 
 
 def alike(seed: int) -> pd.DataFrame:
@@ -103,7 +103,7 @@ def alike(seed: int) -> pd.DataFrame:
 
 def test_of_many_groups_alike_few_are_reported_to_differ() -> None:
     """Eight groups are tested twice each: where nothing differs, not one in ten logs may say that something does."""
-    reports = [uneven(alike(seed)) for seed in range(30)]
+    reports = [uneven_side_warnings(alike(seed)) for seed in range(30)]
     assert sum(map(bool, reports)) <= 3
 
 
@@ -112,18 +112,18 @@ def test_the_error_of_the_yaw_rate_is_tested_too() -> None:
     row = {"group": "all", "rows": 200, "u": 0.1, "v": 0.1, "turning": 0.0, "error": 0.001, "pieces": 10}
     sides = {"starboard": {"r": 0.01, "r_error": 0.004}, "port": {"r": 0.025, "r_error": 0.009}}
     groups = pd.DataFrame([{**row, "side": side, **error} for side, error in sides.items()])
-    assert uneven(groups) == ()
+    assert uneven_side_warnings(groups) == ()
     sure = groups.assign(r_error=[0.001, 0.002])
-    assert uneven(sure) == ("the error of the yaw rate is 2.5 times as large to port as to starboard",)
+    assert uneven_side_warnings(sure) == ("the error of the yaw rate is 2.5 times as large to port as to starboard",)
 
 
 @pytest.mark.parametrize("count", [2, 3, 8])
 def test_the_error_of_a_ratio_of_equal_pieces_is_that_of_a_mean(count: int) -> None:
     values = np.random.default_rng(count).normal(1.0, 0.3, count)
-    share, error = _ratio(3.0 * values, np.full(count, 3.0))
+    share, error = _ratio_of_sums(3.0 * values, np.full(count, 3.0))
     assert share == pytest.approx(values.mean())
     assert error == pytest.approx(values.std(ddof=1) / count**0.5)
-    assert np.isinf(_ratio(values[:1], np.ones(1))[1])
+    assert np.isinf(_ratio_of_sums(values[:1], np.ones(1))[1])
 
 
 def test_a_craft_without_an_angle_has_no_groups_by_helm() -> None:
@@ -139,8 +139,8 @@ def test_a_craft_without_an_angle_has_no_groups_by_helm() -> None:
 def test_a_turning_that_one_piece_shows_has_no_error_beside_it() -> None:
     groups = compared(port=-0.14, starboard=0.02)
     lone = groups.assign(error=np.inf)
-    assert {row[-1] for row in shown(lone) if row[1] == "port"} == {"-14.0"}
-    assert not any("inf" in cell for row in shown(lone) for cell in row)
+    assert {row[-1] for row in side_table_rows(lone) if row[1] == "port"} == {"-14.0"}
+    assert not any("inf" in cell for row in side_table_rows(lone) for cell in row)
 
 
 def test_instants_between_far_rows_are_none() -> None:

@@ -14,12 +14,12 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
-from shipid.identification.fit import evaluate, origin, search
+from shipid.identification.fit import evaluate_factors, initial_point, search_factors
 from shipid.identification.late_fit import late_fit
-from shipid.identification.residuals import build, predict
-from shipid.identification.settings import POSITIVE, Identify, unknowns
-from shipid.identification.solve import LEAST, Solution, _discounted, _weakest, identify
-from shipid.identification.statistics import LinearFit, statistics
+from shipid.identification.residuals import build_problem, predict_residuals
+from shipid.identification.settings import POSITIVE, Identify, free_factors
+from shipid.identification.solve import LEAST, Solution, _discount_residuals, _weakest_factor, identify
+from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.dynamics import vessel_dynamics
@@ -60,8 +60,8 @@ def test_noise_free_data_give_back_every_force(method: str, horizon: float) -> N
     assert solution.objective < 1e-6 * solution.objective_start
     for path in solution.paths:  # 32 numbers, all of them seen by these manoeuvres
         assert solution.values[path] == pytest.approx(SHIP.parameters[path], rel=1e-4)
-    fit = build(solution.identified, dataset, dataset.runs, settings(method=method))
-    free = predict(fit, np.ones(len(FEW)), np.zeros((6, 0)))
+    fit = build_problem(solution.identified, dataset, dataset.runs, settings(method=method))
+    free = predict_residuals(fit, np.ones(len(FEW)), np.zeros((6, 0)))
     for name, width, extent in zip(("u", "v", "r"), fit.deviations, ranges(dataset), strict=True):
         assert np.sqrt(np.mean((free.r[free.signals == name] * width) ** 2)) < 1e-4 * extent
 
@@ -70,9 +70,9 @@ def test_noise_free_data_give_back_every_force(method: str, horizon: float) -> N
 def test_it_converges_from_where_whole_runs_diverge(seed: int) -> None:
     dataset, rng = trials(SHIP, runs=2, steps=30), np.random.default_rng(seed)
     wanted = settings(parameters=["hull.derivatives.*"])
-    fit = build(SHIP, dataset, dataset.runs, wanted)
+    fit = build_problem(SHIP, dataset, dataset.runs, wanted)
     begin = {path: 1 + 3 * rng.uniform(-1, 1) for path in fit.unknown.paths}
-    assert search(fit, np.array(list(begin.values())), origin(fit)).status == "diverged"
+    assert search_factors(fit, np.array(list(begin.values())), initial_point(fit)).status == "diverged"
     solution = identify(SHIP, dataset, dataset.runs, wanted, start=begin)
     assert not np.isfinite(solution.objective_start)
     assert solution.status == "ok"
@@ -150,7 +150,7 @@ def test_commands_that_change_between_rows(name: str, n_rpm: float, duration: fl
         wrong, right = (float(np.abs(one.factors[0] - 1)) for one in (held, between))
         assert wrong > 0.04
         assert right < wrong / 2
-        judged = statistics(LinearFit.of(held))
+        judged = fit_statistics(LinearFit.of(held))
         found = late_fit(held, sparse, judged)
         assert found.startswith(f"commands count from their row, on average {interval / 2:g} s late")
         assert ("--set step=" in found) == (gear and name == "container-175")
@@ -341,9 +341,9 @@ def test_the_nuisances_are_projected_out() -> None:
     solution = identify(SHIP, noisy, noisy.runs, wanted)
     assert (solution.residuals**2).sum() == pytest.approx(solution.objective, rel=1e-6)
     assert np.abs(solution.jacobian.T @ solution.residuals).max() < 1e-3 * np.abs(solution.jacobian).sum(axis=0).max()
-    fit = build(SHIP, noisy, noisy.runs, wanted)
+    fit = build_problem(SHIP, noisy, noisy.runs, wanted)
     assert solution.point is not None
-    whole = predict(fit, solution.factors, solution.point.nuisances, solution.point.away)
+    whole = predict_residuals(fit, solution.factors, solution.point.nuisances, solution.point.away)
     columns = [whole.by_factor]
     for run in range(3):
         mine = (whole.run == run)[:, None]
@@ -400,7 +400,7 @@ def test_standard_errors_of_huber_are_those_of_its_theory(sharper: float, bad: f
     density /= density.sum()
     variance = (density @ np.clip(x, -k, k) ** 2) / density[np.abs(x) <= k].sum() ** 2
     plain = np.sqrt(np.diag(np.linalg.inv(known.jacobian.T @ known.jacobian)))
-    errors = statistics(LinearFit.of(solution)).covariances["fisher"].errors
+    errors = fit_statistics(LinearFit.of(solution)).covariances["fisher"].errors
     np.testing.assert_allclose(errors / plain, np.sqrt(variance), rtol=0.15)
 
 
@@ -414,7 +414,7 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     assert [path for path, there in zip(solution.paths, solution.held, strict=True) if there] == [
         path for path in solution.paths if path in solution.dropped
     ]
-    judged = statistics(LinearFit.of(solution))
+    judged = fit_statistics(LinearFit.of(solution))
     assert np.isinf(judged.errors[solution.held]).all()
     assert "dropped" in judged.sentences[solution.paths.index(solution.dropped[0])]
     for path in solution.dropped:
@@ -422,7 +422,7 @@ def test_what_the_data_do_not_support_is_dropped() -> None:
     assert solution.factors[3] == pytest.approx(2.0, rel=0.02)
     coarse = replace(solution, residuals=solution.residuals / 10, jacobian=solution.jacobian / 10)
     verdicts = [
-        [_weakest(one, 10.0**power, solution.centre) for power in range(5)] for one in (solution, coarse)
+        [_weakest_factor(one, 10.0**power, solution.centre) for power in range(5)] for one in (solution, coarse)
     ]  # whatever deviations are declared
     assert verdicts[0] == verdicts[1]
     assert {None, 3} == set(verdicts[0])
@@ -440,7 +440,7 @@ def test_what_cannot_be_seen_is_dropped_first() -> None:
 
 def test_a_mass_stays_above_zero() -> None:
     wanted = settings(parameters=["inertia.m", "inertia.I_z", "added_mass.X_udot", "thruster.*.D_p", *FEW])
-    free = unknowns(SHIP, wanted)
+    free = free_factors(SHIP, wanted)
     low = dict(zip(free.paths, free.low, strict=True))
     for path in ("inertia.m", "inertia.I_z", "thruster.port.D_p"):
         assert low[path] == POSITIVE
@@ -630,7 +630,7 @@ def test_discounted_residuals_let_priors_count() -> None:
 def test_residuals_that_vanish_are_discounted_to_a_limit() -> None:
     data = trials(SHIP, runs=1, steps=20)
     solution = identify(SHIP, data, data.runs, settings(nuisance=["initial_state"]))
-    again, _ = _discounted(replace(solution, residuals=np.zeros_like(solution.residuals)))
+    again, _ = _discount_residuals(replace(solution, residuals=np.zeros_like(solution.residuals)))
     assert all(again.weights[name] == pytest.approx(LEAST * solution.settings.weights[name]) for name in again.weights)
     assert again.widths["initial_state"] == pytest.approx(solution.settings.widths["initial_state"] / LEAST)
 
@@ -649,7 +649,7 @@ def test_intervals_of_discounted_fits_cover(noise: str) -> None:
             data = changed(clean, **{n: clean.frame[n] + rng.normal(0, w, len(clean.frame)) for n, w in widths.items()})
         base = SHIP.with_values({path: SHIP.parameters[path] / rng.normal(1, 0.1) for path in FEW})
         solution = identify(base, data, data.runs, settings(prior={"hull.*": 0.1}, discount=True))
-        known, true = statistics(LinearFit.of(solution)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
+        known, true = fit_statistics(LinearFit.of(solution)), [SHIP.parameters[p] / base.parameters[p] for p in FEW]
         held += ((known.low <= true) & (true <= known.high)).tolist()
     assert np.mean(held) > 0.90 - 2 * (0.9 * 0.1 / len(held)) ** 0.5
 
@@ -661,8 +661,8 @@ def test_a_segment_without_a_measured_row_changes_nothing() -> None:
     gap = Dataset(data.frame[~(first & (t > 20.5) & (t < 40.5))], data.metadata)
     wanted = settings(nuisance=["initial_state"], horizon=20, method="rk4")
     base = SHIP.with_values({path: 0.85 * SHIP.parameters[path] for path in FEW})
-    task = build(base, gap, gap.runs, wanted)
-    counts = np.bincount(predict(task, np.ones(4), np.zeros((2, 0))).segment, minlength=len(task.segments))
+    task = build_problem(base, gap, gap.runs, wanted)
+    counts = np.bincount(predict_residuals(task, np.ones(4), np.zeros((2, 0))).segment, minlength=len(task.segments))
     assert 0 in counts[:-1]
     solution = identify(base, gap, gap.runs, wanted)
     assert solution.status == "ok"
@@ -677,8 +677,10 @@ def test_a_segment_without_a_measured_row_changes_nothing() -> None:
 def test_both_objectives_of_a_discounted_fit_have_the_same_weights() -> None:
     data = walked(trials(SHIP, runs=4, steps=60), 0)
     fit = identify(degraded(SHIP), data, data.runs, settings(discount=True))
-    start = build(degraded(SHIP), data, data.runs, fit.settings)
-    assert fit.objective_start == pytest.approx(evaluate(start, start.unknown.centre, origin(start)).objective)
+    start = build_problem(degraded(SHIP), data, data.runs, fit.settings)
+    assert fit.objective_start == pytest.approx(
+        evaluate_factors(start, start.unknown.centre, initial_point(start)).objective
+    )
     at_end = identify(fit.identified, data, data.runs, fit.settings.model_copy(update={"discount": False}))
     assert fit.objective <= fit.objective_start
     assert at_end.objective_start == pytest.approx(fit.objective, rel=1e-3)

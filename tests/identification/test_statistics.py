@@ -15,14 +15,14 @@ from shipid.identification.statistics import (
     LinearFit,
     _Basis,
     _Drift,
-    _drift,
+    _signal_drift,
     against_priors,
-    autocorrelation,
-    blocks,
-    decided_alone,
+    block_clusters,
+    factors_of_single_runs,
+    fit_statistics,
     open_to_drift,
-    statistics,
-    whiteness,
+    pooled_autocorrelation,
+    residual_whiteness,
 )
 from tests.identification.linear import LEVELS, SIGNALS, design, fitted, labels, noise
 
@@ -42,22 +42,22 @@ def test_intervals_cover_in_white_and_coloured_noise(runs: int, samples: int, ph
     jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
     rng, covered = np.random.default_rng(1), np.zeros(COUNT)
     for _ in range(200):
-        estimates = statistics(fitted(jacobian, noise(rng, runs, samples, phi), clusters, signals))
+        estimates = fit_statistics(fitted(jacobian, noise(rng, runs, samples, phi), clusters, signals))
         covered += (estimates.low <= 1) & (estimates.high >= 1)
     assert 0.92 <= covered.mean() / 200 <= 0.98
     assert covered.min() / 200 >= 0.90
 
 
 def test_which_form_is_chosen() -> None:
-    assert statistics(one(0.0)).chosen == "fisher"
-    coloured = statistics(one(0.8))
+    assert fit_statistics(one(0.0)).chosen == "fisher"
+    coloured = fit_statistics(one(0.8))
     assert coloured.chosen == "sandwich"
     assert not coloured.covariances["fisher"].trusted
     few = fitted(
         design(3, 400, 3), noise(np.random.default_rng(0), 3, 400, 0.8), *labels(3, 400)
     )  # 3 runs are under 4 degrees of freedom
-    assert statistics(few).chosen == "blocks"
-    assert "mislead" in statistics(few).covariances["sandwich"].reason
+    assert fit_statistics(few).chosen == "blocks"
+    assert "mislead" in fit_statistics(few).covariances["sandwich"].reason
 
 
 def test_residuals_of_a_signal_that_says_nothing_of_a_factor_do_not_count() -> None:
@@ -68,9 +68,9 @@ def test_residuals_of_a_signal_that_says_nothing_of_a_factor_do_not_count() -> N
     )
     jacobian = np.where(of_r[:, None], 0.0, JACOBIAN)
     fit = fitted(jacobian, error, CLUSTERS, NAMES)
-    assert not whiteness(fit)["r"].white
-    assert statistics(fit).chosen == "fisher"
-    assert statistics(fitted(JACOBIAN, error, CLUSTERS, NAMES)).chosen == "sandwich"
+    assert not residual_whiteness(fit)["r"].white
+    assert fit_statistics(fit).chosen == "fisher"
+    assert fit_statistics(fitted(JACOBIAN, error, CLUSTERS, NAMES)).chosen == "sandwich"
 
 
 @pytest.mark.parametrize("runs", [1, 3])
@@ -79,8 +79,8 @@ def test_factors_that_priors_alone_hold_lend_no_trust(runs: int) -> None:
     error, names = noise(np.random.default_rng(0), runs, 400, 0.8), labels(runs, 400)
     jacobian = design(runs, 400, 7) * np.where(np.arange(7) < 3, 1.0, 1e-6)
     widths = np.full(7, 0.3)
-    few = statistics(fitted(jacobian[:, :3], error, *names, prior_widths=widths[:3]))
-    more = statistics(fitted(jacobian, error, *names, prior_widths=widths))
+    few = fit_statistics(fitted(jacobian[:, :3], error, *names, prior_widths=widths[:3]))
+    more = fit_statistics(fitted(jacobian, error, *names, prior_widths=widths))
     assert not more.covariances["sandwich"].trusted
     assert more.chosen == few.chosen
     np.testing.assert_allclose(more.high[:3] - more.low[:3], few.high - few.low, rtol=1e-3)
@@ -89,7 +89,7 @@ def test_factors_that_priors_alone_hold_lend_no_trust(runs: int) -> None:
 
 def test_runs_too_short_for_stretches_are_not_called_stretches() -> None:
     """Residuals that remember 30 samples would need stretches of 300; the runs have 100 and stay whole."""
-    short = statistics(fitted(design(3, 100, 3), noise(np.random.default_rng(0), 3, 100, 0.95), *labels(3, 100)))
+    short = fit_statistics(fitted(design(3, 100, 3), noise(np.random.default_rng(0), 3, 100, 0.95), *labels(3, 100)))
     assert short.covariances["blocks"].reason.startswith("3 runs, too short to be cut into stretches of ")
     np.testing.assert_allclose(short.covariances["blocks"].matrix, short.covariances["sandwich"].matrix)
 
@@ -99,12 +99,12 @@ def test_fisher_is_the_textbook_formula() -> None:
     rows = np.array(NAMES) == "u"
     jacobian = JACOBIAN[rows]
     fit = fitted(jacobian, np.random.default_rng(0).normal(size=len(jacobian)), CLUSTERS[rows], ("u",) * rows.sum())
-    estimates = statistics(fit).covariances["fisher"]
+    estimates = fit_statistics(fit).covariances["fisher"]
     freedom = len(jacobian) - COUNT
     expected = fit.residuals @ fit.residuals / freedom * np.linalg.inv(jacobian.T @ jacobian)
     np.testing.assert_allclose(estimates.matrix, expected, rtol=1e-9)
     np.testing.assert_allclose(estimates.freedom, freedom)
-    np.testing.assert_allclose(statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
+    np.testing.assert_allclose(fit_statistics(fit).information, np.linalg.inv(expected), rtol=1e-9)
 
 
 @pytest.mark.parametrize("runs", [1, 3])
@@ -113,7 +113,7 @@ def test_fisher_counts_the_correlation_of_the_residuals(runs: int) -> None:
     jacobian, error = design(runs, 120, 3)[:: len(SIGNALS)], noise(np.random.default_rng(0), runs, 120, 0.8)
     clusters = np.repeat(np.arange(runs), 120)
     fit = fitted(jacobian, error[: len(jacobian)], clusters, ("u",) * len(jacobian))
-    estimates = statistics(fit)
+    estimates = fit_statistics(fit)
     memory = estimates.whiteness["u"].memory
     apart = np.abs(np.subtract.outer(np.arange(len(jacobian)), np.arange(len(jacobian))))
     correlation = ((memory - 1) / (memory + 1)) ** apart * (clusters[:, None] == clusters)
@@ -129,7 +129,7 @@ def test_fisher_counts_the_correlation_of_the_residuals(runs: int) -> None:
 def test_sandwich_is_the_jackknife_over_runs() -> None:
     """In the ratios of its entries: the estimates are computed again without each run."""
     fit = one(0.8)
-    matrix = statistics(fit).covariances["sandwich"].matrix
+    matrix = fit_statistics(fit).covariances["sandwich"].matrix
     again = [
         np.linalg.lstsq(fit.jacobian[fit.clusters != run], -fit.residuals[fit.clusters != run], rcond=None)[0]
         for run in range(RUNS)
@@ -142,7 +142,7 @@ def test_sandwich_is_the_jackknife_over_runs() -> None:
 def test_sandwich_of_a_mean_over_equal_clusters() -> None:
     """G equal clusters, one mean: the variance of the means of the clusters (divisor G - 1) over G."""
     clusters, error = np.repeat(np.arange(7), 12), np.random.default_rng(0).normal(size=84)
-    form = statistics(fitted(np.ones((84, 1)), error, clusters, ("u",) * 84)).covariances["sandwich"]
+    form = fit_statistics(fitted(np.ones((84, 1)), error, clusters, ("u",) * 84)).covariances["sandwich"]
     expected = error.reshape(7, 12).mean(axis=1).var(ddof=1) / 7
     assert form.matrix[0, 0] == pytest.approx(expected)
 
@@ -159,7 +159,7 @@ def test_intervals_cover_what_one_run_alone_excites(among: tuple[int, ...]) -> N
     jacobian[np.ix_(clusters == 0, among)] = 0.0
     rng, covered = np.random.default_rng(1), np.zeros(COUNT)
     for _ in range(60):
-        estimates = statistics(fitted(jacobian, noise(rng, runs, samples, 0.8), clusters, signals))
+        estimates = fit_statistics(fitted(jacobian, noise(rng, runs, samples, 0.8), clusters, signals))
         assert estimates.chosen == "sandwich"
         covered += (estimates.low <= 1) & (estimates.high >= 1)
     assert covered.min() / 60 >= 0.9
@@ -170,14 +170,14 @@ def test_a_run_that_alone_decides_a_factor_is_named() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[CLUSTERS != 4, 2] *= 0.01
     fit = fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.8), CLUSTERS, NAMES, runs=names)
-    assert decided_alone(fit) == {fit.paths[2]: "M05"}
-    assert decided_alone(one(0.8, runs=names)) == {}
+    assert factors_of_single_runs(fit) == {fit.paths[2]: "M05"}
+    assert factors_of_single_runs(one(0.8, runs=names)) == {}
     few = labels(1, 400)
-    assert decided_alone(fitted(design(1, 400, 3), np.ones(1200), *few, runs=("M01",))) == {}
+    assert factors_of_single_runs(fitted(design(1, 400, 3), np.ones(1200), *few, runs=("M01",))) == {}
 
 
 def test_a_single_run_is_not_trusted() -> None:
-    single = statistics(fitted(design(1, 400, 3), noise(np.random.default_rng(0), 1, 400, 0.99), *labels(1, 400)))
+    single = fit_statistics(fitted(design(1, 400, 3), noise(np.random.default_rng(0), 1, 400, 0.99), *labels(1, 400)))
     assert not single.covariances["sandwich"].trusted
     assert np.isfinite(single.covariances["sandwich"].matrix).all()
 
@@ -186,21 +186,21 @@ def test_freedom_of_a_mean_over_equal_clusters() -> None:
     """G equal clusters, one mean: Satterthwaite gives G - 1."""
     clusters = np.repeat(np.arange(7), 12)
     fit = fitted(np.ones((84, 1)), np.random.default_rng(0).normal(size=84), clusters, ("u",) * 84)
-    assert statistics(fit).covariances["sandwich"].freedom[0] == pytest.approx(6)
+    assert fit_statistics(fit).covariances["sandwich"].freedom[0] == pytest.approx(6)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_scaling_a_parameter_scales_its_interval(phi: float) -> None:
     fit, scale = one(phi), np.array([1e-6, 1.0, 1e3, 1e6, 0.1, 7.0])
     scaled = replace(fit, jacobian=fit.jacobian / scale, factors=fit.factors * scale)
-    np.testing.assert_allclose(statistics(scaled).errors, statistics(fit).errors * scale, rtol=1e-6)
-    np.testing.assert_allclose(statistics(scaled).correlations, statistics(fit).correlations, atol=1e-9)
+    np.testing.assert_allclose(fit_statistics(scaled).errors, fit_statistics(fit).errors * scale, rtol=1e-6)
+    np.testing.assert_allclose(fit_statistics(scaled).correlations, fit_statistics(fit).correlations, atol=1e-9)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
     fit, rng = one(phi), np.random.default_rng(5)
-    estimates = statistics(fit)
+    estimates = fit_statistics(fit)
     rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
     columns = rng.permutation(COUNT)
     moved = LinearFit(
@@ -211,28 +211,28 @@ def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
         fit.clusters[rows],
         tuple(fit.signals[k] for k in rows),
     )
-    np.testing.assert_allclose(statistics(moved).errors, estimates.errors[columns], rtol=1e-8)
-    assert [statistics(moved).sentences[k] for k in range(COUNT)] == [estimates.sentences[j] for j in columns]
+    np.testing.assert_allclose(fit_statistics(moved).errors, estimates.errors[columns], rtol=1e-8)
+    assert [fit_statistics(moved).sentences[k] for k in range(COUNT)] == [estimates.sentences[j] for j in columns]
 
 
 def test_declared_levels_that_are_wrong_do_no_harm() -> None:
     """All residuals and sensitivities over ten times the standard deviation: the same intervals."""
     fit = one(0.0)
     other = replace(fit, residuals=fit.residuals / 10, jacobian=fit.jacobian / 10)
-    np.testing.assert_allclose(statistics(other).errors, statistics(fit).errors, rtol=1e-9)
+    np.testing.assert_allclose(fit_statistics(other).errors, fit_statistics(fit).errors, rtol=1e-9)
 
 
 def test_levels_and_memory_are_measured() -> None:
     """An AR(1) of 0.8 has an integrated correlation time of (1 + 0.8) / (1 - 0.8) = 9 samples."""
-    colours = statistics(one(0.0)).whiteness
+    colours = fit_statistics(one(0.0)).whiteness
     assert {name: round(colours[name].level, 1) for name in SIGNALS} == {"u": 1.3, "v": 0.6, "r": 1.0}
     assert all(colour.white for colour in colours.values())
-    coloured = statistics(one(0.8)).whiteness
+    coloured = fit_statistics(one(0.8)).whiteness
     assert np.mean([colour.memory for colour in coloured.values()]) == pytest.approx(9, rel=0.25)
     assert not any(colour.white for colour in coloured.values())
     fit = one(0.8)
     of_u = np.array(fit.signals) == "u"
-    rho = autocorrelation([fit.residuals[of_u & (fit.clusters == run)] for run in np.unique(fit.clusters)])
+    rho = pooled_autocorrelation([fit.residuals[of_u & (fit.clusters == run)] for run in np.unique(fit.clusters)])
     pairs = [rho[k] + rho[k + 1] for k in range(1, len(rho) - 1, 2)]
     until = next(k for k, pair in enumerate(pairs) if pair <= 0)
     assert coloured["u"].memory == pytest.approx(1 + 2 * sum(pairs[:until]))
@@ -254,7 +254,7 @@ def test_whiteness_is_that_of_ljung_and_box_and_of_means_over_quarters() -> None
     fit = LinearFit(("p",), np.ones(1), np.concatenate(errors), np.ones((97, 1)), clusters, ("u",) * 97)
     drifts = sum(float(part.sum() ** 2 / len(part) / np.mean(e**2)) for e in errors for part in np.array_split(e, 4))
     both = stats.chi2.sf(expected, freedom), stats.chi2.sf(drifts, 8)
-    assert whiteness(fit)["u"].probability == pytest.approx(min(2 * min(both), 1.0))
+    assert residual_whiteness(fit)["u"].probability == pytest.approx(min(2 * min(both), 1.0))
 
 
 @pytest.mark.parametrize(("share", "least", "most"), [(0.0, 0.0, 0.08), (0.04, 0.5, 1.0), (0.1, 0.9, 1.0)])
@@ -266,7 +266,7 @@ def test_a_slow_drift_in_noise_is_seen(share: float, least: float, most: float) 
         slow = noise(rng, 6, 100, 0.98).reshape(6, 3, 100)[:, 2].ravel()
         error = np.sqrt(1 - share) * rng.normal(size=600) + np.sqrt(share) * slow
         fit = LinearFit(("p",), np.ones(1), error, np.ones((600, 1)), clusters, signals)
-        found += not whiteness(fit)["u"].white
+        found += not residual_whiteness(fit)["u"].white
     assert least <= found / 100 <= most
 
 
@@ -287,7 +287,7 @@ def begun(error: np.ndarray, jacobian: np.ndarray = SLOW, runs: int = 1) -> Line
 
 
 def drifts(fit: LinearFit) -> _Drift:
-    return _drift(fit, [np.flatnonzero(fit.clusters == run) for run in np.unique(fit.clusters)], _Basis.of(fit))
+    return _signal_drift(fit, [np.flatnonzero(fit.clusters == run) for run in np.unique(fit.clusters)], _Basis.of(fit))
 
 
 @pytest.mark.parametrize("prior", [np.inf, 0.2])
@@ -332,7 +332,7 @@ def test_a_drift_that_one_run_does_not_show_names_the_factors_that_it_moves() ->
     rng, passed, covered, open_ = np.random.default_rng(0), 0, np.zeros(5), np.zeros(5)
     for _ in range(300):
         drift = noise(rng, 1, 600, 0.99)[400:600] / LEVELS["u"]
-        judged = statistics(begun(rng.normal(size=200) + 0.4 * drift))
+        judged = fit_statistics(begun(rng.normal(size=200) + 0.4 * drift))
         if judged.chosen == "fisher" and judged.covariances["fisher"].trusted:
             passed += 1
             named = open_to_drift(judged)
@@ -347,7 +347,7 @@ def test_a_drift_that_one_run_does_not_show_names_the_factors_that_it_moves() ->
 
 def test_ten_runs_show_a_drift_that_would_matter() -> None:
     rng = np.random.default_rng(0)
-    few, more = (statistics(begun(rng.normal(size=200 * runs), runs=runs)) for runs in (2, 10))
+    few, more = (fit_statistics(begun(rng.normal(size=200 * runs), runs=runs)) for runs in (2, 10))
     assert open_to_drift(few)["p0"] > 1.3
     assert not open_to_drift(more)
 
@@ -356,7 +356,7 @@ def test_autocorrelation_is_the_mean_product_of_all_pairs() -> None:
     """Over runs of different lengths; runs of few rows or without errors count for nothing."""
     rng = np.random.default_rng(4)
     runs = [rng.normal(size=count).cumsum() for count in (30, 50)]
-    rho = autocorrelation([runs[0], np.ones(3), np.zeros(40), runs[1]])
+    rho = pooled_autocorrelation([runs[0], np.ones(3), np.zeros(40), runs[1]])
     products = [[run[i] * run[i + lag] for run in runs for i in range(len(run) - lag)] for lag in range(50)]
     np.testing.assert_allclose(rho, [np.mean(each) / np.mean(products[0]) for each in products], rtol=1e-9)
 
@@ -367,27 +367,27 @@ def test_a_run_without_errors_is_no_sign_of_colour() -> None:
     exact = LinearFit(
         ("p",), np.ones(1), np.append(errors, np.zeros(20)), np.ones((80, 1)), np.repeat([0, 1], [60, 20]), ("u",) * 80
     )
-    assert whiteness(exact)["u"].probability == whiteness(fit)["u"].probability
-    assert whiteness(exact)["u"].memory == pytest.approx(whiteness(fit)["u"].memory)
+    assert residual_whiteness(exact)["u"].probability == residual_whiteness(fit)["u"].probability
+    assert residual_whiteness(exact)["u"].memory == pytest.approx(residual_whiteness(fit)["u"].memory)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_correlated_residuals_are_worth_fewer(phi: float) -> None:
-    for colour in statistics(one(phi)).whiteness.values():
+    for colour in fit_statistics(one(phi)).whiteness.values():
         assert colour.effective * colour.memory == pytest.approx(colour.samples)
         assert colour.effective <= colour.samples
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_without_priors_an_interval_is_that_of_the_data_alone(phi: float) -> None:
-    estimates = statistics(one(phi))
+    estimates = fit_statistics(one(phi))
     np.testing.assert_allclose(estimates.alone, (estimates.high - estimates.low) / 2, rtol=1e-9)
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: float) -> None:
     widths = 1e-5 * np.arange(1, COUNT + 1)
-    estimates = statistics(one(phi, prior_widths=widths))
+    estimates = fit_statistics(one(phi, prior_widths=widths))
     assert {"fisher", "sandwich"} <= set(estimates.covariances)
     for form in estimates.covariances.values():
         np.testing.assert_allclose(form.errors, widths, rtol=1e-3)
@@ -397,16 +397,16 @@ def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: flo
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_what_the_data_alone_say_is_not_changed_by_priors(phi: float, width: float) -> None:
     """Correlated residuals widen it as without priors: tight priors hid them, and factors were called identified."""
-    without = statistics(one(phi))
+    without = fit_statistics(one(phi))
     widths = np.where(np.arange(COUNT) < 4, width, np.inf)
-    np.testing.assert_allclose(statistics(one(phi, prior_widths=widths)).alone, without.alone, rtol=1e-6)
+    np.testing.assert_allclose(fit_statistics(one(phi, prior_widths=widths)).alone, without.alone, rtol=1e-6)
 
 
 def test_a_pair_that_acts_as_one_is_named() -> None:
     """p1 has 2 x the effect of p0, but for 1e-6: neither is identified, their combination is named, others are."""
     jacobian = JACOBIAN.copy()
     jacobian[:, 1] = 2 * jacobian[:, 0] + 1e-6 * jacobian[:, 1]
-    estimates = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    estimates = fit_statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
     assert estimates.identifiable.tolist() == [False, False, True, True, True, True]
     assert "only p0 and p1 together; +10 % of p0 with -5 % of p1 has no effect" in estimates.sentences[0]
 
@@ -414,7 +414,7 @@ def test_a_pair_that_acts_as_one_is_named() -> None:
 def test_what_has_no_effect_is_named() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[:, 2] = 0
-    estimates = statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
+    estimates = fit_statistics(fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), CLUSTERS, NAMES))
     assert np.isinf(estimates.high[2])
     assert not estimates.identifiable[2]
     assert estimates.identifiable.sum() == COUNT - 1
@@ -427,7 +427,7 @@ def test_a_wide_interval_has_its_reason(size: float, why: str) -> None:
     jacobian = np.linalg.qr(np.random.default_rng(3).normal(size=(3000, 3)))[0] * 10
     jacobian[:, 1] = size * (np.cos(np.radians(8)) * jacobian[:, 0] + np.sin(np.radians(8)) * jacobian[:, 1])
     error = np.random.default_rng(0).normal(size=3000)
-    estimates = statistics(fitted(jacobian, error, np.repeat(np.arange(6), 500), ("u",) * 3000))
+    estimates = fit_statistics(fitted(jacobian, error, np.repeat(np.arange(6), 500), ("u",) * 3000))
     assert not estimates.combinations
     assert estimates.identifiable[2]
     assert estimates.sentences[1].endswith(f"% of its base value, {why}")
@@ -437,7 +437,7 @@ def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
     jacobian = JACOBIAN.copy()
     jacobian[:, 2] *= 1e-4
     error, widths = noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0), np.full(COUNT, 0.2)
-    estimates = statistics(fitted(jacobian, error, CLUSTERS, NAMES, prior_widths=widths))
+    estimates = fit_statistics(fitted(jacobian, error, CLUSTERS, NAMES, prior_widths=widths))
     assert estimates.errors[2] == pytest.approx(0.2, rel=1e-3)
     assert not estimates.identifiable[2]
     assert estimates.alone[2] > 10
@@ -446,30 +446,30 @@ def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
 
 def test_what_ends_at_a_bound_has_no_interval_and_harms_no_other() -> None:
     bound = np.array([False, True, False, False, False, False])
-    estimates = statistics(one(at_bound=bound))
+    estimates = fit_statistics(one(at_bound=bound))
     assert np.isinf(estimates.high[1])
     assert "bound" in estimates.sentences[1]
     without = replace(
         one(), **{"paths": tuple("abcde"), "factors": np.ones(5), "jacobian": np.delete(one().jacobian, 1, axis=1)}
     )
-    np.testing.assert_allclose(estimates.errors[~bound], statistics(without).errors, rtol=1e-9)
+    np.testing.assert_allclose(estimates.errors[~bound], fit_statistics(without).errors, rtol=1e-9)
 
 
 def test_what_is_held_counts_as_known() -> None:
     """Held or dropped factors have no interval and do not widen those of others."""
     held = np.array([False, True, False, True, False, False])
-    estimates = statistics(one(held=held, dropped=("p3",)))
+    estimates = fit_statistics(one(held=held, dropped=("p3",)))
     assert np.isinf(estimates.high[held]).all()
     assert not estimates.identifiable[held].any()
     assert "p1 was held at " in estimates.sentences[1]
     assert "p3 was dropped" in estimates.sentences[3]
     without = replace(one(), **{"paths": tuple("abcd"), "factors": np.ones(4), "jacobian": one().jacobian[:, ~held]})
-    np.testing.assert_allclose(estimates.errors[~held], statistics(without).errors, rtol=1e-9)
+    np.testing.assert_allclose(estimates.errors[~held], fit_statistics(without).errors, rtol=1e-9)
 
 
 def test_nothing_free_is_nothing_known() -> None:
     fit = one(at_bound=np.arange(COUNT) < 2, held=np.arange(COUNT) >= 2)
-    estimates = statistics(fit)
+    estimates = fit_statistics(fit)
     assert np.isinf(estimates.errors).all()
     assert (estimates.low, estimates.high) == (pytest.approx(-np.inf), pytest.approx(np.inf))
     assert not estimates.identifiable.any()
@@ -487,14 +487,14 @@ def test_nuisances_cost_degrees_of_freedom() -> None:
 
     jacobian = centred(design(RUNS, 8, 3))
     fit = fitted(jacobian, centred(error[:, None])[:, 0], *labels(RUNS, 8), spent=np.full(len(error), 1 / 8))
-    levels = {name: colour.level for name, colour in statistics(fit).whiteness.items()}
-    plain = {name: colour.level for name, colour in statistics(replace(fit, spent=None)).whiteness.items()}
+    levels = {name: colour.level for name, colour in fit_statistics(fit).whiteness.items()}
+    plain = {name: colour.level for name, colour in fit_statistics(replace(fit, spent=None)).whiteness.items()}
     assert levels["u"] == pytest.approx(1.3, abs=0.15)
     assert levels["u"] / plain["u"] == pytest.approx(np.sqrt(8 / 7), rel=0.01)
 
 
 def test_blocks_cut_all_signals_at_the_same_times() -> None:
-    numbers = blocks(one(), 20)
+    numbers = block_clusters(one(), 20)
     assert len(np.unique(numbers)) == RUNS * 4
     for run in range(RUNS):
         u, v, r = (numbers[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
@@ -508,7 +508,7 @@ def test_a_block_holds_one_run_where_a_signal_has_fewer_rows(thinned: str) -> No
     kept = (np.array(NAMES) != thinned) | (np.arange(len(NAMES)) % 4 == 0)
     signals = tuple(name for name, here in zip(NAMES, kept, strict=True) if here)
     few = LinearFit(fit.paths, fit.factors, fit.residuals[kept], fit.jacobian[kept], CLUSTERS[kept], signals)
-    numbers = blocks(few, 20)
+    numbers = block_clusters(few, 20)
     runs_of = [np.unique(few.clusters[numbers == number]) for number in np.unique(numbers)]
     assert all(len(runs) == 1 for runs in runs_of)
     assert len(runs_of) == RUNS * 4

@@ -11,8 +11,8 @@ from shipid.data.dataset import Dataset
 from shipid.identification.outcome import run_identification
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, statistics
-from shipid.identification.stream import current_fit, streams
+from shipid.identification.statistics import LinearFit, fit_statistics
+from shipid.identification.stream import current_fit, estimate_currents
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
@@ -47,7 +47,7 @@ def fitted(log: Dataset, **more: object) -> Solution:
 
 
 def sentence(solution: Solution, log: Dataset) -> str:
-    return current_fit(solution, log, statistics(LinearFit.of(solution)))
+    return current_fit(solution, log, fit_statistics(LinearFit.of(solution)))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
@@ -56,7 +56,7 @@ def test_another_current_in_each_run_is_named_with_the_nuisance_that_estimates_i
     """For a vessel without a current term nothing named it, and intervals were far from the truth."""
     log, currents = log_of(seed, drawn(seed)), drawn(seed)
     solution = fitted(log, **more)
-    seen = streams(solution, log)
+    seen = estimate_currents(solution, log)
     assert seen is not None
     assert seen.size == pytest.approx(np.sqrt(np.mean(np.sum(currents**2, axis=1))), rel=0.35)
     assert re.search(
@@ -97,7 +97,7 @@ def test_logs_without_a_current_are_not_blamed(seed: int) -> None:
     late = changed(sound, **{name: np.roll(sound.frame[name].to_numpy(), 2) for name in sound.commands})
     for vessel, log in ((SHIP.with_values(wrong), sound), (SHIP, late)):
         solution = identify(vessel, log, log.runs, Identify(parameters=FEW, weights=NOISE, horizon=0, start="base"))
-        seen = streams(solution, log)
+        seen = estimate_currents(solution, log)
         assert seen is not None
         assert seen.explained < 0.1
         assert sentence(solution, log) == ""
@@ -110,9 +110,9 @@ def test_a_current_that_is_set_is_not_looked_for() -> None:
     known |= {f"{run}.environment.beta_c": float(b) for run, b in zip(log.runs, beta_c, strict=True)}
     vessel = SHIP.with_values({"current.kind": "uniform"})
     settings = Identify(parameters=FEW, weights=NOISE, horizon=0, start="base", runs=known)
-    assert streams(identify(vessel, log, log.runs, settings), log) is None
+    assert estimate_currents(identify(vessel, log, log.runs, settings), log) is None
     alone = log.select(log.runs[:1])
-    assert streams(fitted(alone), alone) is None
+    assert estimate_currents(fitted(alone), alone) is None
 
 
 def test_the_whole_identification_warns() -> None:

@@ -7,12 +7,12 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.identification.settings import Identify, unknowns
+from shipid.identification.settings import Identify, free_factors
 from shipid.identification.structures import (
     PRESENT,
     STRUCTURES,
     check_structures,
-    exchange,
+    exchange_structure,
 )
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -50,7 +50,7 @@ def rates(vessel: Vessel, nu: tuple[float, float, float], orders: dict[str, floa
 def test_the_new_hull_makes_nearly_the_forces_of_the_old_one(name: str, ship: Vessel) -> None:
     data = log_of(ship)
     asked = SETTINGS if ship is KVLCC2 else Identify(parameters=["hull.*"])
-    exchanged = exchange(ship, name, data, data.runs, asked)
+    exchanged = exchange_structure(ship, name, data, data.runs, asked)
     assert max(exchanged.misfit.values()) < 0.16
     moving = data.frame[["u", "v", "r", *vessel_dynamics(ship).commands]].iloc[10::17]
     short = [column.rsplit(".", 1)[-1] for column in moving.columns]
@@ -61,29 +61,29 @@ def test_the_new_hull_makes_nearly_the_forces_of_the_old_one(name: str, ship: Ve
         pairs.append((rates(ship, nu, values), rates(exchanged.vessel, nu, values)))
     old, new = np.array(pairs).swapaxes(0, 1)
     assert (np.sqrt(((old - new) ** 2).mean(axis=0)) < 0.3 * np.sqrt((old**2).mean(axis=0))).all()
-    free = unknowns(exchanged.vessel, exchanged.settings)  # the vessel accepts its settings
+    free = free_factors(exchanged.vessel, exchanged.settings)  # the vessel accepts its settings
     assert set(STRUCTURES[name].hull) <= set(free.paths)
 
 
 def test_the_same_structure_is_recovered() -> None:
     data = log_of(KVLCC2)
-    exchanged = exchange(KVLCC2, "mmg", data, data.runs, SETTINGS)
+    exchanged = exchange_structure(KVLCC2, "mmg", data, data.runs, SETTINGS)
     for path, value in KVLCC2.parameters.items():
         assert exchanged.vessel.parameters[path] == pytest.approx(value, rel=1e-4, abs=1e-6), path
     assert max(exchanged.misfit.values()) < 1e-6
-    present = exchange(KVLCC2, PRESENT, data, data.runs, SETTINGS)
+    present = exchange_structure(KVLCC2, PRESENT, data, data.runs, SETTINGS)
     assert present.vessel is KVLCC2
     assert present.settings is SETTINGS
 
 
 def test_numbers_outside_of_the_hull_stay_as_the_settings_say() -> None:
     data = trials(KVLCC2, runs=2, steps=40)
-    exchanged = exchange(KVLCC2, "cubic", data, data.runs, SETTINGS).settings
+    exchanged = exchange_structure(KVLCC2, "cubic", data, data.runs, SETTINGS).settings
     assert {"added_mass.Y_vdot", "thruster.rudder.f_alpha"} <= set(exchanged.parameters)
     assert not [path for path in exchanged.parameters if path.startswith("hull.mmg")]
     assert exchanged.prior["added_mass.Y_vdot"] == 0.2
     assert exchanged.bounds == {"thruster.rudder.f_alpha": (0.5, 2.0)}
-    polynomial = exchange(KVLCC2, "abkowitz", data, data.runs, SETTINGS)
+    polynomial = exchange_structure(KVLCC2, "abkowitz", data, data.runs, SETTINGS)
     assert "thruster.rudder.f_alpha" not in polynomial.settings.parameters  # that rudder is gone, its gear is not
     rudder, before = (one.document["thruster"]["rudder"] for one in (polynomial.vessel, KVLCC2))
     assert rudder["kind"] == "rudder_derivatives"
@@ -95,31 +95,31 @@ def test_numbers_of_the_gear_of_a_replaced_rudder_stay_free() -> None:
     gear = "thruster.rudder.actuator.delta.rate"
     asked = Identify(parameters=["hull.*", gear], prior={gear: 0.2})
     for name in STRUCTURES:
-        exchanged = exchange(KVLCC2, name, log_of(KVLCC2), log_of(KVLCC2).runs, asked)
+        exchanged = exchange_structure(KVLCC2, name, log_of(KVLCC2), log_of(KVLCC2).runs, asked)
         assert gear in exchanged.settings.parameters, name
         assert exchanged.settings.prior[gear] == 0.2
-        assert gear in unknowns(exchanged.vessel, exchanged.settings).paths
+        assert gear in free_factors(exchanged.vessel, exchanged.settings).paths
 
 
 def test_no_pattern_frees_a_dimension() -> None:
     """`wind.*` freed the length over all, which stays fixed in a fit of the hull as it is."""
     zeros = [path for path, value in GUNNERUS.parameters.items() if path.startswith("wind.") and value == 0]
     asked = Identify(parameters=["hull.*", "wind.*"], fixed=zeros)
-    exchanged = exchange(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, asked)
+    exchanged = exchange_structure(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, asked)
     free = {path for path in exchanged.settings.parameters if path.startswith("wind.")}
-    assert free == {path for path in unknowns(GUNNERUS, asked).paths if path.startswith("wind.")}
+    assert free == {path for path in free_factors(GUNNERUS, asked).paths if path.startswith("wind.")}
     assert "wind.L_oa" not in free
     full = asked.model_copy(update={"parameters": [*asked.parameters, "wind.L_oa"]})
-    named = exchange(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, full)
+    named = exchange_structure(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, full)
     assert "wind.L_oa" in named.settings.parameters
 
 
 def test_zeros_of_a_table_that_is_tied_by_a_pattern_stay_zero() -> None:
     table = "wind.C_Y.*"
     asked = Identify(parameters=["hull.*", table], together=[[table]], prior={table: 0.2})
-    exchanged = exchange(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, asked)
-    tied = next(group for group in unknowns(exchanged.vessel, exchanged.settings).groups if len(group) > 1)
-    assert tied == unknowns(GUNNERUS, asked.model_copy(update={"parameters": [table]})).groups[0]
+    exchanged = exchange_structure(GUNNERUS, "mmg", log_of(GUNNERUS), log_of(GUNNERUS).runs, asked)
+    tied = next(group for group in free_factors(exchanged.vessel, exchanged.settings).groups if len(group) > 1)
+    assert tied == free_factors(GUNNERUS, asked.model_copy(update={"parameters": [table]})).groups[0]
 
 
 @pytest.mark.parametrize("name", list(STRUCTURES))
@@ -127,7 +127,7 @@ def test_a_hull_in_the_bis_system_is_replaced(name: str) -> None:
     """It stayed beside the new one, whose coefficients all began at 0: its numbers were fixed in every structure."""
     tanker = load_vessel("esso-190k")
     data = log_of(tanker)
-    exchanged = exchange(tanker, name, data, data.runs, Identify(parameters=["hull.*"]))
+    exchanged = exchange_structure(tanker, name, data, data.runs, Identify(parameters=["hull.*"]))
     assert "bis_derivatives" not in exchanged.vessel.document["hull"]
     assert max(exchanged.misfit.values()) < 0.02
     values = exchanged.vessel.parameters
@@ -146,7 +146,7 @@ def test_roll_and_heel_are_as_they_were(block: str, name: str) -> None:
     """A ship that rolls had no damping of it, and no moment of heel: a roll of 0.1 rad grew in still water."""
     ship, coefficient = HEELING[block]
     data = log_of(ship)
-    vessel = exchange(ship, name, data, data.runs, Identify(parameters=["hull.*"])).vessel
+    vessel = exchange_structure(ship, name, data, data.runs, Identify(parameters=["hull.*"])).vessel
     assert vessel.document["hull"][block][coefficient] == ship.document["hull"][block][coefficient]
     model = vessel_dynamics(ship)
     numbers = [data.frame[command].median() for command in model.commands]
@@ -168,7 +168,9 @@ def test_constants_of_a_hull_stay_with_its_kind() -> None:
     """A ship whose resistance is another astern kept none of it, in a structure of the same kind."""
     ship = KVLCC2.with_values({"hull.mmg.k_astern": 1.4})
     for name, kept in {"modulus": True, "cubic": False}.items():
-        hull = exchange(ship, name, log_of(KVLCC2), log_of(KVLCC2).runs, Identify(parameters=["hull.*"])).vessel
+        hull = exchange_structure(
+            ship, name, log_of(KVLCC2), log_of(KVLCC2).runs, Identify(parameters=["hull.*"])
+        ).vessel
         assert (hull.parameters.get("hull.mmg.k_astern") == 1.4) == kept
 
 
@@ -177,7 +179,7 @@ def test_a_rudder_that_is_off_stays_off(name: str) -> None:
     """No coefficient of it is free, it takes no order, and its block is as before."""
     without = KVLCC2.with_values({"thruster.rudder.off": True})
     data = log_of(KVLCC2)
-    exchanged = exchange(without, name, data, data.runs, Identify(parameters=["hull.*"]))
+    exchanged = exchange_structure(without, name, data, data.runs, Identify(parameters=["hull.*"]))
     assert vessel_dynamics(exchanged.vessel).commands == vessel_dynamics(without).commands
     assert not [path for path in exchanged.settings.parameters if path.startswith("thruster.rudder")]
     assert exchanged.vessel.document["thruster"]["rudder"] == without.document["thruster"]["rudder"]
@@ -186,7 +188,7 @@ def test_a_rudder_that_is_off_stays_off(name: str) -> None:
 def test_resistance_is_taken_over_once() -> None:
     data = trials(GUNNERUS, runs=2, steps=40)
     for name in STRUCTURES:
-        vessel = exchange(GUNNERUS, name, data, data.runs, Identify(parameters=["hull.*"])).vessel
+        vessel = exchange_structure(GUNNERUS, name, data, data.runs, Identify(parameters=["hull.*"])).vessel
         straight = [rates(one, (3.0, 0.0, 0.0), {"n": 2.0, "alpha": 0.0})[0] for one in (GUNNERUS, vessel)]
         assert straight[1] == pytest.approx(straight[0], abs=0.02), name
 
@@ -200,6 +202,8 @@ def test_what_is_no_structure_or_lacks_a_size_is_refused() -> None:
     mariner = load_vessel("mariner")
     sizes = {"particulars": {"L_pp": 160.93, "U_0": 7.7175}}
     with pytest.raises(DocumentError, match=r"particulars.T: missing: a structure of the hull needs it"):
-        exchange(Vessel(mariner.document | sizes, mariner.file), "mmg", data, ["M01"], Identify(parameters=["hull.*"]))
+        exchange_structure(
+            Vessel(mariner.document | sizes, mariner.file), "mmg", data, ["M01"], Identify(parameters=["hull.*"])
+        )
     with pytest.raises(DataError, match="needs this command"):
-        exchange(GUNNERUS, "mmg", data, ["M01"], Identify(parameters=["hull.*"]))
+        exchange_structure(GUNNERUS, "mmg", data, ["M01"], Identify(parameters=["hull.*"]))

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
-from shipid.identification.unstable import grows, growth_in
+from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.stability import yaw_growth
@@ -20,11 +20,11 @@ def straight(vessel: Vessel, speed: float) -> Dataset:
 
 def test_it_is_of_the_median_speed_and_orders_of_the_runs() -> None:
     vessel = ship(1e5)
-    assert growth_in(straight(vessel, U), ["A"], vessel) == yaw_growth(vessel, U, {"screw.n": 0.0})
-    assert np.isfinite(growth_in(straight(vessel, 0.0), ["A"], vessel))
+    assert yaw_growth_rate(straight(vessel, U), ["A"], vessel) == yaw_growth(vessel, U, {"screw.n": 0.0})
+    assert np.isfinite(yaw_growth_rate(straight(vessel, 0.0), ["A"], vessel))
 
 
 def test_only_what_grows_within_the_runs_is_said() -> None:
-    assert "e-fold in 10 s" in grows(0.1, 120.0, 8.0)
-    assert "--horizon 24" in grows(0.1, 120.0, 8.0)
-    assert grows(0.1, 20.0, 2.0) == grows(-0.1, 120.0, 8.0) == grows(0.1, 120.0, 60.0) == ""
+    assert "e-fold in 10 s" in growth_warning(0.1, 120.0, 8.0)
+    assert "--horizon 24" in growth_warning(0.1, 120.0, 8.0)
+    assert growth_warning(0.1, 20.0, 2.0) == growth_warning(-0.1, 120.0, 8.0) == growth_warning(0.1, 120.0, 60.0) == ""

@@ -16,7 +16,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.identification.outcome import COMPARED
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.structures import exchange
+from shipid.identification.structures import exchange_structure
 from shipid.report.structures import write_structures
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
@@ -73,7 +73,7 @@ def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
 def data_of(structure: str) -> Dataset:
     """Trials of a ship whose hull has this structure, near to SHIP."""
     plain = zigzags(SHIP)
-    return zigzags(exchange(SHIP, structure, plain, plain.runs, SETTINGS).vessel)
+    return zigzags(exchange_structure(SHIP, structure, plain, plain.runs, SETTINGS).vessel)
 
 
 @pytest.fixture(scope="module")
