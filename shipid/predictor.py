@@ -29,10 +29,10 @@ from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DataError, ResultError, ShipidError, suggest_name
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
-from shipid.hybrid.calibration import calibrated
-from shipid.hybrid.contract import fault_of_corrector, named
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widened
-from shipid.hybrid.methods import METHODS, kind_of, listed
+from shipid.hybrid.calibration import calibrate_bands
+from shipid.hybrid.contract import fault_of_corrector, name_of_class
+from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widen_range
+from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.metrics import vector_lengths
 from shipid.observer import AGE, Observer
@@ -274,7 +274,7 @@ class Predictor:
         outside = np.full(count, not self.limits)
         for name, ends in self.limits.items():
             if name in columns:
-                (low, high), values = widened(*ends), as_float_array(name, columns[name], DataError)
+                (low, high), values = widen_range(*ends), as_float_array(name, columns[name], DataError)
                 outside |= ~((values >= low) & (values <= high))
         if self.run_up > 0:
             age = as_float_array(AGE, columns.get(AGE, np.zeros(len(outside))), DataError)
@@ -356,7 +356,7 @@ class Predictor:
         with locate_errors(f"{kind.__name__}.from_arrays", kind):
             corrector = kind.from_arrays(json.loads(json.dumps(header)), arrays)
         if fault := fault_of_corrector(corrector):
-            raise ShipidError(f"`from_arrays` of {named(kind)} must return a corrector: {fault}")
+            raise ShipidError(f"`from_arrays` of {name_of_class(kind)} must return a corrector: {fault}")
         one, first = instants.select(np.arange(1)), paths[:, :1]
         kept, restored = (replace(self, corrector=each).predict(one, first) for each in (self.corrector, corrector))
         if not np.allclose(kept, restored, rtol=1e-6, atol=1e-6, equal_nan=True):
@@ -395,7 +395,7 @@ class Predictor:
             )
         kind: Any = header.get("method")
         if isinstance(kind, str) and kind not in METHODS:
-            raise ResultError(f"made by the method {kind!r}, which is not known here: {listed(kind)}", file=file)
+            raise ResultError(f"made by the method {kind!r}, which is not known here: {method_names(kind)}", file=file)
         fault = _fault_of(arrays)
         if fault:
             raise ResultError(f"damaged: {fault}: run the study again", file=file)
@@ -535,7 +535,7 @@ def fit(
         physics has an observer; the physics or the training diverges.
     """
     check_class("method", method, Method, "such as PathDrawn()", DataError)
-    kind = kind_of(method)
+    kind = method_kind(method)
     check_class("physics", physics, Physics, "such as Physics(vessel, horizon=60, step=1.0)", DataError)
     check_class("windows", windows, Windows, "as of `cut_windows`", DataError)
     check_choice("commands", commands, get_args(Commands), DataError)
@@ -639,7 +639,7 @@ def bands_of(
     """Bands from errors (T, S, 2) [m] on windows by models that did not see their runs, and why there are none."""
     if left_out is None:
         return None, NO_REFITS
-    bands = calibrated(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step, kinds)
+    bands = calibrate_bands(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step, kinds)
     return bands, "" if bands is not None else "fewer than 3 runs have errors of models that did not see them"
 
 

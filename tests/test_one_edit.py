@@ -24,11 +24,11 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.export.correctors import inputs_of
 from shipid.export.model import model
 from shipid.export.write import export_predictor
-from shipid.hybrid.features import choose_features, group_of
-from shipid.hybrid.mirror import reflection
+from shipid.hybrid.features import choose_features, input_group
+from shipid.hybrid.mirror import mirror_matrix
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stepping import Stepper, free
+from shipid.hybrid.stepping import Stepper, step_alone
 from shipid.logs import readers
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
@@ -167,7 +167,7 @@ def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
 def test_a_correction_mirrors_it() -> None:
     rng = np.random.default_rng(1)
     table = {name: rng.normal(size=40) for name in ("u", "v", "r", "propeller.n", "tail.flap")}
-    image = reflection(table, choose_features(table))
+    image = mirror_matrix(table, choose_features(table))
     assert image is not None
     np.testing.assert_array_equal(image, np.diag([1, -1, -1, 1, -1]))
 
@@ -291,10 +291,10 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
     far, near = (np.abs(physics.paths(one) - windows.future).max() for one in (deep, instants))
     assert near < 0.05 * far
     motion = {name: instants.columns[name] for name in ("u", "v", "r", "psi")}
-    stepped = free(physics, Stepper(physics, instants).at(0, motion))
-    np.testing.assert_allclose(stepped, free(physics, instants), atol=1e-12)
-    assert np.abs(stepped - free(physics, deep)).max() > 1e-3
-    assert group_of("depth") == "wind"
+    stepped = step_alone(physics, Stepper(physics, instants).at(0, motion))
+    np.testing.assert_allclose(stepped, step_alone(physics, instants), atol=1e-12)
+    assert np.abs(stepped - step_alone(physics, deep)).max() > 1e-3
+    assert input_group("depth") == "wind"
     predictor = fit(OneStep(trials=2, units=8), replace(physics, vessel=load_vessel("gunnerus-28.9")), windows)
     assert "depth" in inputs_of(predictor.corrector).environment
     assert predictor.limits["depth"] == (log["depth"].min(), log["depth"].max())

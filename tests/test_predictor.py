@@ -17,7 +17,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.physics import Physics, assumed, check_columns
+from shipid.hybrid.physics import Physics, check_columns, missing_columns
 from shipid.observer import Observer
 from shipid.predictor import FORMAT, Predictor
 from shipid.study.apply import predict_log
@@ -356,6 +356,6 @@ def test_what_is_assumed_is_named() -> None:
     ship = load_vessel("gunnerus-28.9")
     commands = {f"{side}.{signal}": np.zeros(1) for side in ("port", "starboard") for signal in ("n", "alpha")}
     measured = commands | dict.fromkeys(("north", "east", "psi", "u", "v"), np.zeros(1))
-    assert assumed(ship, measured) == ["r", "V_w", "beta_w"]
-    assert assumed(ship, measured | dict.fromkeys(("r", "V_w", "beta_w"), np.zeros(1))) == []
+    assert missing_columns(ship, measured) == ["r", "V_w", "beta_w"]
+    assert missing_columns(ship, measured | dict.fromkeys(("r", "V_w", "beta_w"), np.zeros(1))) == []
     check_columns(ship, commands, "log.csv")

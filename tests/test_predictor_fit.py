@@ -26,7 +26,7 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.trials import row_of
+from shipid.hybrid.trials import trial_row
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _folds, fit
 from shipid.vessel.load import Vessel, load_vessel
@@ -356,7 +356,7 @@ def test_a_method_changes_no_window_that_others_are_fitted_to(monkeypatch: pytes
             for array in (task.windows.future, task.windows.columns["u"], task.cases["none"].paths):
                 with pytest.raises(ValueError, match="read-only"):
                     array += 1.0
-            return {"none": Fitted(Unchanged({}), [row_of(0, {}, 1.0, 0.0)], 0.0)}
+            return {"none": Fitted(Unchanged({}), [trial_row(0, {}, 1.0, 0.0)], 0.0)}
 
     monkeypatch.setitem(METHODS, "greedy", Greedy)
     fit(Greedy(), NONE, WINDOWS)

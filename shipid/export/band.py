@@ -42,7 +42,7 @@ def band_rows(bands: Bands, now: Mapping[str, MX], path: MX, step: float, radius
 
 
 def _track(path: MX) -> MX:
-    """Unit vectors (2, T) along a path, as `shipid.hybrid.bands.track`; ahead where it does not move."""
+    """Unit vectors (2, T) along a path, as `shipid.hybrid.bands.track_directions`; ahead where it does not move."""
     first = ca.horzcat(MX(np.zeros((2, 1))), path[:, :-1])
     chords = ca.horzcat(path[:, 1:] - first[:, :-1], path[:, -1] - first[:, -1])
     length = ca.sqrt(ca.sum1(chords**2))
@@ -84,7 +84,7 @@ def is_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
 
 
 def factor_function(bands: Bands) -> ca.Function:
-    """(miss, level, kind) -> how much wider than calibrated an adaptive band is, as `shipid.hybrid.bands.factor`."""
+    """(miss, level, kind) -> how much wider than calibrated an adaptive band is, as `shipid.hybrid.bands.adaptive_factor`."""
     inputs = symbols_of({"miss": 1, "level": 1, "kind": 1})
     miss, level, kind = inputs.values()
     whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])

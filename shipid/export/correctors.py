@@ -15,17 +15,17 @@ from shipid.errors import ShipidError
 from shipid.export.equations import Equations, by_name, named_function, symbols_of
 from shipid.export.known import Known, feature_table, stacked, turned, within
 from shipid.hybrid.alone import Unchanged
-from shipid.hybrid.calibrator import Calibrated, TrajectoryInputs
+from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Normaliser
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.forest import ForestCorrector, Trees
-from shipid.hybrid.hankel_dmd import MISSED, HankelCorrector
+from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.methods import METHODS
-from shipid.hybrid.modules import ModulesCorrector, without
+from shipid.hybrid.modules import ModulesCorrector, physics_without_modules
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector
-from shipid.hybrid.stepping import LIMIT
+from shipid.hybrid.stepping import VELOCITY_LIMIT
 from shipid.hybrid.units import Units
 from shipid.physics.signals import direct_inputs, measurable_signals
 
@@ -236,7 +236,7 @@ def corrected_step(known: Known, num_kept: int, added: Added) -> ca.Function:
         after, way = free(known, known.equations, start, start.parameters)
     more, kept = added(start, after, carry[6:])
     then = after + h * more
-    then = ca.if_else(within(then, LIMIT), then, np.nan)
+    then = ca.if_else(within(then, VELOCITY_LIMIT), then, np.nan)
     if way is not None and known.physics.integrator != "euler":
         moved = way + h**2 / 2 * more + 0 * then
         turned_by, shift = moved[2], turned(moved[:2], psi - first)
@@ -291,7 +291,7 @@ def nearest(point: MX, centres: Array) -> MX:
 
 def modules(known: Known, corrector: ModulesCorrector) -> MX:
     """Factors of single modules, faded out far from the training data."""
-    reduced = [Equations(one.vessel) for one in without(known.physics) if one.vessel is not None]
+    reduced = [Equations(one.vessel) for one in physics_without_modules(known.physics) if one.vessel is not None]
     every, h = known.names.parameters, known.physics.step
 
     def added(start: Start, whole: MX, kept: MX) -> tuple[MX, MX]:
@@ -315,7 +315,7 @@ def modules(known: Known, corrector: ModulesCorrector) -> MX:
 def hankel(known: Known, corrector: HankelCorrector) -> MX:
     """A linear law of delays, rolled over the horizon."""
     law, physical = corrector.law, known.physics.vessel is not None
-    kept_names = [*MOTIONS, *law.commands, *(MISSED if physical else ())]
+    kept_names = [*MOTIONS, *law.commands, *(MISSED_NAMES if physical else ())]
     rows = [stacked(row, (*MOTIONS, *law.commands)) for row in known.past[known.names.before(law.delays) :]]
     if physical:
         rows = [ca.vertcat(*pair) for pair in zip(rows, missed_before(known, law.delays), strict=True)]
@@ -369,7 +369,7 @@ CORRECTORS: dict[type[Any], Counterpart] = {
     Unchanged: Counterpart(alone, lambda _: Taken((), ())),
     ForceCorrector: Counterpart(alone, lambda _: Taken((), ())),
     Compensator: Counterpart(compensated, _compensated_taken),
-    Calibrated: Counterpart(compensated, _compensated_taken),
+    TrajectoryCompensator: Counterpart(compensated, _compensated_taken),
     ForestCorrector: Counterpart(forest, lambda one: Taken(one.inputs.commands, one.names)),
     RecurrentCorrector: Counterpart(recurrent, _recurrent_taken),
     OneStepCorrector: Counterpart(

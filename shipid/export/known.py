@@ -13,7 +13,7 @@ from casadi import MX
 
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.export.equations import Equations, by_name, rolled_out, symbols_of
-from shipid.hybrid.features import MOTIONS, PARTS, Inputs, steps_of
+from shipid.hybrid.features import MOTIONS, PLAN_PARTS, Inputs, count_steps
 from shipid.hybrid.physics import Physics
 from shipid.observer import COLUMNS, bank, moves_start
 from shipid.physics.signals import direct_inputs
@@ -223,7 +223,7 @@ class Known:
 
     def _past_error(self, seconds: float) -> MX:
         """x, y, u, v, r of `shipid.hybrid.features.past_error`."""
-        steps = steps_of(seconds, self.physics.step)
+        steps = count_steps(seconds, self.physics.step)
         records, then = self.past_records(steps), self.past[self.names.before(steps)]
         last, change = records[:, -1], self.now["psi"] - then["psi"]
         here = turned(-stacked(then, "xy"), change)  # the present position in the frame of the start
@@ -258,7 +258,7 @@ class Known:
         table, horizon = {}, self.names.horizon
         for name, orders in by_name(inputs.commands, self.commands(inputs.commands)).items():
             component, _, signal = name.rpartition(".")
-            for number, part in enumerate(np.array_split(np.arange(horizon), min(PARTS, horizon)), start=1):
+            for number, part in enumerate(np.array_split(np.arange(horizon), min(PLAN_PARTS, horizon)), start=1):
                 mean = ca.sum2(orders[:, part[0] : part[-1] + 1]) / len(part)
                 table[f"{component}.planned-{number}.{signal}"] = mean - self.now[name]
         return table
@@ -266,17 +266,17 @@ class Known:
     def _history(self, inputs: Inputs) -> dict[str, MX]:
         columns, now, step = {}, self.now, self.physics.step
         for seconds in inputs.memory.history:
-            row = self.past[self.names.before(steps_of(seconds, step))]
+            row = self.past[self.names.before(count_steps(seconds, step))]
             for name in (*MOTIONS, *inputs.commands):
                 component, dot, signal = name.rpartition(".")
                 columns[f"{component}{dot}past-{seconds:g}.{signal}"] = row[name] - now[name]
         for seconds in inputs.memory.turned:
-            row = self.past[self.names.before(steps_of(seconds, step))]
+            row = self.past[self.names.before(count_steps(seconds, step))]
             columns[f"turned-{seconds:g}.psi"] = now["psi"] - row["psi"]
         return columns
 
     def _estimates(self) -> dict[str, MX]:
-        """Inputs of `shipid.hybrid.features.estimates`."""
+        """Inputs of `shipid.hybrid.features.observer_inputs`."""
         now, seen = self.now, self.seen
         table = {f"observer-force.{motion}": seen[name] for motion, name in zip(MOTIONS, "XYN", strict=True)}
         current = turned(stacked(seen, ("current_north", "current_east")), -now["psi"])

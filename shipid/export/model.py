@@ -19,7 +19,7 @@ from shipid.export.equations import named_function, symbols_of
 from shipid.export.known import Known, Layout, layout
 from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
-from shipid.hybrid.method import Corrector, widened
+from shipid.hybrid.method import Corrector, widen_range
 from shipid.hybrid.physics import Physics
 from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
@@ -127,7 +127,7 @@ class Model:
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Entry of `now` -> least and greatest value without an alarm, with the slack of `Predictor.outside`."""
-        given = {name: widened(*ends) for name, ends in self.predictor.limits.items() if name in self.layout.now}
+        given = {name: widen_range(*ends) for name, ends in self.predictor.limits.items() if name in self.layout.now}
         return {name: (float(low), float(high)) for name, (low, high) in given.items()}
 
     def unit(self, name: str) -> str:

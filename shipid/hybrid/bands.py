@@ -28,7 +28,7 @@ LEVELS = np.arange(1, 100) / 100
 """Levels that the tables of a band hold; between them it interpolates."""
 FEWEST = 3  # runs: one is left out, and two are needed to see how much runs differ
 TRAITS = ("length", "turn", "change", "slip", "distance")
-"""What the growth of a band depends on, see `traits`."""
+"""What the growth of a band depends on, see `prediction_traits`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Region:
 
         No error reaches 0, also in the region without extent of a predictor that never erred.
         """
-        along, across = turned(errors, self.ahead)
+        along, across = split_along_track(errors, self.ahead)
         with np.errstate(divide="ignore", invalid="ignore"):
             parts = np.stack([along / self.along, across / self.across], axis=-1)
         return vector_lengths(np.where(np.stack([along, across], axis=-1) == 0, 0.0, parts))
@@ -135,16 +135,18 @@ class Bands(Stored):
         self.check(level, kind)
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
-        radius = at_level(self.steps if pointwise else self.table(kind), level)
-        return self._region(radius, self.growth(paths, columns, step), track(paths))
+        radius = radius_at_level(self.steps if pointwise else self.table(kind), level)
+        return self._region(radius, self.growth(paths, columns, step), track_directions(paths))
 
     def regions(
         self, paths: Array, columns: Mapping[str, Array], step: float, levels: Sequence[float]
     ) -> dict[float, Region]:
         """Return the regions for whole paths at several levels, those that it promises; arguments as of `region`."""
-        size, ahead = self.growth(paths, columns, step), track(paths)
+        size, ahead = self.growth(paths, columns, step), track_directions(paths)
         return {
-            level: self._region(at_level(self.whole, level), size, ahead) for level in levels if self.promises(level)
+            level: self._region(radius_at_level(self.whole, level), size, ahead)
+            for level in levels
+            if self.promises(level)
         }
 
     def _region(self, radius: Array, size: Array, ahead: Array) -> Region:
@@ -156,8 +158,10 @@ class Bands(Stored):
 
     def growth(self, paths: Array, columns: Mapping[str, Array], step: float) -> Array:
         """How much wider (S,) the band of each prediction is than that of an average one [1]."""
-        away = distance(columns, self.names, self.centres, self.spread)
-        seen = np.clip(traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high)
+        away = distance_from_training(columns, self.names, self.centres, self.spread)
+        seen = np.clip(
+            prediction_traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high
+        )
         size: Array = np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
         return size
 
@@ -170,15 +174,15 @@ class Bands(Stored):
         if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {suggest_name(kind, self.kinds)}")
         if not self.promises(level, kind):
-            raise DataError(too_few(level, self.runs if kind is None else self.kinds[kind], kind))
+            raise DataError(sentence_of_few_runs(level, self.runs if kind is None else self.kinds[kind], kind))
 
     def promises(self, level: float, kind: str | None = None) -> bool:
         """Whether there were enough runs for a level, or enough runs of a kind of manoeuvre."""
         runs = self.runs if kind is None else self.kinds.get(kind, 0)
-        return 0 < level <= LEVELS[-1] and runs >= needed(level)
+        return 0 < level <= LEVELS[-1] and runs >= runs_needed(level)
 
 
-def needed(level: float) -> int:
+def runs_needed(level: float) -> int:
     """Fewest runs that a level needs: 4 for 0.8, 9 for 0.9, 19 for 0.95.
 
     Of G runs and a new one, each is the worst with the same probability, so no band from G runs promises more than
@@ -187,13 +191,13 @@ def needed(level: float) -> int:
     return max(FEWEST, math.ceil(level / (1 - level) - 1e-9))
 
 
-def too_few(level: float, runs: int, kind: str | None = None) -> str:
+def sentence_of_few_runs(level: float, runs: int, kind: str | None = None) -> str:
     """One sentence where there are too few runs for a level, or too few of a kind of manoeuvre."""
     of = "" if kind is None else f" of the kind {kind!r}"
-    return f"a band of {100 * level:g} % needs {needed(level)} runs or more{of} to calibrate it: there are {runs}"
+    return f"a band of {100 * level:g} % needs {runs_needed(level)} runs or more{of} to calibrate it: there are {runs}"
 
 
-def at_level(table: Array, level: float) -> Array:
+def radius_at_level(table: Array, level: float) -> Array:
     """Radius for a level from a table (99, ...) for `LEVELS`; below the first level it goes to 0."""
     place = level * 100 - 1
     if place < 0:
@@ -206,7 +210,7 @@ def at_level(table: Array, level: float) -> Array:
     return radius
 
 
-def track(paths: Array) -> Array:
+def track_directions(paths: Array) -> Array:
     """Unit vectors (T, S, 2) along paths (T, S, 2) that start at the origin; ahead where a path does not move."""
     first = np.concatenate([np.zeros_like(paths[:1]), paths[:-1]])
     chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
@@ -216,19 +220,19 @@ def track(paths: Array) -> Array:
     return ahead
 
 
-def turned(errors: Array, ahead: Array) -> tuple[Array, Array]:
+def split_along_track(errors: Array, ahead: Array) -> tuple[Array, Array]:
     """Errors (..., 2) along the unit vectors `ahead` and across them, to starboard."""
     along = errors[..., 0] * ahead[..., 0] + errors[..., 1] * ahead[..., 1]
     return along, errors[..., 1] * ahead[..., 0] - errors[..., 0] * ahead[..., 1]
 
 
-def chords_of(paths: Array) -> Array:
+def path_chords(paths: Array) -> Array:
     """Three chords (3, S, 2) [m] of paths (T, S, 2) [m] that start at the origin, one for each third of the steps."""
     ends = np.array([-(-len(paths) * part // 3) - 1 for part in (1, 2, 3)])
     return np.diff(np.concatenate([np.zeros_like(paths[:1]), paths[ends]]), axis=0)
 
 
-def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array, length: float) -> Array:
+def prediction_traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array, length: float) -> Array:
     """What makes a prediction easy or hard, (S, 5), one column for each of `TRAITS`; no trait has a unit.
 
     length : logarithm of the length of the predicted path, by three chords, over that of an average one.
@@ -236,7 +240,7 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     turns later [rad]. slip : how far the turn is from what the present yaw rate would give [rad].
     distance : logarithm of 1 + the distance from the windows of training.
     """
-    chords = chords_of(paths)
+    chords = path_chords(paths)
     size = vector_lengths(chords)
     cross = chords[:-1, :, 0] * chords[1:, :, 1] - chords[:-1, :, 1] * chords[1:, :, 0]
     dot = (chords[:-1] * chords[1:]).sum(axis=-1) + 0.0  # a ship at rest does not turn: 0 and not -0
@@ -254,12 +258,16 @@ def traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array,
     )
 
 
-def distance(columns: Mapping[str, Array], names: tuple[str, ...], centres: Array, spread: Array) -> Array:
+def distance_from_training(
+    columns: Mapping[str, Array], names: tuple[str, ...], centres: Array, spread: Array
+) -> Array:
     """Distance (S,) [1] of instants from the nearest of some points of training, root mean square over columns."""
-    return nearest(np.stack([columns[name] for name in names], axis=1) / spread, centres / spread)
+    return nearest_distances(np.stack([columns[name] for name in names], axis=1) / spread, centres / spread)
 
 
-def nearest(points: Array, centres: Array, run: Places | None = None, run_of_centre: Places | None = None) -> Array:
+def nearest_distances(
+    points: Array, centres: Array, run: Places | None = None, run_of_centre: Places | None = None
+) -> Array:
     """Root mean square distance over coordinates of points (S, d) from the nearest of the centres (m, d), (S,).
 
     run, run_of_centre : number of the run of each point (S,) and centre (m,): those of the same run are passed over.
@@ -275,7 +283,7 @@ def nearest(points: Array, centres: Array, run: Places | None = None, run_of_cen
     return distances
 
 
-class Adaptive(NamedTuple):
+class AdaptiveState(NamedTuple):
     """State of a band that adapts along a run: the share of paths that it now aims to miss, and the one wanted.
 
     miss : may leave 0 to 1: below 0 the band grows until it holds, above 1 it is empty. wanted : 1 - level.
@@ -287,12 +295,12 @@ class Adaptive(NamedTuple):
     rate: float
 
 
-def adaptive(level: float, rate: float = 0.02) -> Adaptive:
+def start_adaptation(level: float, rate: float = 0.02) -> AdaptiveState:
     """Return the state at the start of a run: the band is as calibrated."""
-    return Adaptive(1 - level, 1 - level, rate)
+    return AdaptiveState(1 - level, 1 - level, rate)
 
 
-def adapted(state: Adaptive, missed: bool, together: int = 1) -> Adaptive:
+def adapt_band(state: AdaptiveState, missed: bool, together: int = 1) -> AdaptiveState:
     """Return the state after one more path could be judged: adaptive conformal inference.
 
     Each miss widens the band, each hit narrows it a little, so that the long-run share of misses goes to that wanted,
@@ -307,14 +315,14 @@ def adapted(state: Adaptive, missed: bool, together: int = 1) -> Adaptive:
     return state._replace(miss=state.miss + state.rate / together * (state.wanted - float(missed)))
 
 
-def factor(state: Adaptive, whole: Array) -> float:
+def adaptive_factor(state: AdaptiveState, whole: Array) -> float:
     """Return how much wider than calibrated the band is now, from the table `whole` (99,) of its `Bands`.
 
     Beyond the levels of the table it grows by e for each 0.05 that misses are to fall further, without a bound.
     """
-    usual = float(at_level(whole, min(1 - state.wanted, LEVELS[-1])))
+    usual = float(radius_at_level(whole, min(1 - state.wanted, LEVELS[-1])))
     level = 1 - state.miss
     if level <= 0 or usual == 0:
         return 0.0 if level <= 0 else 1.0
-    inside = float(at_level(whole, min(level, float(LEVELS[-1]))))
+    inside = float(radius_at_level(whole, min(level, float(LEVELS[-1]))))
     return inside / usual * math.exp(max(level - float(LEVELS[-1]), 0.0) / 0.05)

@@ -20,7 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import choose_evenly
-from shipid.hybrid.bands import FEWEST, LEVELS, TRAITS, Bands, chords_of, nearest, track, traits, turned
+from shipid.hybrid.bands import (
+    FEWEST,
+    LEVELS,
+    TRAITS,
+    Bands,
+    nearest_distances,
+    path_chords,
+    prediction_traits,
+    split_along_track,
+    track_directions,
+)
 from shipid.metrics import vector_lengths
 
 Array = NDArray[np.float64]
@@ -33,7 +43,7 @@ PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed
 
 
 @dataclass(frozen=True)
-class _Runs:
+class _RunShares:
     """Windows (S,) sorted into G runs.
 
     place : index of the run of each window. weight : of each window, (S,), the same sum for each run, 1 in all.
@@ -64,7 +74,7 @@ class _Runs:
         return sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1))
 
 
-def calibrated(
+def calibrate_bands(
     left_out: Array,
     future: Array,
     run: NDArray[np.str_],
@@ -83,27 +93,31 @@ def calibrated(
     columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
     step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
     """
-    chosen = _spread_over_runs(run, np.all(np.isfinite(left_out), axis=(0, 2)))
-    runs = _runs(run[chosen])
+    chosen = _pick_over_runs(run, np.all(np.isfinite(left_out), axis=(0, 2)))
+    runs = _shares_of_runs(run[chosen])
     if runs.count < FEWEST:
         return None
     errors = left_out[:, chosen]
     paths = future[:, chosen] - errors
     columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r"}}
-    centres, spread, away = _from_training(runs, np.stack([columns[name] for name in names], axis=1))
+    centres, spread, away = _training_distances(runs, np.stack([columns[name] for name in names], axis=1))
     far = max(float(away.max()), 1e-9)
-    length = max(float(vector_lengths(chords_of(paths)).sum(axis=0) @ runs.weight), 1e-9)
-    seen = traits(paths, columns, step, away, length)
+    length = max(float(vector_lengths(path_chords(paths)).sum(axis=0) @ runs.weight), 1e-9)
+    seen = prediction_traits(paths, columns, step, away, length)
     middle = runs.weight @ seen
     deviation = np.sqrt(runs.weight @ (seen - middle) ** 2)
     deviation = np.where(deviation > 1e-9, deviation, 1.0)
     normal = (seen - middle) / deviation
-    apart = np.stack([np.abs(part) for part in turned(errors, track(paths))], axis=-1)  # (T, S, 2)
+    apart = np.stack(
+        [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
+    )  # (T, S, 2)
     best = None
     for circle in (True, False):
-        fitted = _fitted(runs, apart, normal, circle)
-        whole = _radii(fitted.scores.max(axis=0), runs)
-        size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[_middle_level(runs.count)]
+        fitted = _fit_scores(runs, apart, normal, circle)
+        whole = _radii_of_runs(fitted.scores.max(axis=0), runs)
+        size = (
+            float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[_place_of_middle_level(runs.count)]
+        )
         if best is None or size < TIGHTER * best[0]:
             best = size, fitted, whole
     assert best is not None
@@ -112,14 +126,15 @@ def calibrated(
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
     by_kind = [  # of too few runs no band is promised, whatever is here
-        radii(reach[of == kind], runs.place[of == kind]) if count >= FEWEST else whole for kind, count in known.items()
+        band_radii(reach[of == kind], runs.place[of == kind]) if count >= FEWEST else whole
+        for kind, count in known.items()
     ]
     return Bands(
         runs=runs.count,
         along=fitted.scale[:, 0],
         across=fitted.scale[:, 1],
         whole=whole,
-        steps=np.stack([_radii(row, runs) for row in fitted.scores], axis=1),
+        steps=np.stack([_radii_of_runs(row, runs) for row in fitted.scores], axis=1),
         names=tuple(names),
         centres=centres,
         spread=spread,
@@ -135,23 +150,23 @@ def calibrated(
     )
 
 
-def radii(scores: Array, place: NDArray[np.int64]) -> Array:
+def band_radii(scores: Array, place: NDArray[np.int64]) -> Array:
     """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
 
     place : number of the run of each window, (S,). The result depends on the scores by run alone, and not on the
     order of the runs.
     """
-    return _radii(scores, _runs(place))
+    return _radii_of_runs(scores, _shares_of_runs(place))
 
 
-def _radii(scores: Array, runs: _Runs) -> Array:
-    order = _rising(scores)
-    ranks = _ranks(order, runs)
+def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
+    order = _rising_order(scores)
+    ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")
     at = np.cumsum(runs.weight[rising_ranks]) - runs.weight[rising_ranks] / 2
     wanted = np.interp(LEVELS, at, ranks[rising_ranks])
     # Where windows of a run are nearly one window, the new run may also fall between two others: (G + 1) level.
-    wanted = np.clip(wanted + _alike(ranks, runs) ** 2 * (LEVELS - 0.5) / (runs.count - 1), 0.0, 1.0)
+    wanted = np.clip(wanted + _intraclass_correlation(ranks, runs) ** 2 * (LEVELS - 0.5) / (runs.count - 1), 0.0, 1.0)
     weights = runs.weight[order]
     at = np.cumsum(weights) - weights / 2
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
@@ -159,14 +174,14 @@ def _radii(scores: Array, runs: _Runs) -> Array:
     return rising
 
 
-def _rising(values: Array) -> NDArray[np.int64]:
+def _rising_order(values: Array) -> NDArray[np.int64]:
     """Indices (S,) that sort values, equal ones in their order: a stable sort, at a sixth of its time without ties."""
     order = np.argsort(values)
     rising = values[order]
     return order if np.all(rising[:-1] < rising[1:]) else np.argsort(values, kind="stable")
 
 
-def _ranks(order: NDArray[np.int64], runs: _Runs) -> Array:
+def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
     """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
     below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
@@ -179,7 +194,7 @@ def _ranks(order: NDArray[np.int64], runs: _Runs) -> Array:
     return shares
 
 
-def _alike(ranks: Array, runs: _Runs) -> float:
+def _intraclass_correlation(ranks: Array, runs: _RunShares) -> float:
     """How alike the windows of one run are, 0 to 1: share of the variance of their ranks that lies between runs."""
     means = runs.means(ranks)
     within = float(runs.weight @ (ranks - means[runs.place]) ** 2)
@@ -191,7 +206,7 @@ def _alike(ranks: Array, runs: _Runs) -> float:
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _ScoreFit:
     """Scale (T, 2) [m] along and across, slopes (5,) of the growth, and scores (T, S) by the other runs alone."""
 
     scale: Array
@@ -199,26 +214,26 @@ class _Fit:
     scores: Array
 
 
-def _fitted(runs: _Runs, apart: Array, normal: Array, circle: bool) -> _Fit:
+def _fit_scores(runs: _RunShares, apart: Array, normal: Array, circle: bool) -> _ScoreFit:
     """Scale and growth from all runs, and scores of each run by those of the others."""
     if circle:
         apart = np.broadcast_to(vector_lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
     means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
     total = means.sum(axis=0)
-    scale = _floored(total / runs.count)
-    others = _floored((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
+    scale = _floor_scale(total / runs.count)
+    others = _floor_scale((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
     plain = vector_lengths(apart / others)
-    slopes, without = _slopes(runs, normal, plain.max(axis=0))
-    return _Fit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+    slopes, without = _growth_slopes(runs, normal, plain.max(axis=0))
+    return _ScoreFit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
 
 
-def _floored(scale: Array) -> Array:
+def _floor_scale(scale: Array) -> Array:
     """Scales (..., T, 2) [m] that are nowhere below a share of the greatest, nor zero."""
     most = scale.max(axis=-2, keepdims=True)
     return np.asarray(np.maximum(scale, np.maximum(FLOOR * most, 1e-9)), dtype=float)
 
 
-def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
+def _growth_slopes(runs: _RunShares, normal: Array, scores: Array) -> tuple[Array, Array]:
     """Slopes (5,) of the logarithm of scores (S,) over traits, from all runs, and without each run, (G, 5).
 
     Ridge regression in which every run counts as one sample. The distance from training makes no band narrower.
@@ -244,7 +259,7 @@ def _slopes(runs: _Runs, normal: Array, scores: Array) -> tuple[Array, Array]:
     return solved(product, right), np.stack(without)
 
 
-def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
+def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, Array]:
     """Centres (m, d) of training windows (S, d), spread (d,) of each column, and distances (S,) from other runs."""
     deviation = np.sqrt(runs.weight @ (points - runs.weight @ points) ** 2)
     spread = np.maximum(deviation, np.maximum(1e-3 * np.abs(points).max(axis=0), 1e-9))
@@ -252,11 +267,14 @@ def _from_training(runs: _Runs, points: Array) -> tuple[Array, Array, Array]:
     chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
     parts = [slice(first, first + PART) for first in range(0, len(points), PART)]
-    away = [nearest(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen]) for part in parts]
+    away = [
+        nearest_distances(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen])
+        for part in parts
+    ]
     return centres, spread, np.concatenate(away)
 
 
-def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices of sound windows, at most `WINDOWS` of each run, in order."""
     rows = np.flatnonzero(sound)
     if not len(rows):
@@ -266,12 +284,12 @@ def _spread_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArra
     return np.sort(np.concatenate([choose_evenly(part, WINDOWS) for part in parts]))
 
 
-def _runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _Runs:
+def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:
     known, place = np.unique(names, return_inverse=True)
     sizes = np.bincount(place, minlength=len(known))
-    return _Runs(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
+    return _RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
 
 
-def _middle_level(count: int) -> int:
+def _place_of_middle_level(count: int) -> int:
     """Index in `LEVELS` of 0.9, or of the highest level that so many runs can promise."""
     return min(90, 100 * count // (count + 1)) - 1

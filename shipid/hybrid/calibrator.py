@@ -22,7 +22,7 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Scale
 
 Array = NDArray[np.float64]
-SEEN = ("x", "y", "u", "v", "r")
+TRAJECTORY_SIGNALS = ("x", "y", "u", "v", "r")
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,15 @@ class TrajectoryInputs(Inputs):
             return inputs
         states = physics.states(instants)
         with np.errstate(invalid="ignore"):
-            sound = np.isfinite(np.stack([states[name] for name in SEEN])).all(axis=(0, 1))
+            sound = np.isfinite(np.stack([states[name] for name in TRAJECTORY_SIGNALS])).all(axis=(0, 1))
         for k in np.unique(np.round(np.linspace(0, physics.horizon, self.moments + 1)[1:]).astype(int)):
             label = f"physics-{k * physics.step:g}"
-            inputs |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in SEEN}
+            inputs |= {f"{label}.{name}": np.where(sound, states[name][k - 1], 0.0) for name in TRAJECTORY_SIGNALS}
         return inputs
 
 
 @dataclass(frozen=True)
-class Calibrated(Compensator):
+class TrajectoryCompensator(Compensator):
     """A compensator whose inputs hold the trajectory of the physics."""
 
     inputs: TrajectoryInputs
@@ -68,7 +68,7 @@ class Calibrator(PathDrawn):
 
     SEARCHED: ClassVar[tuple[str, ...]] = (*PathDrawn.SEARCHED, "physics_scale")
     meets_none: ClassVar[bool] = False
-    corrector: ClassVar[type[Any]] = Calibrated
+    corrector: ClassVar[type[Any]] = TrajectoryCompensator
 
     moments: PositiveInt = 3
     physics_scale: Scale = (2.0, 32.0)

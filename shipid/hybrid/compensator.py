@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.hybrid.features import Inputs, rows_of
+from shipid.hybrid.features import Inputs, select_inputs
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stored import Stored
 
@@ -44,7 +44,7 @@ class Normaliser(Stored):
 
     def apply(self, table: Mapping[str, Array]) -> Array:
         """Return normalised inputs (S, d) of features (S,), selected by name; DataError where one is missing."""
-        return (rows_of(table, self.names) - self.mean) / self.std
+        return (select_inputs(table, self.names) - self.mean) / self.std
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Network(Stored):
         units = self.normaliser.apply(table)
         for inner, offset in hidden:
             units = np.tanh(units @ inner + offset)
-        return np.tensordot(self.basis, unflatten(units @ weight + bias), 1)
+        return np.tensordot(self.basis, unflatten_paths(units @ weight + bias), 1)
 
 
 @dataclass(frozen=True)
@@ -103,13 +103,13 @@ class Compensator(Stored):
         return np.asarray(total / len(self.networks))
 
 
-def flatten(paths: Array) -> Array:
+def flatten_paths(paths: Array) -> Array:
     """Arrange outputs (S, 2 r) of a network, x_1 ... x_r, y_1 ... y_r as in (12), for paths or shapes (r, S, 2)."""
     return np.concatenate([paths[..., 0], paths[..., 1]]).T
 
 
-def unflatten(outputs: Array) -> Array:
-    """Arrange paths or shapes (r, S, 2) of outputs (S, 2 r): the inverse of `flatten`."""
+def unflatten_paths(outputs: Array) -> Array:
+    """Arrange paths or shapes (r, S, 2) of outputs (S, 2 r): the inverse of `flatten_paths`."""
     return np.stack(np.split(outputs.T, 2), axis=-1)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from threadpoolctl import threadpool_info, threadpool_limits
 
 
-def vectors() -> str:
+def vector_instructions() -> str:
     """Vector instructions that NumPy found on this processor, and the kernels of its BLAS, such as X86_V4, Zen."""
     found = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
     kernels = {str(library["architecture"]) for library in threadpool_info() if "architecture" in library}

@@ -20,19 +20,19 @@ from shipid.physics.signals import direct_inputs, measurable_signals
 Array = NDArray[np.float64]
 MOTIONS = ("u", "v", "r")
 TOLERANCE = 1e-9  # two columns that differ by less, relative to their size, are one column written twice
-PARTS = 3  # of the horizon, in which a method sees planned commands
+PLAN_PARTS = 3  # of the horizon, in which a method sees planned commands
 
 
 def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
     """Planned commands as few numbers: the mean command less the present one in each part of the horizon.
 
-    The parts are nearly equal, `PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
+    The parts are nearly equal, `PLAN_PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
     ..., so that the side and the sign of the command hold for its plan.
     """
     means: dict[str, Array] = {}
     for name, values in planned.items():
         component, _, signal = name.rpartition(".")
-        for number, part in enumerate(np.array_split(values, min(PARTS, len(values))), start=1):
+        for number, part in enumerate(np.array_split(values, min(PLAN_PARTS, len(values))), start=1):
             means[f"{component}.planned-{number}.{signal}"] = part.mean(axis=0) - columns[name]
     return means
 
@@ -62,7 +62,7 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
     return table | {name: np.asarray(columns[name], dtype=float) for name in direct_inputs(columns)}
 
 
-def rows_of(table: Mapping[str, Array], names: Sequence[str]) -> Array:
+def select_inputs(table: Mapping[str, Array], names: Sequence[str]) -> Array:
     """Inputs (S, d) of a fitted method, by name; DataError where the table lacks one that it was trained with."""
     missing = next((name for name in names if name not in table), None)
     if missing is not None:
@@ -107,7 +107,7 @@ class Memory(CheckedModel, BaseModel):
         return max((*self.history, *self.turned, *self.error), default=0.0)
 
 
-NOTHING = Memory()
+NO_MEMORY = Memory()
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Inputs:
     """
 
     commands: tuple[str, ...]
-    memory: Memory = NOTHING
+    memory: Memory = NO_MEMORY
 
     def table(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return every input (S,) at the instants; DataError where a column or a part of the past is missing."""
@@ -136,7 +136,7 @@ class Inputs:
         """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
         if physics.vessel is None:
             return {}
-        table = estimates(instants) if self.memory.observer and physics.observer is not None else {}
+        table = observer_inputs(instants) if self.memory.observer and physics.observer is not None else {}
         for seconds in self.memory.error:
             errors = past_error(replace(physics, observer=None), instants, seconds)
             table |= {f"error-{seconds:g}.{name}": values for name, values in errors.items()}
@@ -156,7 +156,7 @@ class Inputs:
 
     @staticmethod
     def _before(instants: Instants, name: str, seconds: float, step: float) -> Array:
-        steps = steps_of(seconds, step)
+        steps = count_steps(seconds, step)
         if name not in instants.past or len(instants.past[name]) < steps:
             held = len(instants.past.get(name, ())) * step
             raise DataError(
@@ -165,7 +165,7 @@ class Inputs:
         return np.asarray(instants.past[name][-steps])
 
 
-def group_of(name: str) -> str:
+def input_group(name: str) -> str:
     """Kind of an input by its name: `motion`, `wind`, `command`, `history`, `error`, `observer` or `physics`.
 
     A plan is a command; `physics` is a trajectory over the horizon, `wind` also other environment.
@@ -180,7 +180,7 @@ def group_of(name: str) -> str:
     return kind[1] if kind[1] in ("error", "observer", "physics") else "history"
 
 
-def estimates(instants: Instants) -> dict[str, Array]:
+def observer_inputs(instants: Instants) -> dict[str, Array]:
     """Estimates of the observer as inputs (S,), in body axes.
 
     `observer-force.u`, `.v`, `.r` [m/s^2, rad/s^2]; `observer-current.u`, `.v` [m/s]; `observer-wave.u`, `.v`, `.r`
@@ -194,7 +194,7 @@ def estimates(instants: Instants) -> dict[str, Array]:
     return table | {f"observer-wave.{name}": columns[name] - known[f"observer.{name}"] for name in MOTIONS}
 
 
-def steps_of(seconds: float, step: float) -> int:
+def count_steps(seconds: float, step: float) -> int:
     """Number of steps in so many seconds, at least one."""
     return max(round(seconds / step), 1)
 
@@ -205,7 +205,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     x, y : true less predicted position [m], along and across the present heading. u, v, r : true less predicted
     velocities [m/s, rad/s]. A prediction that diverged gives zeros.
     """
-    steps = steps_of(seconds, physics.step)
+    steps = count_steps(seconds, physics.step)
     past, columns = instants.past, instants.columns
     if "x" not in past or len(past["x"]) < steps:
         held = len(past.get("x", ())) * physics.step

@@ -17,14 +17,14 @@ from pydantic import Field, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ShipidError
-from shipid.hybrid.compensator import flatten, smooth_basis, unflatten
-from shipid.hybrid.features import Inputs, Memory, rows_of
+from shipid.hybrid.compensator import flatten_paths, smooth_basis, unflatten_paths
+from shipid.hybrid.features import Inputs, Memory, select_inputs
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Problem, SearchedAlone
+from shipid.hybrid.search import LearningProblem, SearchedAlone
 from shipid.hybrid.settings import Point, seed_of
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import Seen
+from shipid.hybrid.units import SeenInputs
 
 Array = NDArray[np.float64]
 Leaf = Annotated[float, Field(ge=1.0)]
@@ -102,11 +102,11 @@ class ForestCorrector(Stored):
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         table = self.inputs.table(physics, instants)
-        weights = self.trees.predict(rows_of(table, self.names))
-        return np.asarray(paths + np.tensordot(self.basis, unflatten(weights), 1))
+        weights = self.trees.predict(select_inputs(table, self.names))
+        return np.asarray(paths + np.tensordot(self.basis, unflatten_paths(weights), 1))
 
 
-class ForestProblem(Problem):
+class ForestProblem(LearningProblem):
     """A foundation whose inputs and errors of the path, on the basis, are the samples of forests."""
 
     def __init__(self, method: Forest, task: Task, name: str) -> None:
@@ -114,22 +114,22 @@ class ForestProblem(Problem):
         self.inputs = Inputs(task.commands, method.memory)
         self.table = self.inputs.table(self.case.physics, self.instants)
         self.basis = smooth_basis(task.windows.horizon, method.terms)
-        self.outputs = flatten(np.tensordot(self.basis.T, self.targets, 1))  # (S, 2 r)
+        self.outputs = flatten_paths(np.tensordot(self.basis.T, self.targets, 1))  # (S, 2 r)
 
     def solve(self, number: int, point: Point, windows: Index) -> ForestCorrector:
         """Return a forest grown on some windows."""
         method, seed = self.method, seed_of(self.task.seed, number)
         here = {name: values[windows] for name, values in self.table.items()}
-        seen, outputs = Seen.of(here, method.mirror), self.outputs[windows]
+        seen, outputs = SeenInputs.of(here, method.mirror), self.outputs[windows]
         if seen.reflection is not None:
             outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(self.basis.T))])
-        grower = _forest(method.trees, round(point["leaf"]), point["share"], seed)
+        grower = _new_forest(method.trees, round(point["leaf"]), point["share"], seed)
         forest = grower.fit(seen.samples(here), outputs)
         trees = Trees.of([tree.tree_ for tree in forest.estimators_])
         return ForestCorrector(self.inputs, seen.normaliser.names, self.basis, trees, dict(point))
 
 
-def _forest(trees: int, leaf: int, share: float, seed: int) -> Any:
+def _new_forest(trees: int, leaf: int, share: float, seed: int) -> Any:
     """A forest of scikit-learn, not grown yet; ShipidError where it is not installed."""
     try:
         from sklearn.ensemble import RandomForestRegressor
@@ -153,7 +153,7 @@ class Forest(SearchedAlone):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("leaf", "share")
-    problem: ClassVar[type[Problem]] = ForestProblem
+    problem: ClassVar[type[LearningProblem]] = ForestProblem
     corrector: ClassVar[type[Any]] = ForestCorrector
 
     trials: PositiveInt = 6

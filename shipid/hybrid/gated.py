@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from shipid.hybrid.training import Length, descend
+from shipid.hybrid.training import Length, minimise_losses
 
 Array = NDArray[np.float64]
 Shapes = Mapping[str, tuple[int, ...]]
@@ -37,12 +37,12 @@ def train_gated(
         "c_2": (outputs.shape[1],),
     }
     weights = _first_weights(shapes, units, generator)
-    layers = {name: layer.requires_grad_() for name, layer in _layers(weights, shapes).items()}
+    layers = {name: layer.requires_grad_() for name, layer in _layers_by_name(weights, shapes).items()}
 
     def loss(rows: Tensor | slice) -> Tensor:
-        return _loss(layers, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows])
+        return _gated_loss(layers, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows])
 
-    best = descend(
+    best = minimise_losses(
         weights,
         list(layers.values()),
         [decay],
@@ -50,9 +50,9 @@ def train_gated(
         batches=lambda: torch.split(torch.randperm(len(outputs), generator=generator), length.batch),
         rate=lambda epoch: torch.tensor([[learning_rate * (1 + cos(pi * epoch / length.epochs)) / 2]]),
         loss=loss,
-        watched=lambda: _loss(layers, *watched),
+        watched=lambda: _gated_loss(layers, *watched),
     )
-    kept = {name: layer.double().numpy() for name, layer in _layers(best.kept, shapes).items()}
+    kept = {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
     return kept, int(best.epochs[0])
 
 
@@ -63,7 +63,7 @@ def _first_weights(shapes: Shapes, units: int, generator: torch.Generator) -> Te
     return torch.cat([draw.flatten() for draw in draws])[None]
 
 
-def _layers(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
+def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
     """Layers by name, in the memory of weights (1, P)."""
     pieces = torch.split(weights[0], [int(np.prod(shape)) for shape in shapes.values()])
     return {name: piece.view(shape) for (name, shape), piece in zip(shapes.items(), pieces, strict=True)}
@@ -76,7 +76,7 @@ def _tensors(part: Part) -> tuple[list[tuple[Tensor, Tensor]], Tensor]:
     return pairs, torch.as_tensor(outputs).float()
 
 
-def _loss(layers: Mapping[str, Tensor], seen: Sequence[tuple[Tensor, Tensor]], outputs: Tensor) -> Tensor:
+def _gated_loss(layers: Mapping[str, Tensor], seen: Sequence[tuple[Tensor, Tensor]], outputs: Tensor) -> Tensor:
     """Mean squared error (1,) of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
     past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
     flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]

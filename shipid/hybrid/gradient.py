@@ -13,14 +13,14 @@ import optuna
 from optuna.distributions import BaseDistribution
 from optuna.trial import TrialState
 
-from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten
+from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
 from shipid.hybrid.features import Inputs, choose_features
-from shipid.hybrid.journal import distributions, frozen
-from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
+from shipid.hybrid.journal import distributions, frozen_trial
+from shipid.hybrid.method import Array, Fitted, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.search import Search
 from shipid.hybrid.settings import Searched, seed_of
-from shipid.hybrid.training import Length, Settings, train
-from shipid.hybrid.trials import best_of, row_of
+from shipid.hybrid.training import Length, StackSettings, train_stack
+from shipid.hybrid.trials import best_trials, trial_row
 
 Stack = Mapping[str, Mapping[str, float]]
 """Models that train together: name -> hyperparameters."""
@@ -33,9 +33,15 @@ def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) 
     best trial. Foundations with the same inputs and the same architecture in a trial train as one stack. The sampler of
     a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
     """
-    trainer, search, space = _Trainer(task, method, inputs, length), Search(task, task.cases, method), method.space()
-    studies = {key: _study(rows, distributions(space)) for key, rows in search.rows.items()}
-    best = {key: (inf, _Outcome(-1)) for key in studies}  # value and networks of the best trial that was trained here
+    trainer, search, space = (
+        _StackTrainer(task, method, inputs, length),
+        Search(task, task.cases, method),
+        method.space(),
+    )
+    studies = {key: _memory_study(rows, distributions(space)) for key, rows in search.rows.items()}
+    best = {
+        key: (inf, _TrialOutcome(-1)) for key in studies
+    }  # value and networks of the best trial that was trained here
     for number, _ in search.left(count()):
         for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
             seed = seed_of(task.seed, key, number)
@@ -47,8 +53,8 @@ def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) 
             start = time.process_time()
             outcomes = trainer.train(stack, number)
             for key, one in outcomes.items():
-                rows[key] = row_of(number, stack[key], one.value, start, one.epochs)
-                best[key] = min(best[key], (rows[key]["value"], one), key=lambda pair: _rank(pair[0]))
+                rows[key] = trial_row(number, stack[key], one.value, start, one.epochs)
+                best[key] = min(best[key], (rows[key]["value"], one), key=lambda pair: _comparable_value(pair[0]))
             for key in stack:
                 rows[key]["seconds"] /= len(stack)
         for key, trial in trials.items():
@@ -59,21 +65,21 @@ def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) 
     return {key: trainer.fitted(key, search.rows, best[key][1]) for key in studies}
 
 
-def _rank(value: float) -> float:
+def _comparable_value(value: float) -> float:
     """A value by which trials are compared: one that is no number comes last."""
     return value if value == value else inf
 
 
-def _study(rows: Sequence[Row], space: Mapping[str, BaseDistribution]) -> optuna.Study:
+def _memory_study(rows: Sequence[Row], space: Mapping[str, BaseDistribution]) -> optuna.Study:
     """Make a study in memory that knows the trials so far."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study(direction="minimize")
-    study.add_trials([frozen(row, space) for row in rows])
+    study.add_trials([frozen_trial(row, space) for row in rows])
     return study
 
 
 @dataclass(frozen=True)
-class _Outcome:
+class _TrialOutcome:
     """A trial of a model: networks of the folds, mean validation loss [m^2], nan where one diverged, and epochs."""
 
     number: int
@@ -82,35 +88,35 @@ class _Outcome:
     epochs: int = 0
 
 
-class _Trainer:
+class _StackTrainer:
     """What all trials share: inputs, targets and folds."""
 
     def __init__(self, task: Task, method: Searched, inputs: Inputs, length: Length) -> None:
         self.task, self.method, self.inputs, self.length = task, method, inputs, length
         self.tables = shared_tables(task, inputs)
-        self.outputs = {key: flatten(paths) for key, paths in task.targets.items()}
+        self.outputs = {key: flatten_paths(paths) for key, paths in task.targets.items()}
 
     def stacks(self, asked: Stack) -> list[Stack]:
         """Group models by inputs and architecture, in the order of their first member."""
         stacks: dict[tuple[object, ...], dict[str, Mapping[str, float]]] = {}
         for key, parameters in asked.items():
-            alike = (same_table(self.tables[key]), *(parameters[name] for name in self.method.COUNTS))
+            alike = (input_table_key(self.tables[key]), *(parameters[name] for name in self.method.COUNTS))
             stacks.setdefault(alike, {})[key] = parameters
         return list(stacks.values())
 
-    def train(self, stack: Stack, number: int) -> dict[str, _Outcome]:
+    def train(self, stack: Stack, number: int) -> dict[str, _TrialOutcome]:
         """Train the networks of a stack in a trial, those of each fold together."""
         table, outputs = self.tables[next(iter(stack))], np.stack([self.outputs[key] for key in stack])
         made: dict[str, list[tuple[Network, float, int]]] = {key: [] for key in stack}
         for i, (training, validation) in enumerate(self.task.folds):
             entropy = self.task.seed, number, i
             features, normaliser = _inputs_of(table, training)
-            trained = train(
+            trained = train_stack(
                 normaliser.apply(table),
                 outputs,
                 training,
                 validation,
-                _settings(list(stack.values()), self.length),
+                _stack_settings(list(stack.values()), self.length),
                 [seed_of(*entropy, key) for key in stack],
                 order_seed=seed_of(*entropy),
                 device=self.task.device,
@@ -119,12 +125,12 @@ class _Trainer:
                 network = Network(features, normaliser, np.eye(outputs.shape[-1] // 2), trained.layers[k])
                 loss = float(trained.loss[k]) if trained.status[k] == "ok" else nan
                 made[key].append((network, loss, int(trained.epochs[k])))
-        return {key: _outcome(number, results) for key, results in made.items()}
+        return {key: _outcome_of_folds(number, results) for key, results in made.items()}
 
-    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _Outcome) -> Fitted:
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome) -> Fitted:
         """The networks of the best trial; those of an earlier session are trained once more, in the same stack."""
         seconds = sum(row["seconds"] for row in rows[key])
-        kept = best_of(rows[key])
+        kept = best_trials(rows[key])
         if not kept:
             return Fitted(None, rows[key], seconds)
         number = kept[0]["number"]
@@ -141,9 +147,9 @@ def _inputs_of(table: Mapping[str, Array], training: Index) -> tuple[dict[str, t
     return features, Normaliser.fit(seen, tuple(features))
 
 
-def _settings(members: Sequence[Mapping[str, float]], length: Length) -> Settings:
+def _stack_settings(members: Sequence[Mapping[str, float]], length: Length) -> StackSettings:
     """Structure and hyperparameters of the members of a stack."""
-    return Settings(
+    return StackSettings(
         layers=int(members[0]["layers"]),
         units=int(members[0]["units"]),
         learning_rate=tuple(one["learning_rate"] for one in members),
@@ -154,7 +160,7 @@ def _settings(members: Sequence[Mapping[str, float]], length: Length) -> Setting
     )
 
 
-def _outcome(number: int, results: Sequence[tuple[Network, float, int]]) -> _Outcome:
+def _outcome_of_folds(number: int, results: Sequence[tuple[Network, float, int]]) -> _TrialOutcome:
     """A trial by the networks, losses and epochs of its folds."""
     networks, losses, epochs = zip(*results, strict=True)
-    return _Outcome(number, networks, float(np.mean(losses)), max(epochs))
+    return _TrialOutcome(number, networks, float(np.mean(losses)), max(epochs))

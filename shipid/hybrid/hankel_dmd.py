@@ -21,21 +21,21 @@ from pydantic import model_validator as validator
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import MOTIONS, feature_table, steps_of
+from shipid.hybrid.features import MOTIONS, count_steps, feature_table
 from shipid.hybrid.method import Index
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Problem
+from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale
-from shipid.hybrid.stepping import Stepped, Stepper, StepProblem, free, stepped_paths
+from shipid.hybrid.stepping import Stepped, Stepper, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import Seen, solve
+from shipid.hybrid.units import SeenInputs, solve_ridges
 
 Array = NDArray[np.float64]
-MISSED = ("missed.u", "missed.v", "missed.r")
+MISSED_NAMES = ("missed.u", "missed.v", "missed.r")
 
 
 @dataclass(frozen=True)
-class Law(Stored):
+class LinearLaw(Stored):
     """The linear law, with its inputs.
 
     commands : names of the command columns. delays : number of past steps.
@@ -56,7 +56,7 @@ class Law(Stored):
         return np.asarray((full.reshape(len(self.weights), -1, full.shape[1]) @ self.weights).reshape(-1, 3))
 
 
-def delayed(
+def delayed_inputs(
     now: Mapping[str, Array], before: Mapping[str, Array], delays: int, commands: tuple[str, ...]
 ) -> dict[str, Array]:
     """Inputs (S,) of the law: those at the instant and, for each name of `before` (P, S), the last `delays` of them.
@@ -72,7 +72,7 @@ def delayed(
 
 
 def missed_steps(physics: Physics, instants: Instants, motion: Mapping[str, Array]) -> dict[str, Array]:
-    """Accelerations that single steps of the physics miss, `MISSED` -> (T, S), of T steps from the instants on.
+    """Accelerations that single steps of the physics miss, `MISSED_NAMES` -> (T, S), of T steps from the instants on.
 
     motion : true u, v, r and psi after 0..T steps, (T + 1, S).
     """
@@ -80,8 +80,8 @@ def missed_steps(physics: Physics, instants: Instants, motion: Mapping[str, Arra
     for k in range(physics.horizon):
         at = stepper.at(k, {name: values[k] for name, values in motion.items()})
         after = np.stack([motion[name][k + 1] for name in MOTIONS], axis=1)
-        residuals.append((after - free(physics, at)) / physics.step)
-    return {name: np.stack([step[:, axis] for step in residuals]) for axis, name in enumerate(MISSED)}
+        residuals.append((after - step_alone(physics, at)) / physics.step)
+    return {name: np.stack([step[:, axis] for step in residuals]) for axis, name in enumerate(MISSED_NAMES)}
 
 
 def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple[str, ...]) -> dict[str, Array]:
@@ -103,7 +103,7 @@ def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple
 class HankelCorrector(Stored):
     """The law, rolled over the horizon from the past of the instants."""
 
-    law: Law
+    law: LinearLaw
     past: float
     hyperparameters: Mapping[str, float]
 
@@ -113,8 +113,8 @@ class HankelCorrector(Stored):
         rows = past_rows(physics, instants, law.delays, law.commands)
 
         def acceleration(at: Instants, _: int, __: Array) -> Array:
-            residual = law(delayed(at.columns, rows, law.delays, law.commands))
-            now = {**at.columns, **dict(zip(MISSED, residual.T, strict=True))}
+            residual = law(delayed_inputs(at.columns, rows, law.delays, law.commands))
+            now = {**at.columns, **dict(zip(MISSED_NAMES, residual.T, strict=True))}
             for name, values in rows.items():  # what held at the start of the step becomes the past
                 rows[name] = np.concatenate([values[1:], now[name][None]])
             return residual
@@ -127,18 +127,18 @@ class HankelProblem(StepProblem):
 
     def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> HankelCorrector:  # noqa: ARG002
         """Return the law on the steps of some windows for all ridges; one ridge has no axis in front."""
-        delays = steps_of(point["delays"], self.task.windows.step)
+        delays = count_steps(point["delays"], self.task.windows.step)
         chosen, table = self.steps.of(windows), self.table(delays)
         here = {key: values[chosen] for key, values in table.items()}
-        seen, missing = Seen.of(here, self.method.mirror), self.steps.missing[chosen]
+        seen, missing = SeenInputs.of(here, self.method.mirror), self.steps.missing[chosen]
         if seen.reflection is not None:
             missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
         values = (seen.samples(here) - seen.normaliser.mean) / seen.normaliser.std
         full = np.concatenate([values, np.ones((len(values), 1))], axis=1)
         size = np.maximum(missing.std(axis=0), 1e-12)
         penalty = np.r_[np.ones(values.shape[1]), 1e-3]
-        weights = solve(full, missing / size, ridges, penalty) * size
-        law = Law(self.task.commands, delays, seen.normaliser, weights[0] if len(ridges) == 1 else weights)
+        weights = solve_ridges(full, missing / size, ridges, penalty) * size
+        law = LinearLaw(self.task.commands, delays, seen.normaliser, weights[0] if len(ridges) == 1 else weights)
         return HankelCorrector(law, point["delays"], point)
 
     def table(self, delays: int) -> dict[str, Array]:
@@ -154,7 +154,7 @@ class HankelProblem(StepProblem):
         for key, values in past.items():
             rows = np.concatenate([values, later[key]])
             before[key] = np.stack([rows[at - ago, steps.window] for ago in range(delays, 0, -1)])
-        return delayed(steps.at.columns, before, delays, self.task.commands)
+        return delayed_inputs(steps.at.columns, before, delays, self.task.commands)
 
 
 class HankelDMD(Stepped):
@@ -169,7 +169,7 @@ class HankelDMD(Stepped):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
-    problem: ClassVar[type[Problem]] = HankelProblem
+    problem: ClassVar[type[LearningProblem]] = HankelProblem
     corrector: ClassVar[type[Any]] = HankelCorrector
 
     delays: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 4.0, 8.0)

@@ -47,9 +47,9 @@ class Journal:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self.file, self.check, self.digest = file, check, study
         try:
-            for line in _whole_lines(file)[-1:]:
+            for line in _read_whole_lines(file)[-1:]:
                 json.loads(line)  # Optuna would pass over a last one that it cannot read
-            self.storage = JournalStorage(_Lines(str(file)))
+            self.storage = JournalStorage(_JournalLines(str(file)))
         except (ValueError, KeyError, TypeError, AttributeError):
             raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=file) from None
         names = optuna.get_all_study_names(self.storage)
@@ -71,8 +71,8 @@ class Journal:
     def _checked_row(self, cell: str, number: int, trial: FrozenTrial) -> Row:
         """A trial as it was added; ResultError if it is damaged."""
         with suppress(KeyError, TypeError):  # an attribute is missing or is another's
-            row = _row(number, trial)
-            if trial.user_attrs[CHECKSUM] == _checksum(cell, row):
+            row = _row_of_trial(number, trial)
+            if trial.user_attrs[CHECKSUM] == _row_checksum(cell, row):
                 return row
         raise ResultError(f"damaged: trial {number} of {cell} is not as written; {REMEDY}", file=self.file)
 
@@ -89,7 +89,7 @@ class Journal:
         """Append trials to searches: cell -> rows, each with the next number."""
         where = distributions(space)
         for cell, mine in rows.items():
-            self._study(cell).add_trials([frozen(row, where, cell) for row in mine])
+            self._study(cell).add_trials([frozen_trial(row, where, cell) for row in mine])
 
     def _study(self, cell: str) -> optuna.Study:
         """The study of a cell to be written to, made where there is none."""
@@ -100,7 +100,7 @@ class Journal:
         return self._studies[cell]
 
 
-class _Lines(JournalFileBackend):
+class _JournalLines(JournalFileBackend):
     """The file of a journal, without a lock, for one process writes it, and without waiting for the disk."""
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
@@ -109,7 +109,7 @@ class _Lines(JournalFileBackend):
             stream.writelines(json.dumps(log, separators=(",", ":")).encode() + b"\n" for log in logs)
 
 
-def _whole_lines(file: Path) -> list[bytes]:
+def _read_whole_lines(file: Path) -> list[bytes]:
     """Lines of a file, none where there is no file; a last one that is not whole is cut off it."""
     lines = file.read_bytes().splitlines(keepends=True) if file.exists() else []
     if lines and not lines[-1].endswith(b"\n"):
@@ -131,7 +131,7 @@ def distributions(space: Space) -> dict[str, BaseDistribution]:
     return drawn
 
 
-def frozen(row: Row, where: Mapping[str, BaseDistribution], cell: str = "") -> FrozenTrial:
+def frozen_trial(row: Row, where: Mapping[str, BaseDistribution], cell: str = "") -> FrozenTrial:
     """A trial of a cell that ended, as Optuna keeps it; attributes hold what is not searched, and the order of all."""
     searched = {name: value for name, value in row["params"].items() if name in where}
     complete = row["state"] == "complete"
@@ -140,30 +140,30 @@ def frozen(row: Row, where: Mapping[str, BaseDistribution], cell: str = "") -> F
         state=TrialState.COMPLETE if complete else TrialState.FAIL,
         value=row["value"] if complete else None,
         params=searched,
-        distributions={name: _holding(where[name], value) for name, value in searched.items()},
+        distributions={name: _widen_distribution(where[name], value) for name, value in searched.items()},
         user_attrs={
             "seconds": row["seconds"],
             "epochs": row["epochs"],
             FIXED: fixed,
             NUMBER: row["number"],
-            CHECKSUM: _checksum(cell, row),
+            CHECKSUM: _row_checksum(cell, row),
         },
     )
 
 
-def _checksum(cell: str, row: Row) -> int:
+def _row_checksum(cell: str, row: Row) -> int:
     """CRC-32 of a row of a search."""
     return zlib.crc32(json.dumps([cell, sorted(row.items())]).encode())
 
 
-def _holding(where: BaseDistribution, value: float) -> BaseDistribution:
+def _widen_distribution(where: BaseDistribution, value: float) -> BaseDistribution:
     """The span, with a value that rounding put just outside of it."""
     if isinstance(where, FloatDistribution) and not where.low <= value <= where.high:
         return FloatDistribution(min(where.low, value), max(where.high, value), log=where.log)
     return where
 
 
-def _row(number: int, trial: FrozenTrial) -> Row:
+def _row_of_trial(number: int, trial: FrozenTrial) -> Row:
     complete, known = trial.state == TrialState.COMPLETE, trial.user_attrs
     return {
         "number": number,
@@ -175,10 +175,10 @@ def _row(number: int, trial: FrozenTrial) -> Row:
     }
 
 
-def merge(files: Iterable[Path], target: Path) -> None:
+def merge_journals(files: Iterable[Path], target: Path) -> None:
     """Write one journal that holds the studies of all; it appears whole. ResultError for a file that is damaged."""
     with replace_whole(target) as temporary:
-        into = JournalStorage(_Lines(str(temporary)))
+        into = JournalStorage(_JournalLines(str(temporary)))
         for file in files:
             storage = Journal(file).storage
             for name in optuna.get_all_study_names(storage):

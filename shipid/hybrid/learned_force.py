@@ -22,12 +22,12 @@ from shipid.document import LEAST_NUMBER
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Judged, Problem, SearchedAlone
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import ridges_of
-from shipid.hybrid.units import solve
+from shipid.hybrid.trials import ridge_values
+from shipid.hybrid.units import solve_ridges
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -38,7 +38,7 @@ LIMITS = ("X_max", "Y_max", "N_max")
 HIDDEN = ("w_u", "w_v", "w_r", "w_0")
 OUTPUT = ("c_X", "c_Y", "c_N")
 START_RIDGE = 1e-5
-MOST = 0.95  # of the limit that a force may have at the start
+LARGEST_START = 0.95  # of the limit that a force may have at the start
 LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
 
 
@@ -52,14 +52,14 @@ class ForceCorrector(Stored):
 
     def with_force(self, physics: Physics) -> Physics:
         """Return the physics with the learned force among its terms."""
-        return physics.with_values({BLOCK: plain(self.block)})
+        return physics.with_values({BLOCK: block_document(self.block)})
 
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11) of the physics with the learned force."""
         return self.with_force(physics).paths(instants)
 
 
-class ForceProblem(Problem):
+class ForceProblem(LearningProblem):
     """A foundation whose true steps give the first weights of its force, and whose rollouts the others."""
 
     def __init__(self, method: LearnedForce, task: Task, name: str) -> None:
@@ -68,7 +68,7 @@ class ForceProblem(Problem):
         self.steps = true_steps(replace(task, cases={name: measured}), name)  # they start from measured states
         self.starts: dict[int, Array] = {}  # fold -> weights of the trial before
 
-    def judge(self, number: int, point: Point) -> Judged:  # noqa: ARG002
+    def judge(self, number: int, point: Point) -> TrialWorth:  # noqa: ARG002
         """Return the error on the validation windows of a force that starts from that of the trial before."""
         losses, most = [], 0
         for fold, (training, validation) in enumerate(self.task.folds):
@@ -76,7 +76,7 @@ class ForceProblem(Problem):
             weights, count = trainer.solve(point["ridge"], self.starts.get(fold))
             self.starts[fold], most = weights, max(most, count)
             losses.append(trainer.error(weights, self.instants.select(validation), self.future[:, validation]))
-        return Judged(float(np.mean(losses)) / 2, point, most)  # per coordinate, as the other methods
+        return TrialWorth(float(np.mean(losses)) / 2, point, most)  # per coordinate, as the other methods
 
     def solve(self, number: int, point: Point, windows: Index) -> ForceCorrector:  # noqa: ARG002
         """Return the force of a ridge, learned from some windows."""
@@ -84,7 +84,7 @@ class ForceProblem(Problem):
         weights, _ = trainer.solve(point["ridge"], None)
         return ForceCorrector(trainer.block(weights), dict(point))
 
-    def _trainer(self, windows: Index, seed: int) -> _Trainer:
+    def _trainer(self, windows: Index, seed: int) -> _ForceLoss:
         """The loss on some windows: of a physics with the block, on at most `samples` of the windows."""
         generator, method, some = np.random.default_rng(seed), self.method, windows
         if len(windows) > method.samples:
@@ -95,12 +95,12 @@ class ForceProblem(Problem):
             scale: np.array([max(float(columns[motion].std()), LEAST_SCALE)])
             for scale, motion in zip(SCALES, MOTIONS, strict=True)
         }
-        block |= limits(physics.ship, float(np.hypot(columns["u"], columns["v"]).max()), method.limit)
+        block |= force_limits(physics.ship, float(np.hypot(columns["u"], columns["v"]).max()), method.limit)
         block |= {key: generator.standard_normal(method.units) for key in HIDDEN}
         block |= {key: np.zeros(method.units) for key in OUTPUT}
         here = self.steps.of(windows)
-        block = started(block, physics, self.steps.at.select(here), self.steps.missing[here])
-        return _Trainer(physics, block, self.instants.select(some), self.future[:, some], method.iterations)
+        block = first_output_weights(block, physics, self.steps.at.select(here), self.steps.missing[here])
+        return _ForceLoss(physics, block, self.instants.select(some), self.future[:, some], method.iterations)
 
 
 class LearnedForce(SearchedAlone):
@@ -121,7 +121,7 @@ class LearnedForce(SearchedAlone):
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)
     CHAINED: ClassVar[bool] = True
     meets_none: ClassVar[bool] = False
-    problem: ClassVar[type[Problem]] = ForceProblem
+    problem: ClassVar[type[LearningProblem]] = ForceProblem
     corrector: ClassVar[type[Any]] = ForceCorrector
 
     trials: PositiveInt = 3
@@ -148,16 +148,18 @@ class LearnedForce(SearchedAlone):
 
     def ridges(self) -> list[float]:
         """Return the values of the ridge that are tried."""
-        return ridges_of(self.ridge, self.trials)
+        return ridge_values(self.ridge, self.trials)
 
     def points(self) -> list[Point]:
         """Return the trials: from stiff to soft, for each starts from the one before."""
         return [{"ridge": ridge} for ridge in self.ridges()[::-1]]
 
 
-def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing: Array) -> dict[str, Array]:
+def first_output_weights(
+    block: Mapping[str, Array], physics: Physics, at: Instants, missing: Array
+) -> dict[str, Array]:
     """The block with output weights from the accelerations (N, 3) that single steps of the physics miss at `at`."""
-    force = missing @ mass(physics.ship).T
+    force = missing @ horizontal_mass(physics.ship).T
     weights = [block[key][:, None] for key in ("w_u", "w_v", "w_r")]
     u, v, r = (at.columns[motion] / block[scale] for motion, scale in zip(MOTIONS, SCALES, strict=True))
     along = weights[0] * u + block["w_0"][:, None]
@@ -166,18 +168,18 @@ def started(block: Mapping[str, Array], physics: Physics, at: Instants, missing:
     even, odd = (one + other) / 2 - np.tanh(block["w_0"]), (one - other) / 2
     initial = dict(block)
     for key, limit, axis, features in zip(OUTPUT, LIMITS, range(3), (even, odd, odd), strict=True):
-        goal = np.arctanh(np.clip(force[:, axis] / block[limit], -MOST, MOST))
-        initial[key] = solve(features, goal[:, None], [START_RIDGE])[0, :, 0]
+        goal = np.arctanh(np.clip(force[:, axis] / block[limit], -LARGEST_START, LARGEST_START))
+        initial[key] = solve_ridges(features, goal[:, None], [START_RIDGE])[0, :, 0]
     return initial
 
 
-def mass(vessel: Vessel) -> Array:
+def horizontal_mass(vessel: Vessel) -> Array:
     """Mass plus added mass (3, 3) [kg, kg m, kg m^2] that a force in surge, sway and yaw moves; others move freely."""
     rows = [vessel.axes.index(axis) for axis in (0, 1, 5)]
     return np.asarray(np.linalg.inv(np.linalg.inv(vessel.mass)[np.ix_(rows, rows)]))
 
 
-def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:
+def force_limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:
     """Bounds of the force: factor times m U^2 / L [N] and I_z (U / L)^2 [N m], by name."""
     assert vessel.length is not None
     inertia, length = vessel.document["inertia"], vessel.length
@@ -186,19 +188,19 @@ def limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array]:
     return {"X_max": np.array([force]), "Y_max": np.array([force]), "N_max": np.array([moment])}
 
 
-def plain(block: Mapping[str, Array]) -> dict[str, Any]:
+def block_document(block: Mapping[str, Array]) -> dict[str, Any]:
     """The block as a vessel document holds it: numbers, and lists of numbers; 0 for one too near to 0 for it."""
     held = {name: np.where(np.abs(values) < LEAST_NUMBER, 0.0, values) for name, values in block.items()}
     return {name: values.tolist() if name in (*HIDDEN, *OUTPUT) else float(values[0]) for name, values in held.items()}
 
 
-class _Trainer:
+class _ForceLoss:
     """Loss and slope of the weights of one network on some windows, without those that diverge at its first weights."""
 
     def __init__(
         self, physics: Physics, block: Mapping[str, Array], instants: Instants, future: Array, iterations: int
     ) -> None:
-        self.physics = physics.with_values({BLOCK: plain(block)})
+        self.physics = physics.with_values({BLOCK: block_document(block)})
         lost = self.physics.variant_paths(instants)[1][0]
         sound = np.flatnonzero(~lost | lost.all())  # where all are lost, no force makes the error finite
         self.instants, self.future = instants.select(sound), future[:, sound]
@@ -217,7 +219,7 @@ class _Trainer:
         return values
 
     def solve(self, ridge: float, start: Array | None) -> tuple[Array, int]:
-        """Minimise the loss from a start (default: the weights of `started`); weights and the number of iterations."""
+        """Minimise the loss from a start (default: the weights of `first_output_weights`); weights and the number of iterations."""
         from scipy.optimize import minimize  # a study is read without it
 
         def loss(weights: Array) -> tuple[float, Array]:

@@ -17,7 +17,7 @@ from shipid.data.windows import Instants, Windows, locked_view
 from shipid.document import parse_model
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.hybrid.contract import fault_of_corrector
-from shipid.hybrid.features import NOTHING, Inputs, Memory
+from shipid.hybrid.features import NO_MEMORY, Inputs, Memory
 from shipid.hybrid.physics import Physics
 from shipid.users import locate_errors
 from shipid.vessel.load import Vessel
@@ -71,7 +71,7 @@ Row = dict[str, Any]
 Space = Mapping[str, Any]
 
 
-class Journal(Protocol):
+class TrialJournal(Protocol):
     """A record of searches on disk, see `shipid.hybrid.journal`."""
 
     def rows(self, cell: str) -> list[Row]:
@@ -115,7 +115,7 @@ class Task:
     hidden: Mapping[str, Mapping[str, Array] | None] = field(default_factory=dict)
     estimates: Mapping[str, Mapping[str, Array]] = field(default_factory=dict)
     device: str = "cpu"
-    journal: Journal | None = None
+    journal: TrialJournal | None = None
     cells: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -170,7 +170,7 @@ class Traits:
     """
 
     mirror: bool | None = None
-    memory: Memory = NOTHING
+    memory: Memory = NO_MEMORY
     terms: int | None = None
 
 
@@ -230,7 +230,7 @@ class Method(CheckedModel, BaseModel, ABC):
         """Fit every foundation of a task; name of the foundation -> result."""
 
 
-TAKEN = ("cell", "model", "N_D", "seed", "chosen", "number", "value", "epochs", "seconds", "state")
+TRIAL_COLUMNS = ("cell", "model", "N_D", "seed", "chosen", "number", "value", "epochs", "seconds", "state")
 """Columns of a table of trials beside their params."""
 
 
@@ -248,7 +248,7 @@ class TrialRow(BaseModel):
     @model_validator(mode="after")
     def _can_be_stored(self) -> Self:
         """Refuse a name of a column that there is already, and a value that is none."""
-        if taken := sorted({*self.params} & {*TAKEN}):
+        if taken := sorted({*self.params} & {*TRIAL_COLUMNS}):
             raise ValueError(f"params: {taken[0]!r} is a name that is taken: use another")
         if self.state != "diverged" and not np.isfinite(self.value):
             raise ValueError(f"value must be finite, not {self.value}, unless the state is 'diverged'")
@@ -284,7 +284,7 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool)
             parse_model(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)
         ]
     except (DocumentError, TypeError) as error:
-        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.trials.row_of") from None
+        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.trials.trial_row") from None
     check_number(f"{where}: seconds", one.seconds, DataError)
     if not isinstance(one.sentence, str):
         raise DataError(f"{where}: sentence must be a text, not {type(one.sentence).__name__}")
@@ -310,7 +310,7 @@ def _check_corrector(where: str, corrector: Corrector) -> None:
         raise DataError(f"{where}: past of the corrector must be seconds, from 0 on, not {past!r}")
 
 
-def widened(low: float, high: float) -> tuple[float, float]:
+def widen_range(low: float, high: float) -> tuple[float, float]:
     """Least and greatest value that training has seen, apart by their rounding: what equals one of them is inside."""
     slack = 1e-9 * max(1.0, abs(low), abs(high))
     return low - slack, high + slack
@@ -322,6 +322,6 @@ def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:
     return {name: common | inputs.of_physics(case.physics, task.instants(name)) for name, case in task.cases.items()}
 
 
-def same_table(table: Mapping[str, Array]) -> tuple[tuple[str, int], ...]:
+def input_table_key(table: Mapping[str, Array]) -> tuple[tuple[str, int], ...]:
     """A key that is equal for two tables of `shared_tables` that hold the same arrays."""
     return tuple((name, id(values)) for name, values in table.items())

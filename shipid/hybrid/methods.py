@@ -39,7 +39,7 @@ METHODS: dict[str, type[Method]] = {
 def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> Method:
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
-        raise DocumentError(f"{kind!r} is no kind of method: {listed(kind)}", path=f"{path}.kind")
+        raise DocumentError(f"{kind!r} is no kind of method: {method_names(kind)}", path=f"{path}.kind")
     known: Any = METHODS[kind]
     if not (isinstance(known, type) and issubclass(known, Method)) or known.__abstractmethods__:
         what = "needs `fit`" if isinstance(known, type) and issubclass(known, Method) else "must be a class of Method"
@@ -54,12 +54,12 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     return method
 
 
-def listed(kind: str) -> str:
+def method_names(kind: str) -> str:
     """Return the names of the methods that there are, as the remedy where `kind` is none of them."""
     return f"{suggest_name(kind, METHODS)} (one that you wrote needs the script that puts it into METHODS)"
 
 
-def kind_of(method: Method) -> str:
+def method_kind(method: Method) -> str:
     """Return the name under which the class of a method is listed; DataError where it has none, or lacks a part."""
     kind = next((name for name, kind in METHODS.items() if type(method) is kind), None)
     if kind is None:

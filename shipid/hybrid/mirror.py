@@ -12,15 +12,17 @@ from shipid.logs.guess.words import words_of_side
 from shipid.physics.signals import is_command, is_steering, is_thrust_order, mirror_sign
 
 Array = NDArray[np.float64]
-OTHER = {"port": "starboard", "starboard": "port"}
-SIDES = {word: side for side in OTHER for word in words_of_side(side)}  # words in names of components: p, stbd, left
+OTHER_SIDE = {"port": "starboard", "starboard": "port"}
+SIDES = {
+    word: side for side in OTHER_SIDE for word in words_of_side(side)
+}  # words in names of components: p, stbd, left
 ENDS = frozenset().union(*map(words_of_side, ("bow", "stern", "fore", "aft")))  # units there stand on the middle line
 ACROSS = re.compile(
     "bow|tunnel|lateral|transvers|strahl|(stern|aft|fore).*thruster|thruster.*(stern|aft|fore)"
 )  # in names of units whose shaft may drive sideways, such as `bowthruster`
 
 
-def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
+def mirror_matrix(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
     """The mirror (d, d) on inputs, a signed permutation: image = inputs @ it; None where a column has no image.
 
     Names of components say their sides. Several that say none, such as `m1` and `m2`, have no image.
@@ -29,7 +31,7 @@ def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...
     names = list(features)
     matrix = np.zeros((len(names), len(names)))
     words = {column: re.split("([^a-z]+)", column.rpartition(".")[0].lower()) for column in table}
-    called = {_name(column, [SIDES.get(word, word) for word in words[column]]): column for column in table}
+    called = {_column_name(column, [SIDES.get(word, word) for word in words[column]]): column for column in table}
     if len(called) < len(table):
         return None
     middle: dict[str, set[str | float]] = {}  # signal -> inputs and constants of the commands that name no side
@@ -39,7 +41,7 @@ def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...
         if is_thrust_order(column) and values.any() and ACROSS.search(component.lower()) and not turns:
             return None
         sides = [SIDES.get(word, word) for word in words[column]]
-        partner = called.get(_name(column, [OTHER.get(side, side) for side in sides]), "")
+        partner = called.get(_column_name(column, [OTHER_SIDE.get(side, side) for side in sides]), "")
         if is_command(column) and partner == column and not ENDS & set(sides):
             middle.setdefault(signal, set()).add(standing.get(column) or float(values.mean()))
         sign = mirror_sign(column)
@@ -52,6 +54,6 @@ def reflection(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...
     return matrix if (np.abs(matrix).sum(axis=0) == 1).all() and (np.abs(matrix).sum(axis=1) == 1).all() else None
 
 
-def _name(column: str, words: list[str]) -> str:
+def _column_name(column: str, words: list[str]) -> str:
     """Name of a column whose component has these words."""
     return ".".join(filter(None, ("".join(words), column.rpartition(".")[2])))

@@ -21,28 +21,32 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
-from shipid.hybrid.bands import nearest
+from shipid.hybrid.bands import nearest_distances
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Problem
+from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale, seed_of
-from shipid.hybrid.stepping import Stepped, StepProblem, free, stepped_paths
+from shipid.hybrid.stepping import Stepped, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import Seen, Units, solve
+from shipid.hybrid.units import SeenInputs, Units, solve_ridges
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import term_blocks, upstream_signals
 
 Array = NDArray[np.float64]
-MOST = 2000  # moments from which the radius of the alarm is taken, about
-ORDER = ("rudders", "thrusters", "hull")  # in which modules are switched off: a rudder needs the wash of its propeller
+ALARM_MOMENTS = 2000  # moments from which the radius of the alarm is taken, about
+MODULE_ORDER = (
+    "rudders",
+    "thrusters",
+    "hull",
+)  # in which modules are switched off: a rudder needs the wash of its propeller
 
 
 def modules_of(vessel: Vessel | None) -> dict[str, tuple[str, ...]]:
     """Module -> dotted paths of its blocks, in the order in which they are switched off; none without a vessel."""
-    modules: dict[str, list[str]] = {name: [] for name in ORDER}
+    modules: dict[str, list[str]] = {name: [] for name in MODULE_ORDER}
     for path, key, _ in () if vessel is None else term_blocks(vessel.document):
         if key.startswith("hull."):
             modules["hull"].append(path)
@@ -52,7 +56,7 @@ def modules_of(vessel: Vessel | None) -> dict[str, tuple[str, ...]]:
     return {name: tuple(paths) for name, paths in modules.items() if paths}
 
 
-def without(physics: Physics) -> list[Physics]:
+def physics_without_modules(physics: Physics) -> list[Physics]:
     """The physics without the first module, without the first two, ... of `modules_of`."""
     reduced: list[Physics] = []
     off: dict[str, bool] = {}
@@ -62,9 +66,9 @@ def without(physics: Physics) -> list[Physics]:
     return reduced
 
 
-def shares(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
-    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as `free` gives it."""
-    after = np.stack([whole, *(free(one, at) for one in reduced)], axis=1)
+def module_accelerations(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
+    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as `step_alone` gives it."""
+    after = np.stack([whole, *(step_alone(one, at) for one in reduced)], axis=1)
     return (after[:, :-1] - after[:, 1:]) / step
 
 
@@ -89,21 +93,23 @@ class Alarm(Stored):
         while len(centres) < min(count, len(z)) and apart.max() > 0:
             centres.append(z[apart.argmax()])
             apart = np.minimum(apart, np.linalg.norm(z - centres[-1], axis=1))
-        few = np.arange(0, len(z), max(len(z) // MOST, 1))
+        few = np.arange(0, len(z), max(len(z) // ALARM_MOMENTS, 1))
         z, run = z[few], run[few]
-        across = [_away(z[run == name], z[run != name]).max() for name in np.unique(run) if (run != name).any()]
+        across = [
+            _distance_to_centres(z[run == name], z[run != name]).max() for name in np.unique(run) if (run != name).any()
+        ]
         return cls(normaliser, np.array(centres), float(max([*across, apart.max()])))
 
     def weight(self, table: Mapping[str, Array], fade: float) -> Array:
         """1 within the radius of a centre, falling to 0 at `fade` (in standard deviations) beyond it, (S,)."""
         z = self.normaliser.apply(table)
-        weights = np.clip(1 - (_away(z, self.centres) - self.radius) / fade, 0.0, 1.0)
+        weights = np.clip(1 - (_distance_to_centres(z, self.centres) - self.radius) / fade, 0.0, 1.0)
         return np.where(np.isfinite(weights), weights, 0.0)
 
 
-def _away(z: Array, centres: Array) -> Array:
+def _distance_to_centres(z: Array, centres: Array) -> Array:
     """Distance of each point (S, d) to the nearest of the centres (C, d), (S,)."""
-    distances: Array = np.sqrt(z.shape[1]) * nearest(z, centres)
+    distances: Array = np.sqrt(z.shape[1]) * nearest_distances(z, centres)
     return distances
 
 
@@ -131,11 +137,11 @@ class ModulesCorrector(Stored):
         """Return paths (T, S, 2) [m] in the frame (11) of the physics with these factors."""
         if tuple(modules_of(physics.vessel)) != self.modules:
             raise ResultError(f"the physics has other modules than {', '.join(self.modules)}", path="modules")
-        reduced = without(physics)
+        reduced = physics_without_modules(physics)
 
         def acceleration(at: Instants, _: int, whole: Array) -> Array:
             extra = self.factors(at) - 1
-            return np.asarray(np.einsum("sk,skj->sj", extra, shares(reduced, at, whole, physics.step)))
+            return np.asarray(np.einsum("sk,skj->sj", extra, module_accelerations(reduced, at, whole, physics.step)))
 
         return stepped_paths(physics, instants, acceleration)
 
@@ -156,7 +162,9 @@ class ModulesProblem(StepProblem):
     def __init__(self, method: Modules, task: Task, name: str) -> None:
         super().__init__(method, task, name)
         self.modules = tuple(modules_of(self.case.physics.vessel))
-        self.parts = shares(without(self.case.physics), self.steps.at, self.steps.free, self.steps.step)
+        self.parts = module_accelerations(
+            physics_without_modules(self.case.physics), self.steps.at, self.steps.free, self.steps.step
+        )
 
     def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> ModulesCorrector:
         """Return factors on the steps of some windows for all ridges; one ridge has no axis in front."""
@@ -164,13 +172,13 @@ class ModulesProblem(StepProblem):
         chosen = steps.of(windows)
         table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
         table = {key: values for key, values in table.items() if not key.endswith("_rw")}  # factors are of the ship
-        units = Seen.of(table, method.mirror).draw(point, method.units, seed_of(task.seed, number))
+        units = SeenInputs.of(table, method.mirror).draw(point, method.units, seed_of(task.seed, number))
         even, _ = units.parts(table)
         missing, acting = steps.missing[chosen], self.parts[chosen]
         size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
         rows = np.einsum("skj,sm->sjkm", acting / size, even).reshape(missing.size, -1)
         penalty = np.tile(np.r_[0.1, np.ones(method.units)], len(modules))
-        weights = solve(rows, (missing / size).reshape(-1, 1), ridges, penalty)
+        weights = solve_ridges(rows, (missing / size).reshape(-1, 1), ridges, penalty)
         weights = weights.reshape(len(ridges), len(modules), -1)
         alarm = Alarm.fit(table, units.normaliser, method.centres, task.windows.run[steps.window[chosen]])
         weights = weights[0] if len(ridges) == 1 else weights
@@ -195,7 +203,7 @@ class Modules(Stepped):
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")
     RIDGES: ClassVar[int] = 6
     meets_none: ClassVar[bool] = False
-    problem: ClassVar[type[Problem]] = ModulesProblem
+    problem: ClassVar[type[LearningProblem]] = ModulesProblem
     corrector: ClassVar[type[Any]] = ModulesCorrector
 
     trials: PositiveInt = 6

@@ -19,18 +19,18 @@ from shipid.data.windows import Instants
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Problem
+from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import Stepped, StepProblem, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import used
-from shipid.hybrid.units import Seen, Units, solve
+from shipid.hybrid.trials import windows_of_folds
+from shipid.hybrid.units import SeenInputs, Units, solve_ridges
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Head(Stored):
+class OutputWeights(Stored):
     """One network: hidden units and their output weights, (M + 1, 1) for surge and (M or M + 1, 2) for sway and yaw.
 
     Weights may have R more in front, (R, M + 1, 1) and (R, M, 2), for R networks on the same units.
@@ -61,7 +61,7 @@ class OneStepCorrector(Stored):
     """
 
     commands: tuple[str, ...]
-    heads: tuple[Head, ...]
+    heads: tuple[OutputWeights, ...]
     hyperparameters: Mapping[str, float]
     past: float = 0.0
 
@@ -86,18 +86,18 @@ class OneStepProblem(StepProblem):
         """Return networks on the steps of some windows for all ridges; one ridge has no axis in front."""
         chosen = self.steps.of(windows)
         here = {key: values[chosen] for key, values in self.table.items()}
-        units = Seen.of(here, self.method.mirror).draw(point, self.method.units, seed_of(self.task.seed, number))
+        units = SeenInputs.of(here, self.method.mirror).draw(point, self.method.units, seed_of(self.task.seed, number))
         missing = self.steps.missing[chosen]
         size = np.maximum(missing.std(axis=0), 1e-12)
         even, odd = units.parts(here)
-        surge = solve(even, missing[:, :1] / size[:1], ridges) * size[:1]
-        sway_yaw = solve(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
-        head = Head(units, surge, sway_yaw) if len(ridges) > 1 else Head(units, surge[0], sway_yaw[0])
+        surge = solve_ridges(even, missing[:, :1] / size[:1], ridges) * size[:1]
+        sway_yaw = solve_ridges(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
+        head = OutputWeights(units, surge, sway_yaw) if len(ridges) > 1 else OutputWeights(units, surge[0], sway_yaw[0])
         return OneStepCorrector(self.task.commands, (head,), point)
 
     def corrector(self, best: Sequence[Row]) -> OneStepCorrector:
         """Return the mean of the networks of the best trials."""
-        every = used(self.task)
+        every = windows_of_folds(self.task)
         solved = [self.solve(row["number"], row["params"], every) for row in best]
         heads = tuple(one.heads[0] for one in solved)
         return OneStepCorrector(self.task.commands, heads, solved[0].hyperparameters)
@@ -121,7 +121,7 @@ class OneStep(Stepped):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")
-    problem: ClassVar[type[Problem]] = OneStepProblem
+    problem: ClassVar[type[LearningProblem]] = OneStepProblem
     corrector: ClassVar[type[Any]] = OneStepCorrector
 
     trials: PositiveInt = 12

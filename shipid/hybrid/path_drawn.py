@@ -16,14 +16,14 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Fitted, Task
-from shipid.hybrid.settings import Probability, Scale, Searched, spread
-from shipid.hybrid.trials import ridges_of, value_at
+from shipid.hybrid.settings import Probability, Scale, Searched, spread_points
+from shipid.hybrid.trials import ridge_values, setting_at_share
 
 RIDGES = 9  # of a range
-KINDS = ("history", "error", "observer")  # of memory
-CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from, as far as a memory has them
-OBSERVED = (("observer",), KINDS)  # and with estimates of an observer
-MEMORIES = (*CHOICES, *OBSERVED, ("history",), ("error", "observer"), ("history", "observer"))
+MEMORY_KINDS = ("history", "error", "observer")  # of memory
+MEMORY_CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from, as far as a memory has them
+OBSERVER_CHOICES = (("observer",), MEMORY_KINDS)  # and with estimates of an observer
+MEMORIES = (*MEMORY_CHOICES, *OBSERVER_CHOICES, ("history",), ("error", "observer"), ("history", "observer"))
 """What a trial may take, by the number that its record has."""
 Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
@@ -102,15 +102,15 @@ class PathDrawn(Searched):
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
         """Return the kinds of memory that a trial does without."""
-        taken = MEMORIES[int(point["memory"])] if "memory" in point else KINDS
-        return frozenset(set(KINDS) - set(taken))
+        taken = MEMORIES[int(point["memory"])] if "memory" in point else MEMORY_KINDS
+        return frozenset(set(MEMORY_KINDS) - set(taken))
 
     @property
     def memories(self) -> tuple[int, ...]:
-        """What validation chooses from, as places in `MEMORIES`: each of `CHOICES` without what the memory lacks."""
+        """What validation chooses from, as places in `MEMORIES`: each of `MEMORY_CHOICES` without what the memory lacks."""
         memory = self.memory
-        of_kind = dict(zip(KINDS, (memory.history or memory.turned, memory.error, memory.observer), strict=True))
-        choices = (*CHOICES, *OBSERVED) if self.memory.observer else CHOICES
+        of_kind = dict(zip(MEMORY_KINDS, (memory.history or memory.turned, memory.error, memory.observer), strict=True))
+        choices = (*MEMORY_CHOICES, *OBSERVER_CHOICES) if self.memory.observer else MEMORY_CHOICES
         kept = (tuple(kind for kind in choice if of_kind[kind]) for choice in choices)
         return tuple(dict.fromkeys(map(MEMORIES.index, kept)))
 
@@ -139,15 +139,17 @@ class PathDrawn(Searched):
         """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0; endless by budget."""
         ranges = [name for name in self.ranges() if name != "ridge"]
         fixed = {name: value for name in self.SEARCHED if not isinstance(value := getattr(self, name), tuple)}
-        for number, shares in enumerate(spread(len(ranges) + 1, None if self.budget else self.trials)):
+        for number, shares in enumerate(spread_points(len(ranges) + 1, None if self.budget else self.trials)):
             point = {**fixed, "mirror": float(shares[0] < self.mirror)}
             if self.choose:
                 point["memory"] = float(self.memories[number % len(self.memories)])
-            yield point | {name: value_at(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)}
+            yield point | {
+                name: setting_at_share(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)
+            }
 
     def path(self) -> list[float]:
         """Return the ridges of which each trial takes one for each model, rising, evenly spread by their logarithm."""
-        return ridges_of(self.ridge, RIDGES)
+        return ridge_values(self.ridge, RIDGES)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""

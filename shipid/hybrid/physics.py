@@ -93,10 +93,10 @@ class Physics:
     ) -> tuple[Array, Array]:
         """Paths (T, V, S, 2) [m] in the frame (11) of V variants, `parameters` (V, P), and which diverged (V, S).
 
-        What the vessel feels and the columns do not hold, such as wind that was not measured, is zero: see `assumed`.
+        What the vessel feels and the columns do not hold, such as wind that was not measured, is zero: see `missing_columns`.
         """
         result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
-        return np.stack(_in_frame(instants, north, east), axis=-1), result.diverged
+        return np.stack(_positions_in_frame(instants, north, east), axis=-1), result.diverged
 
     def states(self, instants: Instants, *, engine: str = AUTO) -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S), horizontal as in a log.
@@ -107,7 +107,7 @@ class Physics:
         leaning = tuple(name for name in LEANING if name in vessel_dynamics(self.ship).state)
         kept = ("north", "east", *MOTION, *leaning)
         result, (north, east) = self._rollout(instants, kept, None, "cpu", engine)
-        x, y = _in_frame(instants, north[:, 0], east[:, 0])
+        x, y = _positions_in_frame(instants, north[:, 0], east[:, 0])
         motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
         if leaning:
             with np.errstate(all="ignore"):  # a path that diverged
@@ -155,7 +155,7 @@ class Physics:
         future = as_float_array("future", future, DataError)
         if future.shape != (self.horizon, len(instants), 2):
             raise DataError(f"future must be {(self.horizon, len(instants), 2)}, not {future.shape}")
-        goal = np.stack(from_frame(future[..., 0], future[..., 1], *_origin(instants)), axis=-1)
+        goal = np.stack(from_frame(future[..., 0], future[..., 1], *_place_of_instants(instants)), axis=-1)
         if drift is not None:
             goal = goal - self.step * np.arange(1, len(future) + 1)[:, None, None] * drift.T
         return goal
@@ -247,17 +247,17 @@ class Physics:
         return start, commands, environment, slow, drift
 
 
-def _origin(instants: Instants) -> tuple[Array, Array, Array]:
+def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:
     """Place and heading (S,) at the instants; zero where they are not among the columns."""
     zero = np.zeros(len(instants))
     columns = instants.columns
     return columns.get("north", zero), columns.get("east", zero), columns.get("psi", zero)
 
 
-def _in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
+def _positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
     """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged is not finite."""
     with np.errstate(invalid="ignore"):  # it is flagged, and no news to the caller
-        return to_frame(north, east, *_origin(instants))
+        return to_frame(north, east, *_place_of_instants(instants))
 
 
 def check_instants(instants: Instants) -> None:
@@ -268,7 +268,7 @@ def check_instants(instants: Instants) -> None:
         raise DataError("the instants lack this column", path="u")
 
 
-def assumed(vessel: Vessel, columns: Collection[str]) -> list[str]:
+def missing_columns(vessel: Vessel, columns: Collection[str]) -> list[str]:
     """Columns of states and weather that a vessel has and the columns lack: taken as zero, and named in the report."""
     model = vessel_dynamics(vessel)
     needed = (state_column(name) for name in (*model.state, *model.environment))

@@ -14,29 +14,29 @@ import torch
 from torch import Tensor
 
 
-def by_numpy(values: Tensor) -> bool:
+def is_numpy_tensor(values: Tensor) -> bool:
     """Whether NumPy computes with a tensor: it is on the processor."""
     return values.device.type == "cpu"
 
 
-def matmul(left: Tensor, right: Tensor) -> Tensor:
+def matrix_product(left: Tensor, right: Tensor) -> Tensor:
     """Return left @ right, of matrices or stacks of them."""
-    if not by_numpy(left):
+    if not is_numpy_tensor(left):
         return left @ right
     return torch.from_numpy(np.matmul(left.numpy(), right.numpy()))
 
 
-def gram(values: Tensor) -> Tensor:
+def gram_matrix(values: Tensor) -> Tensor:
     """Return values.T @ values of (S, M), at half of the price of a product."""
-    if not by_numpy(values):
+    if not is_numpy_tensor(values):
         return values.T @ values
     array = values.numpy()
     return torch.from_numpy(array.T @ array)  # NumPy sees that one is the other's transpose
 
 
-def hidden(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
+def hidden_layer(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
     """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
-    if not by_numpy(values):
+    if not is_numpy_tensor(values):
         return torch.addmm(offset, values, weight).tanh_()
     units = np.matmul(values.numpy(), weight.numpy())
     units += offset.numpy()
@@ -53,7 +53,7 @@ def _tanh_by_torch() -> bool:
 
 def sums_of_squares(values: Tensor) -> Tensor:
     """Return the sums of squares (F, C) of values (F, b, C) over their rows."""
-    if not by_numpy(values):
+    if not is_numpy_tensor(values):
         return values.square().sum(dim=1)
     array = values.numpy()
     return torch.from_numpy(np.einsum("fbc,fbc->fc", array, array))

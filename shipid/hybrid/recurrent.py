@@ -20,15 +20,15 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.hybrid.compensator import Normaliser, flatten, smooth_basis, unflatten
-from shipid.hybrid.features import Inputs, Memory, feature_table, steps_of
+from shipid.hybrid.compensator import Normaliser, flatten_paths, smooth_basis, unflatten_paths
+from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
 from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Judged, Problem, SearchedAlone
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import mean_square
-from shipid.hybrid.units import Seen
+from shipid.hybrid.trials import mean_squared_error
+from shipid.hybrid.units import SeenInputs
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Sequences:
 
 
 @dataclass(frozen=True)
-class Reader(Stored):
+class SequenceReader(Stored):
     """Names, statistics and mirrors of what a network reads.
 
     past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
@@ -57,7 +57,7 @@ class Reader(Stored):
 
     def read(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Sequences:
         """Read instants, with their inputs (S,) as `Inputs.table` gives them."""
-        rows = [self.past.apply(signals) for signals in signals_of(instants, self.steps, commands)]
+        rows = [self.past.apply(signals) for signals in past_signals(instants, self.steps, commands)]
         return Sequences(np.stack(rows), self.now.apply(table))
 
     def mirrored(self, seen: Sequences) -> Sequences:
@@ -67,7 +67,7 @@ class Reader(Stored):
         return Sequences(seen.past @ along, seen.now @ at)
 
 
-def signals_of(instants: Instants, steps: int, commands: tuple[str, ...]) -> list[dict[str, Array]]:
+def past_signals(instants: Instants, steps: int, commands: tuple[str, ...]) -> list[dict[str, Array]]:
     """Motion, commands and relative wind (S,) at the last `steps` steps and at the instant, the oldest first."""
     held = len(instants.past.get("u", ()))
     if held < steps:
@@ -80,7 +80,7 @@ def signals_of(instants: Instants, steps: int, commands: tuple[str, ...]) -> lis
 class GatedNetwork(Stored):
     """One trained network: what it reads, its layers by name, and its basis (T, r) [m]."""
 
-    reader: Reader
+    reader: SequenceReader
     layers: Mapping[str, Array]
     basis: Array
 
@@ -91,7 +91,7 @@ class GatedNetwork(Stored):
         if self.reader.mirrors is not None:
             half = np.repeat([1.0, -1.0], outputs.shape[1] // 2)
             outputs = (outputs + half * self._outputs(self.reader.mirrored(seen))) / 2
-        return np.tensordot(self.basis, unflatten(outputs), 1)
+        return np.tensordot(self.basis, unflatten_paths(outputs), 1)
 
     def _outputs(self, seen: Sequences) -> Array:
         layers = self.layers
@@ -101,14 +101,14 @@ class GatedNetwork(Stored):
             b = hidden @ layers["W_h"].T + layers["b_h"]
             reset, update, fresh = np.split(a, 3, axis=1)
             reset_h, update_h, fresh_h = np.split(b, 3, axis=1)
-            gate = _sigmoid(update + update_h)
-            hidden = (1 - gate) * np.tanh(fresh + _sigmoid(reset + reset_h) * fresh_h) + gate * hidden
+            gate = _logistic(update + update_h)
+            hidden = (1 - gate) * np.tanh(fresh + _logistic(reset + reset_h) * fresh_h) + gate * hidden
         full = np.concatenate([hidden, seen.now], axis=1)
         outputs: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
         return outputs
 
 
-def _sigmoid(values: Array) -> Array:
+def _logistic(values: Array) -> Array:
     return (1 + np.tanh(values / 2)) / 2
 
 
@@ -128,7 +128,7 @@ class RecurrentCorrector(Stored):
         return np.asarray(paths + np.mean(corrections, axis=0))
 
 
-class RecurrentProblem(Problem):
+class RecurrentProblem(LearningProblem):
     """A foundation whose past is read by networks, one for each fold, that give the error of the path on the basis."""
 
     def __init__(self, method: Recurrent, task: Task, name: str) -> None:
@@ -139,7 +139,7 @@ class RecurrentProblem(Problem):
         self.weights = np.tensordot(self.basis.T, self.targets, 1)  # (r, S, 2)
         self.trained: dict[int, tuple[GatedNetwork, ...]] = {}  # trial -> networks of the folds
 
-    def judge(self, number: int, point: Point) -> Judged:
+    def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the error of the networks of the folds on their validation windows, and the most epochs of one."""
         networks = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
         self.trained[number] = tuple(network for network, _ in networks)
@@ -147,8 +147,8 @@ class RecurrentProblem(Problem):
         for network, (_, validation) in zip(self.trained[number], self.task.folds, strict=True):
             here, instants = self._rows(validation), self.instants.select(validation)
             predicted = network.predict(here, instants, self.task.commands)
-            losses.append(mean_square(predicted, self.targets[:, validation]))
-        return Judged(float(np.mean(losses)), point, max(epochs for _, epochs in networks))
+            losses.append(mean_squared_error(predicted, self.targets[:, validation]))
+        return TrialWorth(float(np.mean(losses)), point, max(epochs for _, epochs in networks))
 
     def corrector(self, best: Sequence[Row]) -> RecurrentCorrector:
         """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
@@ -161,15 +161,15 @@ class RecurrentProblem(Problem):
         """Inputs of some windows at their instants."""
         return {key: values[windows] for key, values in self.table.items()}
 
-    def _reader(self, training: Index) -> Reader:
+    def _reader(self, training: Index) -> SequenceReader:
         """Statistics of the training windows alone."""
-        steps = steps_of(self.method.seconds, self.task.windows.step)
-        rows = signals_of(self.task.windows.select(training).instants(), steps, self.task.commands)
+        steps = count_steps(self.method.seconds, self.task.windows.step)
+        rows = past_signals(self.task.windows.select(training).instants(), steps, self.task.commands)
         along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-        past, now = (Seen.of(part, self.method.mirror) for part in (along, self._rows(training)))
+        past, now = (SeenInputs.of(part, self.method.mirror) for part in (along, self._rows(training)))
         if past.reflection is None or now.reflection is None:
-            return Reader(past.normaliser, now.normaliser, None, steps)
-        return Reader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
+            return SequenceReader(past.normaliser, now.normaliser, None, steps)
+        return SequenceReader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""
@@ -182,7 +182,7 @@ class RecurrentProblem(Problem):
         for windows in self.task.folds[fold]:
             seen = reader.read(self._rows(windows), self.instants.select(windows), self.task.commands)
             both = [seen] if reader.mirrors is None else [seen, reader.mirrored(seen)]
-            parts.append(([(one.past, one.now) for one in both], flatten(self.weights[:, windows]) / scale))
+            parts.append(([(one.past, one.now) for one in both], flatten_paths(self.weights[:, windows]) / scale))
         seed = seed_of(self.task.seed, self.name, number, fold)
         length = Length(method.epochs, method.batch, method.patience)
         layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
@@ -209,7 +209,7 @@ class Recurrent(SearchedAlone):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("learning_rate",)
-    problem: ClassVar[type[Problem]] = RecurrentProblem
+    problem: ClassVar[type[LearningProblem]] = RecurrentProblem
     corrector: ClassVar[type[Any]] = RecurrentCorrector
 
     trials: PositiveInt = 3

@@ -27,23 +27,27 @@ from torch import Tensor
 
 from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Compensator, Network, smooth_basis
-from shipid.hybrid.features import Inputs, group_of
-from shipid.hybrid.method import Array, Fitted, Index, Row, Task, same_table, shared_tables
-from shipid.hybrid.products import gram, hidden, matmul, sums_of_squares
-from shipid.hybrid.search import CLOSING, Search
+from shipid.hybrid.features import Inputs, input_group
+from shipid.hybrid.method import Array, Fitted, Index, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.products import gram_matrix, hidden_layer, matrix_product, sums_of_squares
+from shipid.hybrid.search import CLOSING_TRIALS, Search
 from shipid.hybrid.settings import Point, Searched, seed_of
-from shipid.hybrid.trials import diverged, row_of, used
-from shipid.hybrid.units import Seen, Units
+from shipid.hybrid.trials import diverged_result, trial_row, windows_of_folds
+from shipid.hybrid.units import SeenInputs, Units
 
 Mask = NDArray[np.bool_]
-Seeing = tuple[Seen, Tensor]
+Seeing = tuple[SeenInputs, Tensor]
 """Windows as hidden units see them: what is seen, and its values (S, d), normalised."""
 
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
-FINAL = 2  # trials by a part of the windows that one by all costs, about
-SPARE = 4  # further trials whose errors without each run are kept
-SOUND = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
-ROUNDING = 1e-3  # by which a sum of squares must be greater to be so for sure: a hundred times what `SOUND` leaves
+FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
+SPARE_TRIALS = 4  # further trials whose errors without each run are kept
+LEAST_PIVOT = (
+    0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
+)
+ROUNDING = (
+    1e-3  # by which a sum of squares must be greater to be so for sure: a hundred times what `LEAST_PIVOT` leaves
+)
 
 
 @dataclass(frozen=True)
@@ -74,13 +78,13 @@ def tune_ridge(task: Task, method: Searched, recipe: Recipe) -> dict[str, Fitted
     of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
     chooses the trials that are judged by all, and of these the best make the compensator.
     """
-    tuning = _Tuning(task, method, recipe)
+    tuning = _RidgeTuning(task, method, recipe)
     tuning.search()
     return {key: tuning.fitted(key) for key in task.cases}
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Coordinate:
     """One coordinate, x or y: features with the axes of their Gram matrix, and what they have to make.
 
     features : (S, M); eigenvalues : (M,), rising; axes : (M, M); targets : (S, K r) [m];
@@ -96,7 +100,7 @@ class _Part:
     def rotated(self, windows: Tensor) -> Tensor:
         """Features of some windows (...) on the axes, (..., M)."""
         every = torch.arange(len(self.features), device=windows.device)
-        return matmul(self.features if torch.equal(windows, every) else self.features[windows], self.axes)
+        return matrix_product(self.features if torch.equal(windows, every) else self.features[windows], self.axes)
 
     def weights(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """Weights (M, C) of the axes, fitted to all windows, for some columns of the targets."""
@@ -104,7 +108,7 @@ class _Part:
 
 
 @dataclass(frozen=True)
-class _Group:
+class _FoundationGroup:
     """Foundations whose inputs are the same arrays in a trial: one decomposition serves them all.
 
     names : the foundations. outputs : x and y of their targets on the basis, (S, K r) each.
@@ -116,20 +120,20 @@ class _Group:
     plain: Seeing
     mirrored: Seeing | None
 
-    def of_rows(self, rows: Tensor) -> _Group:
+    def of_rows(self, rows: Tensor) -> _FoundationGroup:
         """The group with some of the windows; means and spreads of inputs stay those of all."""
         plain = self.plain[0], self.plain[1][rows]
         mirrored = (self.mirrored[0], self.mirrored[1][rows]) if self.mirrored else None
         return replace(self, outputs=[side[rows] for side in self.outputs], plain=plain, mirrored=mirrored)
 
-    def only(self, names: Sequence[str], terms: int) -> _Group:
+    def only(self, names: Sequence[str], terms: int) -> _FoundationGroup:
         """The group for some of the foundations; `terms` is r."""
         columns = [self.names.index(name) * terms + term for name in names for term in range(terms)]
         return replace(self, names=tuple(names), outputs=[side[:, columns] for side in self.outputs])
 
 
 @dataclass(frozen=True)
-class _Judges:
+class _JudgingWindows:
     """Windows by which trials are judged: all, or a part.
 
     rows : places of the windows among all, (S,). share : of all windows, by which a ridge shrinks as the sum of squares
@@ -139,24 +143,24 @@ class _Judges:
 
     rows: Index
     share: float
-    blocks: list[_Block]
+    blocks: list[_FoldBlock]
     faster: dict[str, float]
     count: int
 
     @classmethod
-    def of(cls, task: Task, windows: Index, rows: Index, targets: Mapping[str, Array], basis: Array) -> _Judges:
+    def of(cls, task: Task, windows: Index, rows: Index, targets: Mapping[str, Array], basis: Array) -> _JudgingWindows:
         """Take some rows (S,) of the windows, numbered as in the task; targets (T, S, 2) [m] of each foundation."""
         taken = windows[rows]
         folds = [
             (training[np.isin(training, taken)], judged[np.isin(judged, taken)]) for training, judged in task.folds
         ]
         judged = np.concatenate([validation for _, validation in folds])
-        faster = {key: _faster(paths[:, judged], basis) for key, paths in targets.items()}
-        return cls(rows, len(rows) / len(windows), _blocks(folds, taken, task.device), faster, len(judged))
+        faster = {key: _unfollowed_squares(paths[:, judged], basis) for key, paths in targets.items()}
+        return cls(rows, len(rows) / len(windows), _fold_blocks(folds, taken, task.device), faster, len(judged))
 
 
 @dataclass(frozen=True)
-class _Verdict:
+class _TrialVerdict:
     """One trial for one foundation.
 
     value : mean squared error [m^2] on runs left out. ridges : numbers of the ridges that all folds, or all but one,
@@ -172,7 +176,7 @@ class _Verdict:
     left_out: Callable[[], tuple[Array, Tensor]]
 
 
-class _Best:
+class _BestTrials:
     """The networks of the best trials of one model so far, and the errors without each fold of some more.
 
     Without a fold, other trials may be the best.
@@ -183,10 +187,10 @@ class _Best:
         self.networks: list[tuple[float, tuple[dict[str, float], Network]]] = []
         self.left_out: list[tuple[float, tuple[Array, Tensor]]] = []
 
-    def consider(self, trial: _Verdict) -> None:
+    def consider(self, trial: _TrialVerdict) -> None:
         """Solve the network if the trial is among the best."""
         _keep_best(self.networks, self.most, trial.value, lambda: (trial.params, trial.network()))
-        _keep_best(self.left_out, self.most + SPARE, trial.value, trial.left_out)
+        _keep_best(self.left_out, self.most + SPARE_TRIALS, trial.value, trial.left_out)
 
     def without(self, folds: Sequence[Index]) -> Array:
         """Errors (2, S, r) on the basis where no fold has a part in the choice of the trials that judge it."""
@@ -205,7 +209,7 @@ def _keep_best(kept: list[tuple[float, Any]], most: int, value: float, make: Cal
         kept[:] = sorted([*kept, (value, make())], key=lambda pair: pair[0])[:most]
 
 
-class _Tuning:
+class _RidgeTuning:
     """What the trials of a task share, and the best of them so far.
 
     windows : those of all folds. paths : foundation -> targets on the basis, where they are numbers. every : all
@@ -214,26 +218,26 @@ class _Tuning:
 
     def __init__(self, task: Task, method: Searched, recipe: Recipe) -> None:
         self.task, self.method, self.recipe = task, method, recipe
-        self.windows, self.targets = used(task), task.targets
+        self.windows, self.targets = windows_of_folds(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
-        tables = _of_windows(shared_tables(task, recipe.inputs), self.windows)
+        tables = _tables_of_windows(shared_tables(task, recipe.inputs), self.windows)
         self.tables = {key: tables[key] for key in sound}
         self.basis = smooth_basis(task.windows.horizon, recipe.terms)
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
-        self.every = _Judges.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
+        self.every = _JudgingWindows.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
         rows = part_of_runs(task.windows.run[self.windows], recipe.search_windows)
         self.whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
-        self.first = self.every if self.whole else _Judges.of(task, self.windows, rows, sound, self.basis)
-        self.finalists = method.num_chosen() + SPARE
-        self.best = {key: _Best(method.num_chosen()) for key in sound}
+        self.first = self.every if self.whole else _JudgingWindows.of(task, self.windows, rows, sound, self.basis)
+        self.finalists = method.num_chosen() + SPARE_TRIALS
+        self.best = {key: _BestTrials(method.num_chosen()) for key in sound}
         self.points: dict[int, Point] = {}
-        self.groups: dict[frozenset[str], list[_Group]] = {}
+        self.groups: dict[frozenset[str], list[_FoundationGroup]] = {}
         self.rows: dict[str, list[Row]] = {}
 
     def search(self) -> None:
         """Judge all trials, by a part of the windows where they are many."""
         # networks are solved again after a break: it costs less than to keep them
-        closing = CLOSING if self.whole else FINAL * self.finalists
+        closing = CLOSING_TRIALS if self.whole else FINAL_PRICE * self.finalists
         search = Search(self.task, self.paths, self.method, again=True, closing=closing)
         promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.paths}
         for number, point in search.left(self.recipe.points() if self.paths else ()):
@@ -245,7 +249,7 @@ class _Tuning:
                     if self.whole:
                         self.best[key].consider(verdict)
                     promising[key].append((verdict.value, number, verdict.ridges))
-                    made[key] = row_of(number, verdict.params, verdict.value, start)
+                    made[key] = trial_row(number, verdict.params, verdict.value, start)
                 for key in group.names:
                     made[key]["seconds"] = (time.process_time() - start) / len(group.names)
             search.record(made)
@@ -281,7 +285,7 @@ class _Tuning:
         With a single fold there are none: nothing but that fold can choose the trials that judge it.
         """
         if key not in self.best:
-            return diverged(self.method, self.recipe.points())
+            return diverged_result(self.method, self.recipe.points())
         best, errors = self.best[key], None
         folds = [row.cpu().numpy() for block in self.every.blocks for row in block.rows]
         if len(folds) > 1:
@@ -292,41 +296,43 @@ class _Tuning:
         corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
         return Fitted(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
-    def _groups(self, number: int, *, whole: bool = False) -> list[_Group]:
+    def _groups(self, number: int, *, whole: bool = False) -> list[_FoundationGroup]:
         """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""
         left_out = self.recipe.left_out(self.points[number])
         if left_out not in self.groups:
-            self.groups[left_out] = _groups(self.tables, self.paths, left_out, len(self.windows), self.task.device)
+            self.groups[left_out] = _group_foundations(
+                self.tables, self.paths, left_out, len(self.windows), self.task.device
+            )
         if whole or self.whole:
             return self.groups[left_out]
         rows = torch.as_tensor(self.first.rows, device=self.task.device)
         return [group.of_rows(rows) for group in self.groups[left_out]]
 
     def _judge(
-        self, group: _Group, number: int, judges: _Judges, wanted: Mapping[str, Index] | None = None
-    ) -> dict[str, _Verdict]:
+        self, group: _FoundationGroup, number: int, judges: _JudgingWindows, wanted: Mapping[str, Index] | None = None
+    ) -> dict[str, _TrialVerdict]:
         """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
         point, terms, ridges = self.points[number], self.basis.shape[1], self.recipe.ridges
         mirrored = bool(point["mirror"]) and group.mirrored is not None
         seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
         units = seen.draw(point, self.recipe.units, seed_of(self.task.seed, number))
-        layer = _layer(units)  # the same array for all foundations
-        parts = _parts(values, units, group.outputs, self.task.device)
+        layer = _hidden_weights(units)  # the same array for all foundations
+        parts = _coordinates_of_trial(values, units, group.outputs, self.task.device)
         asked = None
         if wanted is not None:
             asked = np.stack([np.isin(range(len(ridges)), wanted[key]) for key in group.names], axis=1)
         scaled = [ridge * judges.share for ridge in ridges]
-        errors, others, kept = _left_out(parts, scaled, judges.blocks, terms, asked)
+        errors, others, kept = _left_out_errors(parts, scaled, judges.blocks, terms, asked)
         verdicts = {}
         for k, key in enumerate(group.names):
             place, columns = int(errors[:, k].argmin()), slice(k * terms, (k + 1) * terms)
             chosen = np.unique([place, *others[:, :, k].argmin(axis=0)])
-            verdicts[key] = _Verdict(
+            verdicts[key] = _TrialVerdict(
                 value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
-                ridges=_down_to(ridges, judges.share, chosen),
+                ridges=_ridges_for_all(ridges, judges.share, chosen),
                 params={**point, "mirror": float(mirrored), "ridge": ridges[place]},
-                network=partial(_network, seen, layer, parts, columns, scaled[place], self.basis),
-                left_out=partial(_chosen_without, others[:, :, k], kept, k),
+                network=partial(_solved_network, seen, layer, parts, columns, scaled[place], self.basis),
+                left_out=partial(_without_each_fold, others[:, :, k], kept, k),
             )
         return verdicts
 
@@ -352,7 +358,7 @@ def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
     return np.sort(np.concatenate(taken))
 
 
-def _down_to(ridges: Sequence[float], share: float, chosen: Index) -> Index:
+def _ridges_for_all(ridges: Sequence[float], share: float, chosen: Index) -> Index:
     """Numbers of the rising ridges that all windows may choose where a share of them chose these.
 
     A fit to a part has ridges smaller by that share, which is right where windows are alike. Where each has news, a
@@ -363,7 +369,7 @@ def _down_to(ridges: Sequence[float], share: float, chosen: Index) -> Index:
     return np.unique(np.concatenate([np.arange(low, high + 1) for low, high in ranges]))
 
 
-def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
+def _tables_of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
     """Tables with the chosen windows alone; arrays that several tables share stay shared."""
     chosen: dict[int, Array] = {}
     for table in tables.values():
@@ -372,35 +378,37 @@ def _of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> di
     return {key: {name: chosen[id(values)] for name, values in table.items()} for key, table in tables.items()}
 
 
-def _groups(
+def _group_foundations(
     tables: Mapping[str, Mapping[str, Array]],
     paths: Mapping[str, Array],
     left_out: frozenset[str],
     num_windows: int,
     device: str,
-) -> list[_Group]:
+) -> list[_FoundationGroup]:
     """Foundations with the same inputs together; `left_out` names kinds of memory that the trial does not take."""
     alike: dict[Any, list[str]] = {}
     seen: dict[Any, dict[str, Array]] = {}
     for key, table in tables.items():
-        taken = {name: values for name, values in table.items() if group_of(name) not in left_out}
-        alike.setdefault(same_table(taken), []).append(key)
-        seen[same_table(taken)] = taken
+        taken = {name: values for name, values in table.items() if input_group(name) not in left_out}
+        alike.setdefault(input_table_key(taken), []).append(key)
+        seen[input_table_key(taken)] = taken
     groups = []
     for table_key, keys in alike.items():
-        outputs = [_side([paths[key] for key in keys], axis, num_windows, device) for axis in (0, 1)]
-        plain, mirrored = (_seeing(seen[table_key], device, mirror=mirror) for mirror in (False, True))
-        groups.append(_Group(tuple(keys), outputs, plain, mirrored if mirrored[0].reflection is not None else None))
+        outputs = [_stacked_side([paths[key] for key in keys], axis, num_windows, device) for axis in (0, 1)]
+        plain, mirrored = (_normalised_inputs(seen[table_key], device, mirror=mirror) for mirror in (False, True))
+        groups.append(
+            _FoundationGroup(tuple(keys), outputs, plain, mirrored if mirrored[0].reflection is not None else None)
+        )
     return groups
 
 
-def _faster(paths: Array, basis: Array) -> float:
+def _unfollowed_squares(paths: Array, basis: Array) -> float:
     """Sum of squares [m^2] of what the basis cannot follow in paths (T, S, 2)."""
     return float(np.square(paths - np.tensordot(basis @ basis.T, paths, 1)).sum())
 
 
 @dataclass(frozen=True)
-class _Block:
+class _FoldBlock:
     """Folds of equal size.
 
     out : rows of the windows that each fold leaves out, (folds, b). judged : which of those are judged, (folds, j).
@@ -423,7 +431,7 @@ class _Block:
         return errors if self.all_judged else errors.take_along_dim(self.judged[:, :, None], dim=1)
 
 
-def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[_Block]:
+def _fold_blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[_FoldBlock]:
     """What each fold leaves out, and which of it is judged, equal sizes together."""
     pairs: dict[tuple[int, int], list[tuple[Index, Index]]] = {}
     for training, validation in folds:
@@ -432,49 +440,53 @@ def _blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -
         pairs.setdefault((len(out), len(judged)), []).append((out, judged))
     stacked = [tuple(np.stack(parts) for parts in zip(*same, strict=True)) for same in pairs.values()]
     return [
-        _Block(torch.as_tensor(out, device=device), torch.as_tensor(judged, device=device)) for out, judged in stacked
+        _FoldBlock(torch.as_tensor(out, device=device), torch.as_tensor(judged, device=device))
+        for out, judged in stacked
     ]
 
 
-def _seeing(table: Mapping[str, Array], device: str, *, mirror: bool) -> Seeing:
+def _normalised_inputs(table: Mapping[str, Array], device: str, *, mirror: bool) -> Seeing:
     """Choose and normalise the inputs; with a mirror, by the windows and their images."""
-    seen = Seen.of(table, mirror)
-    return seen, _tensor(seen.normaliser.apply(table), device)
+    seen = SeenInputs.of(table, mirror)
+    return seen, _double_tensor(seen.normaliser.apply(table), device)
 
 
-def _parts(values: Tensor, units: Units, outputs: Sequence[Tensor], device: str) -> list[_Part]:
+def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor], device: str) -> list[_Coordinate]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
-    weight, offset = (_tensor(part, device) for part in (units.weight, units.offset))
+    weight, offset = (_double_tensor(part, device) for part in (units.weight, units.offset))
     size = len(offset) ** 0.5
-    features = hidden(values, weight, offset)
+    features = hidden_layer(values, weight, offset)
     if units.reflection is None:
-        return _with_axes(features.div_(size), outputs)
-    image = hidden(values, _tensor(units.reflection, device) @ weight, offset)
+        return _coordinates_with_axes(features.div_(size), outputs)
+    image = hidden_layer(values, _double_tensor(units.reflection, device) @ weight, offset)
     even = (features + image).div_(2**0.5 * size)
     odd = features.sub_(image).div_(2**0.5 * size)
-    return _with_axes(even, outputs[:1]) + _with_axes(odd, outputs[1:])
+    return _coordinates_with_axes(even, outputs[:1]) + _coordinates_with_axes(odd, outputs[1:])
 
 
-def _with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Part]:
+def _coordinates_with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Coordinate]:
     """Coordinates that are made of the same features."""
-    eigenvalues, axes = _decompose(features)
-    return [_Part(features, eigenvalues, axes, side, matmul(axes.T, matmul(features.T, side))) for side in outputs]
+    eigenvalues, axes = _decompose_gram(features)
+    return [
+        _Coordinate(features, eigenvalues, axes, side, matrix_product(axes.T, matrix_product(features.T, side)))
+        for side in outputs
+    ]
 
 
-def _decompose(features: Tensor) -> tuple[Tensor, Tensor]:
+def _decompose_gram(features: Tensor) -> tuple[Tensor, Tensor]:
     """Eigenvalues and axes of the Gram matrix; rounding makes no eigenvalue negative."""
-    eigenvalues, axes = torch.linalg.eigh(gram(features))
+    eigenvalues, axes = torch.linalg.eigh(gram_matrix(features))
     return eigenvalues.clamp(min=0.0), axes
 
 
-class _Errors:
+class _LeftOutErrors:
     """Errors of a trial over judged windows, each fold without itself, by ridge; in single precision."""
 
     def __init__(self, num_windows: int, terms: int, num_ridges: int) -> None:
         self.num_windows, self.terms = num_windows, terms
-        self.blocks: list[list[tuple[_Piece, list[int], Tensor]]] = [[] for _ in range(num_ridges)]
+        self.blocks: list[list[tuple[_SidePiece, list[int], Tensor]]] = [[] for _ in range(num_ridges)]
 
-    def keep(self, ridge: int, piece: _Piece, models: list[int], errors: Tensor) -> None:
+    def keep(self, ridge: int, piece: _SidePiece, models: list[int], errors: Tensor) -> None:
         """Keep the errors (folds, j, sides x models x r) of some models on the judged windows of a piece."""
         self.blocks[ridge].append((piece, models, errors.float()))
 
@@ -490,13 +502,13 @@ class _Errors:
         return selected
 
 
-def _left_out(
-    parts: Sequence[_Part],
+def _left_out_errors(
+    parts: Sequence[_Coordinate],
     ridges: Sequence[float],
-    blocks: Sequence[_Block],
+    blocks: Sequence[_FoldBlock],
     terms: int,
     wanted: Mask | None = None,
-) -> tuple[Array, Array, _Errors]:
+) -> tuple[Array, Array, _LeftOutErrors]:
     """Errors over judged windows, each block without itself.
 
     `ridges` rise; `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models. By default each model
@@ -511,14 +523,14 @@ def _left_out(
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
     pieces = [
-        _Piece(sides, slice(end - len(block.out), end), block, _solver(part, block))
-        for sides, part in _alike(parts)
+        _SidePiece(sides, slice(end - len(block.out), end), block, _left_out_solver(part, block))
+        for sides, part in _join_alike_sides(parts)
         for end, block in zip(ends, blocks, strict=True)
     ]
     num_models = targets.shape[1] // terms
     sums = targets.new_full((len(ridges), num_models), torch.inf)
     others = targets.new_full((len(ridges), ends[-1], num_models), torch.inf)
-    errors = _Errors(len(targets), terms, len(ridges))
+    errors = _LeftOutErrors(len(targets), terms, len(ridges))
     bounded = all(block.all_judged for block in blocks)  # what is left out is, not every part of it
 
     def but_one(made: Sequence[Tensor], count: int) -> tuple[Tensor, Tensor]:
@@ -564,7 +576,7 @@ def _left_out(
     return sums.cpu().numpy(), others.cpu().numpy(), errors
 
 
-def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
+def _join_alike_sides(parts: Sequence[_Coordinate]) -> Iterator[tuple[tuple[int, ...], _Coordinate]]:
     """Sides with the same features as one part, their targets side by side."""
     same = [parts] if all(part.features is parts[0].features for part in parts) else [[part] for part in parts]
     first = 0
@@ -575,12 +587,12 @@ def _alike(parts: Sequence[_Part]) -> Iterator[tuple[tuple[int, ...], _Part]]:
 
 
 @dataclass(frozen=True)
-class _Piece:
+class _SidePiece:
     """Some sides, x and y, of the folds of a block. folds : their places among all folds."""
 
     sides: tuple[int, ...]
     folds: slice
-    block: _Block
+    block: _FoldBlock
     solver: _FewRows | _ManyRows
 
     def columns(self, of_side: list[int] | None, width: int) -> list[int] | slice:
@@ -590,11 +602,11 @@ class _Piece:
         return [place * width + column for place in range(len(self.sides)) for column in of_side]
 
 
-def _solver(part: _Part, block: _Block) -> _FewRows | _ManyRows:
+def _left_out_solver(part: _Coordinate, block: _FoldBlock) -> _FewRows | _ManyRows:
     return (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
 
 
-def _chosen_without(others: Array, errors: _Errors, model: int) -> tuple[Array, Tensor]:
+def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tuple[Array, Tensor]:
     """A trial without each fold in turn, for one model: others (ridges, F) [m^2] over all folds but that one."""
     return others.min(axis=0), errors.of(others.argmin(axis=0), model)
 
@@ -605,7 +617,7 @@ class _FewRows:
     In single precision, which is twice as fast, where that is sound: the smaller the ridge, the worse is the condition.
     """
 
-    def __init__(self, part: _Part, block: _Block) -> None:
+    def __init__(self, part: _Coordinate, block: _FoldBlock) -> None:
         self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
         self.exact = part.rotated(out)
@@ -616,20 +628,20 @@ class _FewRows:
 
     def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """What the fit of all windows misses of some columns of the targets, (folds, b, C), in single precision."""
-        fitted = matmul(self.flat, self.part.weights(ridge, columns).float())
+        fitted = matrix_product(self.flat, self.part.weights(ridge, columns).float())
         return torch.sub(self.targets[:, columns], fitted, out=fitted).view(*self.shape, -1)
 
     def without(self, ridge: float, missed: Tensor, columns: list[int] | slice) -> Tensor:
         """What a fit without each block misses of it; by Cholesky's factors of I - H_bb.
 
-        In double precision for blocks with a squared pivot below `SOUND`, which limits the digits.
+        In double precision for blocks with a squared pivot below `LEAST_PIVOT`, which limits the digits.
         """
         diagonal = self.part.eigenvalues + ridge
-        hat = matmul(self.rows, self.columns * (1 / diagonal).float()[:, None])
+        hat = matrix_product(self.rows, self.columns * (1 / diagonal).float()[:, None])
         lower, failed = torch.linalg.cholesky_ex(torch.sub(self.unit, hat, out=hat))
-        unsound = failed.bool() | (lower.diagonal(dim1=1, dim2=2).amin(dim=1) ** 2 < SOUND)
+        unsound = failed.bool() | (lower.diagonal(dim1=1, dim2=2).amin(dim=1) ** 2 < LEAST_PIVOT)
         lower[unsound] = self.unit
-        errors = matmul(torch.cholesky_inverse(lower), missed)
+        errors = matrix_product(torch.cholesky_inverse(lower), missed)
         if unsound.any():
             errors = errors.double()
             errors[unsound] = self._double(unsound, diagonal, columns)
@@ -639,8 +651,10 @@ class _FewRows:
         """Errors of some of the blocks without themselves, (folds, b, C), in double precision."""
         rows = self.exact.view(*self.shape, -1)[folds]
         weighted = rows / diagonal
-        remainder = self.unit.double() - matmul(weighted, rows.mT)
-        missed = self.part.targets[:, columns][self.block.out[folds]] - matmul(weighted, self.part.product[:, columns])
+        remainder = self.unit.double() - matrix_product(weighted, rows.mT)
+        missed = self.part.targets[:, columns][self.block.out[folds]] - matrix_product(
+            weighted, self.part.product[:, columns]
+        )
         solved: Tensor = torch.linalg.solve(remainder, missed)
         return solved
 
@@ -648,24 +662,24 @@ class _FewRows:
 class _ManyRows:
     """As `_FewRows`, by the output weights without each block, (M, M): for blocks of more windows than features."""
 
-    def __init__(self, part: _Part, block: _Block) -> None:
+    def __init__(self, part: _Coordinate, block: _FoldBlock) -> None:
         self.part = part
         self.rows, self.targets = part.rotated(block.out), part.targets[block.out]  # (folds, b, M), (folds, b, K r)
-        self.within = matmul(self.rows.mT, self.rows)
-        self.other = part.product - matmul(self.rows.mT, self.targets)
+        self.within = matrix_product(self.rows.mT, self.rows)
+        self.other = part.product - matrix_product(self.rows.mT, self.targets)
 
     def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """What the fit of all windows misses of some columns of the targets, (folds, b, C)."""
-        return self.targets[..., columns] - matmul(self.rows, self.part.weights(ridge, columns))
+        return self.targets[..., columns] - matrix_product(self.rows, self.part.weights(ridge, columns))
 
     def without(self, ridge: float, _: Tensor, columns: list[int] | slice) -> Tensor:
         """What a fit without each block misses of it."""
         remainder = torch.diag(self.part.eigenvalues + ridge) - self.within
         solved = torch.linalg.solve(remainder, self.other[..., columns])
-        return self.targets[..., columns] - matmul(self.rows, solved)
+        return self.targets[..., columns] - matrix_product(self.rows, solved)
 
 
-def _layer(units: Units) -> tuple[Array, Array]:
+def _hidden_weights(units: Units) -> tuple[Array, Array]:
     """Weights (d, M) and offsets (M,) of the hidden layer of a network: the units drawn, and their mirror images."""
     weight, offset = units.weight, units.offset
     if units.reflection is None:
@@ -673,8 +687,13 @@ def _layer(units: Units) -> tuple[Array, Array]:
     return np.concatenate([weight, units.reflection @ weight], axis=1), np.concatenate([offset, offset])
 
 
-def _network(
-    seen: Seen, layer: tuple[Array, Array], parts: Sequence[_Part], columns: slice, ridge: float, basis: Array
+def _solved_network(
+    seen: SeenInputs,
+    layer: tuple[Array, Array],
+    parts: Sequence[_Coordinate],
+    columns: slice,
+    ridge: float,
+    basis: Array,
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
     x, y = ((part.axes @ part.weights(ridge, columns)).cpu().numpy() / part.features.shape[1] ** 0.5 for part in parts)
@@ -684,10 +703,12 @@ def _network(
     return Network(seen.features, seen.normaliser, basis, (layer, (output, np.zeros(output.shape[1]))))
 
 
-def _side(paths: Sequence[Array], axis: int, num_windows: int, device: str) -> Tensor:
+def _stacked_side(paths: Sequence[Array], axis: int, num_windows: int, device: str) -> Tensor:
     """One coordinate of the paths (r, S, 2) of all models, (S, K r)."""
-    return _tensor(np.concatenate([np.zeros((num_windows, 0)), *(path[..., axis].T for path in paths)], axis=1), device)
+    return _double_tensor(
+        np.concatenate([np.zeros((num_windows, 0)), *(path[..., axis].T for path in paths)], axis=1), device
+    )
 
 
-def _tensor(values: Array, device: str) -> Tensor:
+def _double_tensor(values: Array, device: str) -> Tensor:
     return torch.as_tensor(values, dtype=torch.float64, device=device)

@@ -17,14 +17,16 @@ import numpy as np
 
 from shipid.hybrid.method import Fitted, Index, Row, Task
 from shipid.hybrid.settings import Point, Searched
-from shipid.hybrid.trials import best_of, fit_each, mean_square, points_of, row_of, used
+from shipid.hybrid.trials import best_trials, fit_each, mean_squared_error, trial_points, trial_row, windows_of_folds
 
 Any_ = TypeVar("Any_")
-TIMED = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
-CLOSING = 1  # trials that the last fit costs, about
+TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
+CLOSING_TRIALS = 1  # trials that the last fit costs, about
 
 
-def affordable(budget: float, before: float, seconds: Sequence[float], closing: int = CLOSING) -> int | None:
+def affordable_trials(
+    budget: float, before: float, seconds: Sequence[float], closing: int = CLOSING_TRIALS
+) -> int | None:
     """How many trials fit into a budget; None before enough have been timed, or half of the budget is gone.
 
     Parameters
@@ -34,7 +36,7 @@ def affordable(budget: float, before: float, seconds: Sequence[float], closing: 
     seconds : of the trials so far [s]; the first one also warms up, so the others tell the price.
     closing : trials that what follows the search costs, about.
     """
-    if not seconds or (len(seconds) < TIMED and before + sum(seconds) < budget / 2):
+    if not seconds or (len(seconds) < TIMED_TRIALS and before + sum(seconds) < budget / 2):
         return None
     price = max(fmean(seconds[1:] or seconds), 1e-6)
     return max(len(seconds), int((budget - before) / price) - closing)
@@ -47,7 +49,7 @@ class Search:
     ----------
     task, method : what is searched.
     names : the foundations.
-    closing : as in `affordable`.
+    closing : as in `affordable_trials`.
     again : each trial needs what the one before left behind, so nothing is taken over from an interrupted search but
         its number of trials; the digits are the same.
 
@@ -57,7 +59,7 @@ class Search:
     """
 
     def __init__(
-        self, task: Task, names: Iterable[str], method: Searched, *, again: bool = False, closing: int = CLOSING
+        self, task: Task, names: Iterable[str], method: Searched, *, again: bool = False, closing: int = CLOSING_TRIALS
     ) -> None:
         self.begun, self.closing = time.process_time(), closing
         self.method, self.journal = method, task.journal
@@ -113,13 +115,13 @@ class Search:
         assert self.method.budget is not None
         seconds = [sum(rows[k]["seconds"] for rows in self.rows.values()) for k in range(done)]
         before = time.process_time() - self.begun if self.before is None else self.before
-        self.count = affordable(self.method.budget * len(self.rows), before, seconds, self.closing)
+        self.count = affordable_trials(self.method.budget * len(self.rows), before, seconds, self.closing)
         if self.count is not None and self.journal is not None:
             self.journal.decide(list(self.cells.values()), self.count)
 
 
 @dataclass(frozen=True)
-class Judged:
+class TrialWorth:
     """What a trial is worth: mean squared validation error [m^2] per coordinate, all its settings, and its epochs."""
 
     value: float
@@ -127,7 +129,7 @@ class Judged:
     epochs: int = 0
 
 
-class Problem:
+class LearningProblem:
     """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged.
 
     method : with its settings. task, name : the task and the name of the foundation.
@@ -142,18 +144,18 @@ class Problem:
         """Return the corrector of a trial, learned from these windows alone; unless `judge` and `corrector` do it."""
         raise NotImplementedError
 
-    def judge(self, number: int, point: Point) -> Judged:
+    def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the mean over the folds of the error on validation windows of what the training windows taught."""
         losses = []
         for training, validation in self.task.folds:
             corrector, instants = self.solve(number, point, training), self.instants.select(validation)
             paths = corrector.predict(self.case.physics, instants, self.case.paths[:, validation])
-            losses.append(mean_square(paths, self.future[:, validation]))
-        return Judged(float(np.mean(losses)), point)
+            losses.append(mean_squared_error(paths, self.future[:, validation]))
+        return TrialWorth(float(np.mean(losses)), point)
 
     def corrector(self, best: Sequence[Row]) -> Any:
         """Return the corrector that the best trials make, of which there are `num_chosen` at most."""
-        return self.solve(best[0]["number"], best[0]["params"], used(self.task))
+        return self.solve(best[0]["number"], best[0]["params"], windows_of_folds(self.task))
 
 
 class SearchedAlone(Searched):
@@ -163,13 +165,13 @@ class SearchedAlone(Searched):
     CHAINED : whether a trial begins with what the one before left behind.
     """
 
-    problem: ClassVar[type[Problem]]
+    problem: ClassVar[type[LearningProblem]]
     IDLE: ClassVar[frozenset[str]] = frozenset()
     CHAINED: ClassVar[bool] = False
 
     def points(self) -> Iterable[Point]:
         """Return the trials: a value of everything searched, evenly spread."""
-        return points_of(self, self.IDLE)
+        return trial_points(self, self.IDLE)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
         """Search for every foundation; the best trials make its corrector."""
@@ -180,7 +182,7 @@ class SearchedAlone(Searched):
         for number, point in search.left(self.points()):
             start = time.process_time()
             judged = problem.judge(number, point)
-            search.record({name: row_of(number, judged.params, judged.value, start, judged.epochs)})
+            search.record({name: trial_row(number, judged.params, judged.value, start, judged.epochs)})
         rows = search.rows[name]
-        best = best_of(rows)[: self.num_chosen()]
+        best = best_trials(rows)[: self.num_chosen()]
         return Fitted(problem.corrector(best) if best else None, rows, search.seconds)

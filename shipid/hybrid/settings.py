@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from pydantic import model_validator as validator
 
-from shipid.hybrid.features import NOTHING, Memory
+from shipid.hybrid.features import NO_MEMORY, Memory
 from shipid.hybrid.method import Method, Traits
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -22,7 +22,7 @@ Point = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Span:
+class SearchSpan:
     """Where a hyperparameter is searched: from low to high, by its logarithm or not, in whole numbers or not."""
 
     low: float
@@ -64,7 +64,7 @@ class Searched(Method):
         mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
         return Traits(
             mirror > 0 if isinstance(mirror, bool | float) else None,
-            memory if isinstance(memory, Memory) else NOTHING,
+            memory if isinstance(memory, Memory) else NO_MEMORY,
             terms if isinstance(terms, int) else None,
         )
 
@@ -84,16 +84,16 @@ class Searched(Method):
         """Return what is searched among some values: name -> values."""
         return {}
 
-    def space(self) -> dict[str, Span | tuple[float, ...]]:
+    def space(self) -> dict[str, SearchSpan | tuple[float, ...]]:
         """Return where each hyperparameter that differs between trials is searched: a span, or some values."""
         spans = {
-            name: Span(low, high, log=name not in (*self.COUNTS, *self.LINEAR), whole=name in self.COUNTS)
+            name: SearchSpan(low, high, log=name not in (*self.COUNTS, *self.LINEAR), whole=name in self.COUNTS)
             for name, (low, high) in self.ranges().items()
         }
         return {**spans, **self.choices()}
 
 
-def spread(num_dims: int, num_points: int | None = None) -> Iterator[list[float]]:
+def spread_points(num_dims: int, num_points: int | None = None) -> Iterator[list[float]]:
     """Spread points evenly over the unit cube, any number of them, the first in the middle: an additive recurrence.
 
     Point k is frac(1/2 + k / phi^j) in dimension j = 1 ... d with phi^(d+1) = phi + 1 (Roberts, "The unreasonable

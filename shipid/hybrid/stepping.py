@@ -24,15 +24,15 @@ from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import Judged, Problem, SearchedAlone
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
 from shipid.hybrid.settings import Point, Scale
-from shipid.hybrid.trials import ridge_trial, ridges_of
+from shipid.hybrid.trials import ridge_trial, ridge_values
 from shipid.physics.signals import measurable_signals
 
 Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
 STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
-LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
+VELOCITY_LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
 
 class Stepper:
@@ -64,12 +64,12 @@ class Stepper:
         return Instants(columns, hidden=hidden or None)
 
 
-def free(physics: Physics, at: Instants) -> Array:
+def step_alone(physics: Physics, at: Instants) -> Array:
     """Velocities u, v, r (S, 3) that the physics alone says after one step from `at`."""
-    return _one_step(physics, at)[0]
+    return _step_and_way(physics, at)[0]
 
 
-def _one_step(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
+def _step_and_way(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
     """Velocities (S, 3) after a step, and how far it moves along, across and in heading (S, 3); None: not known."""
     if physics.vessel is None:
         return np.stack([at.columns[name] for name in MOTIONS], axis=1), None
@@ -94,23 +94,25 @@ def stepped_paths(physics: Physics, instants: Instants, acceleration: Accelerati
     with np.errstate(all="ignore"):  # a diverged path is not finite, and no news to the caller
         for k in range(physics.horizon):
             at = stepper.at(k, {**dict(zip(MOTIONS, nu.T, strict=True)), "psi": psi})
-            alone, way = _one_step(physics, at)
+            alone, way = _step_and_way(physics, at)
             more = acceleration(at, k, alone)
             after = alone + step * more
-            after = np.where((np.abs(after) <= LIMIT).all(axis=1, keepdims=True), after, np.nan)
+            after = np.where((np.abs(after) <= VELOCITY_LIMIT).all(axis=1, keepdims=True), after, np.nan)
             if way is None:
                 psi_after = psi + step / 2 * (nu[:, 2] + after[:, 2])
-                place = place + step / 2 * (_turned(nu, psi - first) + _turned(after, psi_after - first))
+                place = place + step / 2 * (
+                    _rotate_velocity(nu, psi - first) + _rotate_velocity(after, psi_after - first)
+                )
             else:
                 way = way + step**2 / 2 * more + 0 * after  # not finite where the path has diverged
                 psi_after = psi + way[:, 2]
-                place = place + _turned(way, psi - first)
+                place = place + _rotate_velocity(way, psi - first)
             nu, psi = after, psi_after
             places.append(place)
     return np.stack(places)
 
 
-def _turned(nu: Array, angle: Array) -> Array:
+def _rotate_velocity(nu: Array, angle: Array) -> Array:
     """Velocity over ground (S, 2) in axes from which the ship has turned by an angle (S,)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * nu[:, 0] - s * nu[:, 1], s * nu[:, 0] + c * nu[:, 1]], axis=1)
@@ -155,9 +157,9 @@ def true_steps(task: Task, name: str) -> TrueSteps:
     stepper = Stepper(physics, windows.instants(known=True, hidden=task.hidden.get(name)))
     chosen = _first_of_each_moment(task)
     number, window = np.divmod(chosen, len(windows))
-    at = joined([stepper.at(k, true_motion(windows, k)) for k in range(windows.horizon)]).select(chosen)
+    at = join_instants([stepper.at(k, true_motion(windows, k)) for k in range(windows.horizon)]).select(chosen)
     after = np.stack([windows.states[key].ravel()[chosen] for key in MOTIONS], axis=1)
-    return TrueSteps(at, free(physics, at), after, window, number, physics.step)
+    return TrueSteps(at, step_alone(physics, at), after, window, number, physics.step)
 
 
 def true_motion(windows: Windows, k: int) -> dict[str, Array]:
@@ -174,14 +176,14 @@ def _first_of_each_moment(task: Task) -> Index:
     return np.sort(np.unique(moments, axis=0, return_index=True)[1])
 
 
-def joined(parts: Sequence[Instants]) -> Instants:
+def join_instants(parts: Sequence[Instants]) -> Instants:
     """Several sets of instants one after the other."""
     columns = {key: np.concatenate([part.columns[key] for part in parts]) for key in parts[0].columns}
     hidden = {key: np.concatenate([(part.hidden or {})[key] for part in parts]) for key in parts[0].hidden or {}}
     return Instants(columns, hidden=hidden or None)
 
 
-class StepProblem(Problem):
+class StepProblem(LearningProblem):
     """A foundation whose true steps are solved for all ridges; a trial takes the ridge that predicts the path best."""
 
     def __init__(self, method: Stepped, task: Task, name: str) -> None:
@@ -196,12 +198,12 @@ class StepProblem(Problem):
         """Return the corrector of a trial for the ridge that it took."""
         return self.solve_ridges(number, point, windows, [point["ridge"]])
 
-    def judge(self, number: int, point: Point) -> Judged:
+    def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the least error over the ridges, on `samples` of the validation windows of each fold at most."""
         method, solve = self.method, partial(self.solve_ridges, number, point)
-        ridges = ridges_of(method.ridge, method.RIDGES)
+        ridges = ridge_values(method.ridge, method.RIDGES)
         ridge, value = ridge_trial(self.task, self.name, ridges, method.samples, solve)
-        return Judged(value, {**point, "ridge": ridge})
+        return TrialWorth(value, {**point, "ridge": ridge})
 
 
 class Stepped(SearchedAlone):

@@ -1,4 +1,4 @@
-"""The one training loop, `descend`, and K small networks of one architecture, trained at once on the same inputs.
+"""The one training loop, `minimise_losses`, and K small networks of one architecture, trained at once on the same inputs.
 
 The members share inputs, batches and structure; each has separate targets, initial weights, learning rate, weight decay
 and drop-out, and nothing it computes depends on who else is in the stack. One small network leaves a core waiting;
@@ -42,7 +42,7 @@ class Length:
 
 
 @dataclass(frozen=True)
-class Settings:
+class StackSettings:
     """Structure and length shared by a stack, and the hyperparameters of each of its K members.
 
     Parameters
@@ -64,7 +64,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedStack:
     """What a stack of K members learned: the weights of its best epoch.
 
     Parameters
@@ -81,17 +81,17 @@ class Trained:
     status: tuple[str, ...]
 
 
-def train(
+def train_stack(
     inputs: Array,
     targets: Array,
     train_idx: NDArray[np.int64],
     val_idx: NDArray[np.int64],
-    settings: Settings,
+    settings: StackSettings,
     seeds: Sequence[int],
     *,
     order_seed: int = 0,
     device: str = "cpu",
-) -> Trained:
+) -> TrainedStack:
     """Train K networks, sample -> target, on the mean squared error.
 
     Parameters
@@ -111,35 +111,35 @@ def train(
     """
     num_samples = len(train_idx)
     widths = [inputs.shape[1], *[settings.units] * settings.layers, targets.shape[2]]
-    x, y = _tensor(inputs[train_idx], device), _tensor(targets[:, train_idx], device)
-    x_val, y_val = _tensor(inputs[val_idx], device), _tensor(targets[:, val_idx], device)
+    x, y = _single_tensor(inputs[train_idx], device), _single_tensor(targets[:, train_idx], device)
+    x_val, y_val = _single_tensor(inputs[val_idx], device), _single_tensor(targets[:, val_idx], device)
 
     generators = [torch.Generator().manual_seed(int(seed)) for seed in seeds]
     order = torch.Generator().manual_seed(order_seed)
     weights = initial_weights(widths, generators).to(device)
-    layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _views(weights, widths)]  # leaves, same memory
-    rates = _tensor(settings.learning_rate, device)[:, None]
+    layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, widths)]  # leaves, same memory
+    rates = _single_tensor(settings.learning_rate, device)[:, None]
 
     def loss(rows: Tensor | slice) -> Tensor:
         x_batch, y_batch = x[rows], y[:, rows]
-        masks = _masks(len(x_batch), widths, settings, generators, device)
-        return (forward(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
+        masks = _dropout_masks(len(x_batch), widths, settings, generators, device)
+        return (stack_outputs(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
 
     batch = min(settings.length.batch or num_samples, num_samples)
-    best = descend(
+    best = minimise_losses(
         weights,
         [leaf for layer in layers for leaf in layer],
         settings.weight_decay,
         settings.length,
-        batches=lambda: _batches(num_samples, batch, order),
+        batches=lambda: _epoch_batches(num_samples, batch, order),
         rate=lambda _: rates,
         loss=loss,
-        watched=lambda: (forward(x_val, layers) - y_val).square().mean(dim=(1, 2)),
+        watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
     )
-    return _trained(best, widths)
+    return _trained_stack(best, widths)
 
 
-def descend(
+def minimise_losses(
     weights: Tensor,
     leaves: Sequence[Tensor],
     decay: Sequence[float],
@@ -149,7 +149,7 @@ def descend(
     rate: Callable[[int], Tensor],
     loss: Callable[[Tensor | slice], Tensor],
     watched: Callable[[], Tensor],
-) -> Watch:
+) -> BestEpochs:
     """Minimise the losses of K members by AdamW, and keep the weights of the best epoch of each.
 
     Parameters
@@ -159,7 +159,7 @@ def descend(
     batches : rows of the batches of the next epoch. rate : epoch, from 0 -> learning rates (K, 1).
     loss : rows -> losses (K,). watched : validation losses (K,) now.
     """
-    adam, watch = Adam(weights, decay), Watch(weights, length.patience)
+    adam, watch = Adam(weights, decay), BestEpochs(weights, length.patience)
     with threadpool_limits(1):  # for the same digits anywhere; networks as small as these are slower on more
         for epoch in range(length.epochs):
             total = torch.zeros(len(weights), device=weights.device)
@@ -176,12 +176,12 @@ def descend(
     return watch
 
 
-def _batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
+def _epoch_batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
     """Cut one epoch into batches, shuffled; a single batch stays in order."""
     return [slice(None)] if batch >= num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
 
 
-def forward(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
+def stack_outputs(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
     """Return outputs (K, n, m) of K networks for inputs (n, d): tanh layers, a linear one; masks (K, n, i) drop."""
     h = x.expand(len(layers[0][0]), *x.shape)
     for i, (weight, bias) in enumerate(layers):
@@ -223,7 +223,7 @@ class Adam:
         self.weights.addcdiv_(self.first * rate, spread, value=-1 / (1 - BETA_1**self.count))
 
 
-class Watch:
+class BestEpochs:
     """Keeps the best weights of each member and decides who is still running."""
 
     def __init__(self, weights: Tensor, patience: int) -> None:
@@ -248,13 +248,13 @@ class Watch:
             self.running &= self.waited < self.patience
 
 
-def _trained(best: Watch, widths: Sequence[int]) -> Trained:
+def _trained_stack(best: BestEpochs, widths: Sequence[int]) -> TrainedStack:
     """What was kept, as arrays."""
     layers = [
-        (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _views(best.kept, widths)
+        (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _layer_views(best.kept, widths)
     ]
     losses = best.best.cpu().numpy().astype(float)
-    return Trained(
+    return TrainedStack(
         layers=tuple(tuple((w[k], b[k]) for w, b in layers) for k in range(len(losses))),
         loss=np.where(np.isfinite(losses), losses, np.nan),
         epochs=best.epochs.cpu().numpy(),
@@ -262,7 +262,7 @@ def _trained(best: Watch, widths: Sequence[int]) -> Trained:
     )
 
 
-def _views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
+def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
     """Split flat weights (K, P) into views: weights (K, i, o) and biases (K, 1, o) of each layer."""
     views, start = [], 0
     for i, o in pairwise(widths):
@@ -272,18 +272,18 @@ def _views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
     return views
 
 
-def _masks(
-    num_samples: int, widths: Sequence[int], settings: Settings, generators: Sequence[torch.Generator], device: str
+def _dropout_masks(
+    num_samples: int, widths: Sequence[int], settings: StackSettings, generators: Sequence[torch.Generator], device: str
 ) -> Masks:
     """Draw a mask (K, n, i) for the input of each layer, or None where no member drops any."""
     rates = [settings.input_dropout] + [settings.hidden_dropout] * settings.layers
     return [
-        dropout(per_member, (num_samples, width), generators).to(device) if any(per_member) else None
+        draw_dropout(per_member, (num_samples, width), generators).to(device) if any(per_member) else None
         for per_member, width in zip(rates, widths[:-1], strict=True)
     ]
 
 
-def dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:
+def draw_dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:
     """Draw inverted drop-out (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0."""
     return torch.stack(
         [
@@ -296,5 +296,5 @@ def dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence
     )
 
 
-def _tensor(values: object, device: str) -> Tensor:
+def _single_tensor(values: object, device: str) -> Tensor:
     return torch.as_tensor(np.asarray(values), dtype=torch.float32, device=device)

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import choose_features, group_of, rows_of
-from shipid.hybrid.mirror import reflection as mirror_of
+from shipid.hybrid.features import choose_features, input_group, select_inputs
+from shipid.hybrid.mirror import mirror_matrix as mirror_of
 from shipid.hybrid.stored import Stored
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Seen:
+class SeenInputs:
     """Inputs that vary in training, their z-score, and their mirror.
 
     features : name of each input -> the columns that were equal to it in training.
@@ -43,12 +43,12 @@ class Seen:
 
     def samples(self, table: Mapping[str, Array]) -> Array:
         """Return inputs (S, d) as they are, and after them their images, (2 S, d), where there is a mirror."""
-        values = rows_of(table, self.normaliser.names)
+        values = select_inputs(table, self.normaliser.names)
         return values if self.reflection is None else np.concatenate([values, values @ self.reflection])
 
     def draw(self, point: Mapping[str, float], count: int, seed: int) -> Units:
         """Draw hidden units with the scales and the offset of a trial."""
-        scales = np.array([point[f"{group_of(name)}_scale"] for name in self.normaliser.names])
+        scales = np.array([point[f"{input_group(name)}_scale"] for name in self.normaliser.names])
         normal = np.random.default_rng(seed).standard_normal((count, len(scales) + 1))
         return Units(self.normaliser, (normal[:, :-1] / scales).T, normal[:, -1] * point["offset"], self.reflection)
 
@@ -78,14 +78,14 @@ class Units(Stored):
         return np.concatenate([one, (plain + image) / 2], axis=1), (plain - image) / 2
 
 
-def taken(arrays: Mapping[str, Array], name: str) -> Array:
+def stored_array(arrays: Mapping[str, Array], name: str) -> Array:
     """An array of a saved method; ResultError where it is missing."""
     if name not in arrays:
         raise ResultError("missing in the saved method", path=name)
     return arrays[name]
 
 
-def solve(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:
+def solve_ridges(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:
     """Weights (R, M, K) that minimise mean |targets - features W|^2 + ridge |penalty W|^2 for R ridges.
 
     features : (N, M). targets : (N, K). penalty : (M,) relative weights of the ridge, all above 0; default 1.

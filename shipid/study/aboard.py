@@ -16,7 +16,7 @@ from shipid.errors import DataError
 from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
-from shipid.hybrid.physics import assumed, check_columns
+from shipid.hybrid.physics import check_columns, missing_columns
 from shipid.logs.dates import format_span
 from shipid.predictor import Predictor
 from shipid.report.content import Line
@@ -113,7 +113,7 @@ def play_aboard(
         step,
         predictor.physics.horizon,
         skipped,
-        () if vessel is None else tuple(assumed(vessel, names)),
+        () if vessel is None else tuple(missing_columns(vessel, names)),
         predictor.commands == "known",
         band,
         dataset.frame[TRACK_COLUMNS],

@@ -21,7 +21,7 @@ from shipid.data.windows import (
 )
 from shipid.errors import DataError, ResultError, suggest_name
 from shipid.files import check_table, write_table
-from shipid.hybrid.bands import Region, adapted, adaptive, factor
+from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
 from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
@@ -77,7 +77,7 @@ def predict_log(
     Parameters
     ----------
     level : share of whole paths that the columns of the band hold; None: no such columns. kind : of the manoeuvre.
-    rate : with one, the band adapts along each run at this rate, see `shipid.hybrid.bands.adapted`.
+    rate : with one, the band adapts along each run at this rate, see `shipid.hybrid.bands.adapt_band`.
 
     Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m], outside;
     with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
@@ -245,13 +245,13 @@ def adapt_along_run(reach: Array, known_at: Array, now: Array, band: BandSetting
     reach : (S,) greatest error of each path over its band as calibrated; not a number where it never ends in the log.
     known_at, now : (S,) when each path ends, and the instants themselves [s], in order. table : radii of the band.
     """
-    state, factors, waiting = adaptive(band.level, band.rate or 0.0), np.ones(len(now)), 0
+    state, factors, waiting = start_adaptation(band.level, band.rate or 0.0), np.ones(len(now)), 0
     slack = clock_slack(now)
     together = np.maximum(np.searchsorted(now, known_at - slack) - np.arange(len(now)), 1)
     for i, t in enumerate(now):
         while waiting < i and known_at[waiting] <= t + slack:
             if np.isfinite(reach[waiting]):
-                state = adapted(state, bool(reach[waiting] > factors[waiting]), int(together[waiting]))
+                state = adapt_band(state, bool(reach[waiting] > factors[waiting]), int(together[waiting]))
             waiting += 1
-        factors[i] = factor(state, table)
+        factors[i] = adaptive_factor(state, table)
     return factors

@@ -11,7 +11,7 @@ import numpy as np
 from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, shorten_line
-from shipid.hybrid.method import Case, Corrector, Fitted, Journal, Task, fit_all
+from shipid.hybrid.method import Case, Corrector, Fitted, Task, TrialJournal, fit_all
 from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, Way
@@ -52,7 +52,7 @@ def work_of(prepared: Prepared, unit: Unit, ways: tuple[Way, ...], device: str) 
     )
 
 
-def fit_method(work: Work, way: Way, journal: Journal | None = None) -> dict[str, Fitted]:
+def fit_method(work: Work, way: Way, journal: TrialJournal | None = None) -> dict[str, Fitted]:
     """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
     mine = {name: work.known[name] for name in way.foundations}

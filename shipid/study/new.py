@@ -23,7 +23,7 @@ from shipid.data.dataset import STANDARD_DEVIATIONS, Dataset, read_dataset
 from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
-from shipid.hybrid.physics import assumed, check_columns
+from shipid.hybrid.physics import check_columns, missing_columns
 from shipid.physics.signals import SIGNALS, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
@@ -312,7 +312,7 @@ def _inputs_in_words(vessels: Mapping[str, Vessel], dataset: Dataset) -> str:
     columns = [str(name) for name in dataset.frame]
     parts = [f"commands {', '.join(dataset.commands) or 'none'}"]
     parts += ["wind is measured" if "V_w" in columns else "wind is not measured and is no input"]
-    lacking = {key: ", ".join(assumed(vessel, columns)) for key, vessel in vessels.items()}
+    lacking = {key: ", ".join(missing_columns(vessel, columns)) for key, vessel in vessels.items()}
     parts += [f"{key} takes {names} as 0" for key, names in lacking.items() if names]
     estimated = ", ".join(name for name, std in STANDARD_DEVIATIONS.items() if std in columns)
     return "; ".join([*parts, f"{estimated} are estimated from positions and heading"] if estimated else parts)

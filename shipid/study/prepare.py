@@ -32,7 +32,7 @@ from shipid.data.windows import (
 )
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
-from shipid.hybrid.physics import Physics, assumed, check_columns
+from shipid.hybrid.physics import Physics, check_columns, missing_columns
 from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
@@ -511,7 +511,7 @@ def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> 
 
 def not_measured(vessel: Vessel, windows: Windows) -> list[str]:
     """A sentence on what a vessel feels and the windows do not hold; none where they hold all."""
-    missing = assumed(vessel, windows.columns)
+    missing = missing_columns(vessel, windows.columns)
     return [f"{vessel.name}: {', '.join(missing)} not measured, assumed 0"] if missing else []
 
 

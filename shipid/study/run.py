@@ -23,7 +23,7 @@ from shipid.engine.native import engine_description, noted_engine
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Journal as Searches
+from shipid.hybrid.method import TrialJournal as Searches
 from shipid.study import seals, store
 from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
 from shipid.study.cluster import Known, Line, SentSearches, on_dask

@@ -16,7 +16,7 @@ from typing import Any
 from shipid.capacity import processor_name, usable_cores
 from shipid.engine.native import engine_description
 from shipid.errors import ShipidError, shorten_line
-from shipid.hybrid.device import vectors
+from shipid.hybrid.device import vector_instructions
 from shipid.physics import TERMS
 from shipid.study import store
 from shipid.study.code import UNKNOWN, code_digest
@@ -89,7 +89,12 @@ def machine() -> dict[str, Any]:
         with suppress(PackageNotFoundError):  # an extra that is not installed
             packages[name] = version(name)
     system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
-    return {**system, "processor": f"{processor_name()}, {vectors()}", "cores": usable_cores(), "packages": packages}
+    return {
+        **system,
+        "processor": f"{processor_name()}, {vector_instructions()}",
+        "cores": usable_cores(),
+        "packages": packages,
+    }
 
 
 def session_at_worker(plan: Plan, device: str, code: Code) -> dict[str, Any]:

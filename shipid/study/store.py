@@ -426,9 +426,9 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
     keys = [unit.key for unit in plan.units]
     if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in keys):
-        from shipid.hybrid.journal import merge  # with Optuna, which a study is read without
+        from shipid.hybrid.journal import merge_journals  # with Optuna, which a study is read without
 
-        merge(journals, folder / TRIALS)
+        merge_journals(journals, folder / TRIALS)
     sweep_run(folder)  # again: a worker of a killed run may outlive it by a moment, and be gone only by now
     if whole:
         seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])

@@ -19,8 +19,8 @@ from scipy import stats
 from shipid.answer.bands import share_interval
 from shipid.data.windows import Windows, run_folds
 from shipid.hybrid.alone import Alone
-from shipid.hybrid.bands import Bands, Region, needed, track
-from shipid.hybrid.calibration import calibrated
+from shipid.hybrid.bands import Bands, Region, runs_needed, track_directions
+from shipid.hybrid.calibration import calibrate_bands
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.method import Case, Corrector, Method, Task
 from shipid.hybrid.path_drawn import PathDrawn
@@ -73,7 +73,9 @@ def cell(made: World, runs: Sequence[str], method: Method, physics: Physics, see
         return None
     paths = fitted.corrector.predict(physics, made.fresh.instants(), ahead)
     names = tuple(limits_of(windows, windows.planned))
-    bands = calibrated(fitted.left_out, windows.future, windows.run, windows.columns, names, windows.step, made.kinds)
+    bands = calibrate_bands(
+        fitted.left_out, windows.future, windows.run, windows.columns, names, windows.step, made.kinds
+    )
     assert bands is not None
     inside = windows.future - fitted.corrector.predict(physics, windows.instants(), alone)
     spread = None
@@ -123,7 +125,7 @@ def promised(made: World, one: Cell, runs: int, keys: dict[str, Any]) -> Iterato
 def rivals(made: World, one: Cell, level: float, keys: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The same share promised in other ways: coverage of whole paths and mean radius."""
     fresh, errors, windows = made.fresh, made.fresh.future - one.paths, one.windows
-    ahead, size = track(one.paths), one.paths.shape[:2]
+    ahead, size = track_directions(one.paths), one.paths.shape[:2]
 
     def circle(radius: Array) -> Region:
         wide = np.broadcast_to(np.maximum(radius, 1e-9), size)
@@ -218,7 +220,7 @@ def figures(kept: pd.DataFrame, beside: pd.DataFrame) -> dict[str, Any]:
     for kind in ("Turning", "Steps", "Zigzag"):
         for level, part in kept[kept.runs == 22].groupby("level"):
             if kind in part:
-                enough = part[part[f"{kind} runs"] >= needed(float(str(level)))]
+                enough = part[part[f"{kind} runs"] >= runs_needed(float(str(level)))]
                 label = f"22 runs, {kind}, {level:.0%}: coverage"
                 summary[label] = mean_interval(enough.groupby("world")[kind].mean())
                 summary[f"{label}, kind named"] = mean_interval(enough.groupby("world")[f"{kind} named"].mean())

@@ -9,16 +9,16 @@ import numpy as np
 from shipid.data.windows import Instants
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.bands import Bands
-from shipid.hybrid.calibrator import Calibrated, TrajectoryInputs
+from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
 from shipid.hybrid.forest import ForestCorrector, Trees
-from shipid.hybrid.hankel_dmd import MISSED, HankelCorrector, Law
+from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector, LinearLaw
 from shipid.hybrid.learned_force import HIDDEN, OUTPUT, ForceCorrector
 from shipid.hybrid.modules import Alarm, ModulesCorrector, modules_of
-from shipid.hybrid.one_step import Head, OneStepCorrector
+from shipid.hybrid.one_step import OneStepCorrector, OutputWeights
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.recurrent import GatedNetwork, Reader, RecurrentCorrector
+from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
 from shipid.hybrid.ridge import smooth_basis
 from shipid.hybrid.units import Units
 from shipid.observer import COLUMNS, Observer
@@ -207,7 +207,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
             units = _units(rng, names, table, 6)
             odd = 6 + (units.reflection is None)
             scale = 0.02 * slow
-            heads.append(Head(units, rng.normal(0, scale, (7, 1)), rng.normal(0, scale * 0.3, (odd, 2))))
+            heads.append(OutputWeights(units, rng.normal(0, scale, (7, 1)), rng.normal(0, scale * 0.3, (odd, 2))))
         return OneStepCorrector(inputs.commands, tuple(heads), {})
     if kind == "modules":
         table = feature_table(instants.columns, inputs.commands)
@@ -222,7 +222,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
     if kind == "hankel-dmd":
         delays = int(rng.integers(1, 4))
         table = feature_table(instants.columns, inputs.commands)
-        kept = [*MOTIONS, *inputs.commands, *(MISSED if physics.vessel is not None else ())]
+        kept = [*MOTIONS, *inputs.commands, *(MISSED_NAMES if physics.vessel is not None else ())]
         names = [name for name in table if not name.endswith("_rw") or name in wind]
         for name in kept:
             component, dot, signal = name.rpartition(".")
@@ -232,7 +232,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
                 table[label] = rng.normal(size=size)
         normaliser = Normaliser(tuple(names), np.zeros(len(names)), np.full(len(names), 3.0))
         weights = rng.normal(0, 0.01 * slow, (len(names) + 1, 3))
-        law = Law(inputs.commands, delays, normaliser, weights)
+        law = LinearLaw(inputs.commands, delays, normaliser, weights)
         return HankelCorrector(law, delays * physics.step, {})
     if kind == "calibrator":
         inputs = TrajectoryInputs(inputs.commands, inputs.memory, int(rng.integers(1, 4)))
@@ -246,7 +246,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         for _ in range(int(rng.integers(1, 4))):
             fewer = [name for name in taken if rng.random() < 0.8] or taken
             networks.append(network_of(rng, fewer, table, horizon, terms, rng.random() < 0.5))
-        return (Calibrated if kind == "calibrator" else Compensator)(inputs, tuple(networks), {})
+        return (TrajectoryCompensator if kind == "calibrator" else Compensator)(inputs, tuple(networks), {})
     if kind == "forest":
         values = np.stack([table[name] for name in taken], axis=1)
         trees = _trees(rng, values, terms)
@@ -262,7 +262,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         }  # fmt: skip
         layers = {key: rng.normal(0, 0.5, shape) for key, shape in shapes.items()}
         mirrors = (_signs(rng, len(names)), _signs(rng, len(taken))) if rng.random() < 0.5 else None
-        reader = Reader(_normaliser(names, now), _normaliser(taken, table), mirrors, steps)
+        reader = SequenceReader(_normaliser(names, now), _normaliser(taken, table), mirrors, steps)
         networks.append(GatedNetwork(reader, layers, smooth_basis(horizon, terms)))
     past = max(steps * physics.step, inputs.memory.past)
     return RecurrentCorrector(inputs, past, tuple(networks), {})

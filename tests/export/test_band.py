@@ -16,7 +16,7 @@ from shipid.export.c import Precision
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import model
 from shipid.hybrid.alone import Unchanged
-from shipid.hybrid.bands import Region, adapted, adaptive, factor
+from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
@@ -138,12 +138,12 @@ def test_a_band_adapts_as_in_python(tmp_path):
         function.argtypes = [ctypes.c_double if kind == "d" else ctypes.c_int for kind in kinds]
         function.restype = ctypes.c_double
     for level, rate, share in ((0.9, 0.02, 0.1), (0.5, 0.3, 0.9), (0.99, 0.05, 0.0), (0.3, 0.2, 1.0)):
-        state, miss = adaptive(level, rate), 1 - level
+        state, miss = start_adaptation(level, rate), 1 - level
         for missed in rng.random(60) < share:
-            state, miss = adapted(state, bool(missed)), loaded.odd_adapted(miss, level, rate, int(missed))
+            state, miss = adapt_band(state, bool(missed)), loaded.odd_adapted(miss, level, rate, int(missed))
             assert miss == pytest.approx(state.miss, rel=1e-12, abs=1e-14)
             for kind, radius in enumerate((table.whole, *table.by_kind)):
-                assert loaded.odd_factor(miss, level, kind) == pytest.approx(factor(state, radius), rel=1e-9)
+                assert loaded.odd_factor(miss, level, kind) == pytest.approx(adaptive_factor(state, radius), rel=1e-9)
     for wrong in ((0.1, 0.9, 9), (np.nan, 0.9, 0), (np.inf, 0.9, 0), (0.1, np.nan, 0), (0.1, 0.0, 0), (0.1, 1.5, 0)):
         assert np.isnan(loaded.odd_factor(*wrong))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.hybrid.bands import Bands
-from shipid.hybrid.calibration import calibrated
+from shipid.hybrid.calibration import calibrate_bands
 
 HORIZON, NAMES = 8, ("u", "r", "port.n")
 Array = np.ndarray
@@ -28,7 +28,7 @@ class Runs:
         chosen = np.arange(len(self.run)) if order is None else order
         errors, paths = scale * self.errors[:, chosen], scale * self.paths[:, chosen]
         columns = {name: values[chosen] * (scale if name == "u" else 1.0) for name, values in self.columns.items()}
-        bands = calibrated(errors, paths + errors, self.run[chosen], columns, NAMES, 1.0, self.kinds)
+        bands = calibrate_bands(errors, paths + errors, self.run[chosen], columns, NAMES, 1.0, self.kinds)
         assert bands is not None
         return bands
 

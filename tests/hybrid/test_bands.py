@@ -12,13 +12,13 @@ from shipid.errors import DataError
 from shipid.hybrid.bands import (
     LEVELS,
     Region,
-    adapted,
-    adaptive,
-    at_level,
-    factor,
-    nearest,
-    needed,
-    traits,
+    adapt_band,
+    adaptive_factor,
+    nearest_distances,
+    prediction_traits,
+    radius_at_level,
+    runs_needed,
+    start_adaptation,
 )
 from tests.hybrid.runs import HORIZON, made
 
@@ -26,7 +26,7 @@ STRANGE = [made(seed) for seed in range(4)]
 
 
 def test_fewest_runs() -> None:
-    assert [needed(level) for level in (0.5, 0.8, 0.9, 0.95, 0.99)] == [3, 4, 9, 19, 99]
+    assert [runs_needed(level) for level in (0.5, 0.8, 0.9, 0.95, 0.99)] == [3, 4, 9, 19, 99]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -94,17 +94,19 @@ def test_centres_of_the_same_run_are_passed_over() -> None:
     rng = np.random.default_rng(3)
     points, centres = rng.normal(size=(40, 3)), rng.normal(size=(12, 3))
     run, of_centre = rng.integers(0, 4, 40), np.arange(12) % 4
-    by_hand = [nearest(point[None], centres[of_centre != mine])[0] for point, mine in zip(points, run, strict=True)]
-    np.testing.assert_allclose(nearest(points, centres, run, of_centre), by_hand, rtol=1e-12)
+    by_hand = [
+        nearest_distances(point[None], centres[of_centre != mine])[0] for point, mine in zip(points, run, strict=True)
+    ]
+    np.testing.assert_allclose(nearest_distances(points, centres, run, of_centre), by_hand, rtol=1e-12)
 
 
 def test_levels_between_those_of_the_table() -> None:
     table = LEVELS**2
-    assert at_level(table, 0.9) == pytest.approx(0.81)
-    assert at_level(table, 0.905) == pytest.approx((0.81 + 0.91**2) / 2)
-    assert at_level(table, 0.985) == pytest.approx((0.98**2 + 0.99**2) / 2)
-    assert at_level(table, 0.99) == pytest.approx(0.99**2)
-    assert at_level(table, 0.005) == pytest.approx(table[0] / 2)
+    assert radius_at_level(table, 0.9) == pytest.approx(0.81)
+    assert radius_at_level(table, 0.905) == pytest.approx((0.81 + 0.91**2) / 2)
+    assert radius_at_level(table, 0.985) == pytest.approx((0.98**2 + 0.99**2) / 2)
+    assert radius_at_level(table, 0.99) == pytest.approx(0.99**2)
+    assert radius_at_level(table, 0.005) == pytest.approx(table[0] / 2)
 
 
 @pytest.mark.parametrize("drift", [0.0, 1.5, -0.5])
@@ -112,12 +114,12 @@ def test_levels_between_those_of_the_table() -> None:
 def test_an_adaptive_band_keeps_its_long_run_rate(level: float, drift: float) -> None:
     """Scores drift away from those of calibration, with bursts: the share of misses goes to that wanted."""
     rng, table = np.random.default_rng(5), -np.log1p(-LEVELS)  # radii of exponential scores
-    state, misses, fixed = adaptive(level, 0.02), [], []
+    state, misses, fixed = start_adaptation(level, 0.02), [], []
     for i in range(6000):
         score = rng.exponential() * np.exp(drift * i / 6000 + (i % 500 < 50))
-        usual = float(at_level(table, level))
-        missed = score > usual * factor(state, table)
-        state = adapted(state, bool(missed))
+        usual = float(radius_at_level(table, level))
+        missed = score > usual * adaptive_factor(state, table)
+        state = adapt_band(state, bool(missed))
         misses.append(missed)
         fixed.append(score > usual)
     assert np.mean(misses) == pytest.approx(1 - level, abs=0.012)
@@ -127,22 +129,22 @@ def test_an_adaptive_band_keeps_its_long_run_rate(level: float, drift: float) ->
 
 def test_the_factor_of_an_adaptive_band_grows_with_misses_and_begins_at_one() -> None:
     table = -np.log1p(-LEVELS)
-    state = adaptive(0.9, 0.1)
-    assert factor(state, table) == pytest.approx(1.0)
+    state = start_adaptation(0.9, 0.1)
+    assert adaptive_factor(state, table) == pytest.approx(1.0)
     for level in (0.2, 0.905, 0.98):
-        between = factor(state._replace(miss=1 - level), table)
-        assert between == pytest.approx(at_level(table, level) / at_level(table, 0.9))
-    assert adapted(state, True).miss == pytest.approx(0.1 - 0.1 * 0.9)
-    assert adapted(state, False, 4).miss == pytest.approx(0.1 + 0.1 * 0.1 / 4)
+        between = adaptive_factor(state._replace(miss=1 - level), table)
+        assert between == pytest.approx(radius_at_level(table, level) / radius_at_level(table, 0.9))
+    assert adapt_band(state, True).miss == pytest.approx(0.1 - 0.1 * 0.9)
+    assert adapt_band(state, False, 4).miss == pytest.approx(0.1 + 0.1 * 0.1 / 4)
     factors = []
     for _ in range(20):
-        state = adapted(state, True)
-        factors.append(factor(state, table))
+        state = adapt_band(state, True)
+        factors.append(adaptive_factor(state, table))
     assert factors == sorted(factors)
     assert factors[-1] > 1e6  # it goes on where the table ends
     for _ in range(2000):
-        state = adapted(state, False)
-    assert factor(state, table) == 0.0
+        state = adapt_band(state, False)
+    assert adaptive_factor(state, table) == 0.0
 
 
 @pytest.mark.parametrize("step", [0.25, 2.0])
@@ -156,14 +158,14 @@ def test_a_steady_turn_has_no_slip_and_no_change(step: float) -> None:
         * np.arange(1, HORIZON * 3 + 1)[:, None, None]
         * np.stack([np.sinc(angle / np.pi), np.sinc(angle / 2 / np.pi) * np.sin(angle / 2)], axis=-1)
     )
-    length, turn, change, slip, _ = traits(paths, {"r": r}, step, np.zeros(3), 1.0).T
+    length, turn, change, slip, _ = prediction_traits(paths, {"r": r}, step, np.zeros(3), 1.0).T
     np.testing.assert_allclose(turn, np.abs(angle[-1]) * 2 / 3, atol=1e-12)
     np.testing.assert_allclose(change, 0.0, atol=1e-12)
     np.testing.assert_allclose(slip, 0.0, atol=1e-12)
     np.testing.assert_allclose(np.exp(length[1]) - 0.02, 4.0 * step * HORIZON * 3)  # straight ahead
-    (slow,) = traits(paths[:, 2:], {"r": r[2:] / 2}, step, np.zeros(1), 1.0)  # it turns more than it would
+    (slow,) = prediction_traits(paths[:, 2:], {"r": r[2:] / 2}, step, np.zeros(1), 1.0)  # it turns more than it would
     assert slow[3] == pytest.approx(slow[1] / 2)
-    (fast,) = traits(paths[:, 2:], {"r": r[2:] * 1.5}, step, np.zeros(1), 1.0)  # it turns less than it would
+    (fast,) = prediction_traits(paths[:, 2:], {"r": r[2:] * 1.5}, step, np.zeros(1), 1.0)  # it turns less than it would
     assert fast[3] == pytest.approx(fast[1] / 2)
-    (twice,) = traits(paths[:, 1:2], {"r": r[1:2]}, step, np.zeros(1), 2 * step)
+    (twice,) = prediction_traits(paths[:, 1:2], {"r": r[1:2]}, step, np.zeros(1), 2 * step)
     assert np.exp(twice[0]) - 0.02 == pytest.approx(2.0 * HORIZON * 3)  # over the length of an average path

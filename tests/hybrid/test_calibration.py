@@ -9,13 +9,13 @@ from scipy.stats import f_oneway
 from shipid.hybrid.calibration import (
     CENTRES,
     PRIOR,
-    _alike,
-    _fitted,
-    _from_training,
-    _runs,
-    _slopes,
-    calibrated,
-    radii,
+    _fit_scores,
+    _growth_slopes,
+    _intraclass_correlation,
+    _shares_of_runs,
+    _training_distances,
+    band_radii,
+    calibrate_bands,
 )
 from tests.hybrid.runs import NAMES, made, runs
 
@@ -31,7 +31,7 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
     for _ in range(rounds):
         shared, single = rng.standard_normal((count + 20, 1)), rng.standard_normal((count + 20, windows))
         scores = np.exp(np.sqrt(alike) * shared + np.sqrt(1 - alike) * single)
-        radius = radii(scores[:count].ravel(), place)[AT]
+        radius = band_radii(scores[:count].ravel(), place)[AT]
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
@@ -43,14 +43,16 @@ def test_how_alike_windows_are_is_the_intraclass_correlation(count: int, windows
     rng = np.random.default_rng(count)
     values = 2.0 * rng.standard_normal((count, 1)) + rng.standard_normal((count, windows))
     F = f_oneway(*values).statistic
-    alike = _alike(values.ravel(), _runs(np.repeat(np.arange(count), windows)))
+    alike = _intraclass_correlation(values.ravel(), _shares_of_runs(np.repeat(np.arange(count), windows)))
     assert alike == pytest.approx(max(F - 1, 0) / (F - 1 + windows))
-    assert _alike(np.ones(6), _runs(np.repeat(np.arange(3), 2))) == 1.0  # nothing differs: a run is one window
+    assert (
+        _intraclass_correlation(np.ones(6), _shares_of_runs(np.repeat(np.arange(3), 2))) == 1.0
+    )  # nothing differs: a run is one window
 
 
 def test_one_window_a_run_is_the_order_statistic() -> None:
     scores = np.arange(1.0, 20.0)  # 19 runs: the 18th of 19 holds a share of 18 / 20 of new ones
-    radius = radii(scores, np.arange(19))
+    radius = band_radii(scores, np.arange(19))
     assert 17.5 <= radius[89] <= 18.5
     assert radius[94] == pytest.approx(19.0, abs=0.5)
     assert (np.diff(radius) >= 0).all()
@@ -109,9 +111,9 @@ def test_runs_without_errors_do_not_calibrate() -> None:
     drawn = runs(0, count=6)
     errors = drawn.errors.copy()
     errors[:, drawn.run != "M000"] = np.nan
-    assert calibrated(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0) is None
+    assert calibrate_bands(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0) is None
     errors[:, np.isin(drawn.run, ["M001", "M002", "M003"])] = 1.0
-    bands = calibrated(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0)
+    bands = calibrate_bands(errors, drawn.paths, drawn.run, drawn.columns, NAMES, 1.0)
     assert bands is not None
     assert bands.runs == 4
 
@@ -120,11 +122,11 @@ def test_runs_without_errors_do_not_calibrate() -> None:
 def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> None:
     """Errors of one run three times as large: its scores are three times as large, those of the others smaller."""
     rng = np.random.default_rng(4)
-    of = _runs(np.repeat(np.arange(6), 8))
+    of = _shares_of_runs(np.repeat(np.arange(6), 8))
     apart, mine = rng.uniform(0.5, 2.0, (5, 48, 2)), of.place == 2
     larger = np.where(mine[:, None], 3.0, 1.0) * apart
     still = np.zeros((48, 5))  # no traits: no growth
-    one, other = (_fitted(of, errors, still, circle).scores for errors in (apart, larger))
+    one, other = (_fit_scores(of, errors, still, circle).scores for errors in (apart, larger))
     np.testing.assert_allclose(other[:, mine], 3.0 * one[:, mine], rtol=1e-12)
     assert (other[:, ~mine] < one[:, ~mine]).all()
 
@@ -132,9 +134,9 @@ def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> N
 def test_slopes_without_a_run_are_those_of_the_other_runs() -> None:
     """A ridge regression by least squares with rows that stand for the prior; every run counts as one sample."""
     rng, place = np.random.default_rng(4), np.repeat(np.arange(4), [3, 9, 5, 7])
-    runs, traits = _runs(place), rng.standard_normal((24, 5))
+    runs, traits = _shares_of_runs(place), rng.standard_normal((24, 5))
     scores = np.exp(0.4 * traits[:, 0] + 0.3 * traits[:, 4] + 0.2 * rng.standard_normal(24))
-    slopes, without = _slopes(runs, traits, scores)
+    slopes, without = _growth_slopes(runs, traits, scores)
     target = np.log(scores)
     noise = runs.weight @ (target - runs.weight @ target) ** 2
     prior = np.sqrt(noise) / PRIOR * np.eye(6)[1:]
@@ -150,7 +152,7 @@ def test_distances_are_in_spreads_of_the_columns_from_points_of_all_runs() -> No
     """A column that hardly varies counts by a thousandth of its size, whatever its sign."""
     rng, place = np.random.default_rng(5), np.repeat(np.arange(3), 200)
     points = np.column_stack([rng.standard_normal(600), np.full(600, -5.0)])
-    centres, spread, away = _from_training(_runs(place), points)
+    centres, spread, away = _training_distances(_shares_of_runs(place), points)
     assert len(centres) == 3 * np.ceil(CENTRES / 3)
     np.testing.assert_allclose(spread, [points[:, 0].std(), 5e-3])
     assert (away > 0).all()

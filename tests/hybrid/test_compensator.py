@@ -7,8 +7,8 @@ from shipid.hybrid.compensator import (
     Compensator,
     Network,
     Normaliser,
-    flatten,
-    unflatten,
+    flatten_paths,
+    unflatten_paths,
 )
 from shipid.hybrid.features import Inputs, choose_features, feature_table
 from tests.hybrid.tasks import compensation
@@ -67,6 +67,6 @@ def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
 
 def test_paths_survive_the_order_of_12():
     paths = np.random.default_rng(0).normal(size=(30, 9, 2))
-    assert flatten(paths).shape == (9, 60)
-    np.testing.assert_array_equal(flatten(paths)[4, 30:], paths[:, 4, 1])
-    np.testing.assert_array_equal(unflatten(flatten(paths)), paths)
+    assert flatten_paths(paths).shape == (9, 60)
+    np.testing.assert_array_equal(flatten_paths(paths)[4, 30:], paths[:, 4, 1])
+    np.testing.assert_array_equal(unflatten_paths(flatten_paths(paths)), paths)

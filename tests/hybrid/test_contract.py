@@ -12,7 +12,7 @@ from shipid.errors import DataError, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.method import Fitted, Method, Task
-from shipid.hybrid.methods import METHODS, kind_of, method_of
+from shipid.hybrid.methods import METHODS, method_kind, method_of
 from shipid.hybrid.settings import Searched
 
 
@@ -112,7 +112,7 @@ def test_what_a_class_lacks_is_said_as_a_plan_is_read(
         method_of("mine", {}, "method.2")
     assert "\n" not in str(caught.value)
     with pytest.raises(DataError, match=rf"^METHODS\['mine'\]: {said}$"):
-        kind_of(kind.model_construct())
+        method_kind(kind.model_construct())
 
 
 @pytest.mark.parametrize("name", ["predict", "header", "arrays", "hyperparameters", "past"])

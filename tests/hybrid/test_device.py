@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_info
 
 from shipid.engine.engines import check_device
 from shipid.errors import ShipidError
-from shipid.hybrid.device import use_threads, vectors
+from shipid.hybrid.device import use_threads, vector_instructions
 
 
 def threads() -> set[int]:
@@ -58,4 +58,4 @@ def test_the_processor_needs_no_pytorch() -> None:
         "check_device('cpu'); print(vectors(), 'torch' in sys.modules)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout == f"{vectors()} False\n"
+    assert result.stdout == f"{vector_instructions()} False\n"

@@ -11,12 +11,12 @@ from shipid.hybrid.features import (
     Inputs,
     Memory,
     choose_features,
-    estimates,
+    count_steps,
     feature_table,
-    group_of,
+    input_group,
+    observer_inputs,
     past_error,
     planned_means,
-    steps_of,
 )
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
@@ -122,7 +122,7 @@ def test_estimates_of_the_observer_are_in_body_axes():
     columns = {"psi": np.array([0.0, np.pi / 2]), "u": np.full(2, 3.0), "v": np.full(2, 0.2), "r": np.full(2, 0.01)}
     known = {"observer.u": 2.5, "observer.v": 0.3, "observer.r": 0.02, "observer.X": 1.0, "observer.Y": 2.0}
     known |= {"observer.N": 3.0, "observer.current_north": 0.1, "observer.current_east": 0.4}
-    table = estimates(Instants(columns, estimates={name: np.full(2, value) for name, value in known.items()}))
+    table = observer_inputs(Instants(columns, estimates={name: np.full(2, value) for name, value in known.items()}))
     by_hand = {"observer-current.u": [0.1, 0.4], "observer-current.v": [0.4, -0.1], "observer-wave.u": [0.5, 0.5]}
     by_hand |= {"observer-wave.v": [-0.1, -0.1], "observer-wave.r": [-0.01, -0.01]}
     by_hand |= {f"observer-force.{name}": [value, value] for name, value in zip("uvr", (1.0, 2.0, 3.0), strict=True)}
@@ -139,13 +139,16 @@ def test_estimates_are_inputs_where_method_and_physics_both_have_the_observer(co
     observed = replace(physics, observer=Observer())
     for memory, one in ((Memory(observer=True), physics), (Memory(), observed)):
         assert Inputs(COMMANDS, memory).of_physics(one, instants) == {}
-    assert Inputs(COMMANDS, Memory(observer=True)).of_physics(observed, instants).keys() == estimates(instants).keys()
+    assert (
+        Inputs(COMMANDS, Memory(observer=True)).of_physics(observed, instants).keys()
+        == observer_inputs(instants).keys()
+    )
 
 
 def test_groups_follow_from_names():
     names = {"u": "motion", "v_rw": "wind", "port.n": "command", "port.planned-1.n": "command"}
     names |= {"past-4.u": "history", "port.past-4.n": "history", "turned-8.psi": "history", "error-8.x": "error"}
-    assert {name: group_of(name) for name in names} == names
+    assert {name: input_group(name) for name in names} == names
 
 
 def test_planned_means_by_hand() -> None:
@@ -163,4 +166,4 @@ def test_planned_means_by_hand() -> None:
     ("seconds", "step", "steps"), [(8.0, 1.0, 8), (8.0, 0.5, 16), (8.0, 2.0, 4), (0.3, 0.1, 3), (0.1, 1.0, 1)]
 )
 def test_seconds_are_so_many_steps(seconds: float, step: float, steps: int) -> None:
-    assert steps_of(seconds, step) == steps
+    assert count_steps(seconds, step) == steps

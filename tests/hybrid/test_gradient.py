@@ -7,7 +7,7 @@ import torch
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
-from shipid.hybrid.training import train
+from shipid.hybrid.training import train_stack
 from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
@@ -39,9 +39,9 @@ def test_equal_architectures_train_as_one_stack_and_others_alone(columns, target
 
     def counted(inputs, targets, *args, **kwargs):
         stacks.append(len(targets))
-        return train(inputs, targets, *args, **kwargs)
+        return train_stack(inputs, targets, *args, **kwargs)
 
-    monkeypatch.setattr("shipid.hybrid.gradient.train", counted)
+    monkeypatch.setattr("shipid.hybrid.gradient.train_stack", counted)
     tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=4)
     assert stacks == [2] * 3
     stacks.clear()

@@ -13,10 +13,14 @@ from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
 from shipid.errors import ResultError
-from shipid.hybrid.journal import Journal, merge
-from shipid.hybrid.settings import Span
+from shipid.hybrid.journal import Journal, merge_journals
+from shipid.hybrid.settings import SearchSpan
 
-SPACE: dict[str, Any] = {"scale": Span(1.0, 16.0), "layers": Span(1, 3, log=False, whole=True), "mirror": (0.0, 1.0)}
+SPACE: dict[str, Any] = {
+    "scale": SearchSpan(1.0, 16.0),
+    "layers": SearchSpan(1, 3, log=False, whole=True),
+    "mirror": (0.0, 1.0),
+}
 
 
 def rows(count: int, seed: int = 0, first: int = 0) -> list[dict[str, Any]]:
@@ -139,7 +143,7 @@ def test_journals_of_units_are_merged(tmp_path: Path) -> None:
         journal.decide(list(mine), 7)
     with files[1].open("ab") as stream:
         stream.write(b'{"op_code": 4')
-    merge(files, tmp_path / "all.log")
+    merge_journals(files, tmp_path / "all.log")
     merged = Journal(tmp_path / "all.log")
     for mine in written:
         for cell, expected in mine.items():

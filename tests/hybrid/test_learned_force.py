@@ -15,9 +15,9 @@ from shipid.hybrid.learned_force import (
     HIDDEN,
     OUTPUT,
     LearnedForce,
-    _Trainer,
-    limits,
-    plain,
+    _ForceLoss,
+    block_document,
+    force_limits,
 )
 from shipid.hybrid.method import Case, Task, fit_all
 from shipid.hybrid.physics import Physics
@@ -69,21 +69,21 @@ def test_each_ridge_is_a_trial(given: dict[str, Any], count: int | None) -> None
 def test_the_force_is_bounded_by_what_the_ship_is() -> None:
     document = SHIP.document
     m, I_z, length = document["inertia"]["m"], document["inertia"]["I_z"], document["particulars"]["L_pp"]
-    bounds = limits(SHIP, 4.0, 0.5)
+    bounds = force_limits(SHIP, 4.0, 0.5)
     assert bounds["X_max"][0] == bounds["Y_max"][0] == pytest.approx(0.5 * m * 16.0 / length)
     assert bounds["N_max"][0] == pytest.approx(0.5 * I_z * 16.0 / length**2)
-    assert limits(SHIP, 0.0, 1.0)["X_max"][0] > 0
+    assert force_limits(SHIP, 0.0, 1.0)["X_max"][0] > 0
 
 
 def block(units: int = 3, weight: float = 1.0) -> dict[str, np.ndarray]:
     """Numbers of a force."""
     rng = np.random.default_rng(0)
-    numbers = {name: np.array([1.0]) for name in ("u_scale", "v_scale", "r_scale")} | limits(SHIP, 3.0, 1.0)
+    numbers = {name: np.array([1.0]) for name in ("u_scale", "v_scale", "r_scale")} | force_limits(SHIP, 3.0, 1.0)
     return numbers | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
 
 
 def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
-    already = WRONG.with_values({BLOCK: plain(block())})
+    already = WRONG.with_values({BLOCK: block_document(block())})
     with pytest.raises(DataError, match=rf"has a learned force already: take the block {BLOCK} out"):
         fit_all(LearnedForce(**CHEAP), task(windows, already))
 
@@ -98,12 +98,12 @@ def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -
     every = np.arange(len(windows))
     instants = windows.instants(known=True)
     broken = replace(instants, columns={**instants.columns, "u": np.where(every == 4, 1e9, instants.columns["u"])})
-    trainer = _Trainer(WRONG, block(weight=0.0), broken, windows.future, 5)
+    trainer = _ForceLoss(WRONG, block(weight=0.0), broken, windows.future, 5)
     assert len(trainer.instants) == len(every) - 1
     np.testing.assert_array_equal(trainer.future, windows.future[:, every != 4])
     none = replace(instants, columns={**instants.columns, "u": np.full(len(every), 1e9)})
-    hopeless = _Trainer(WRONG, block(weight=0.0), none, windows.future, 5)
+    hopeless = _ForceLoss(WRONG, block(weight=0.0), none, windows.future, 5)
     np.testing.assert_array_equal(hopeless.solve(0.1, None)[0], hopeless.start)
     assert not np.isfinite(hopeless.error(hopeless.start, none, windows.future))
-    alone = _Trainer(WRONG, block(weight=0.0), instants.select(every[every != 4]), windows.future[:, every != 4], 5)
+    alone = _ForceLoss(WRONG, block(weight=0.0), instants.select(every[every != 4]), windows.future[:, every != 4], 5)
     np.testing.assert_array_equal(trainer.solve(0.1, None)[0], alone.solve(0.1, None)[0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shipid.engine.rollout import rollout
-from shipid.hybrid.learned_force import LearnedForce, mass
+from shipid.hybrid.learned_force import LearnedForce, horizontal_mass
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.hybrid.worlds import fitted, world
@@ -29,4 +29,4 @@ def test_the_mass_is_what_unit_forces_feel_in_one_step(name):
     begun = zeros["state"], zeros["commands"], zeros["environment"]
     after = rollout(vessel, *begun, step=1.0, num_steps=1, tau_extra=forces, engine="casadi")
     moved = np.stack([after[motion][-1, 0] for motion in ("u", "v", "r")])
-    np.testing.assert_allclose(mass(vessel) @ (moved[:, :3] - moved[:, 3:]), 1e3 * np.eye(3), atol=1e-4)
+    np.testing.assert_allclose(horizontal_mass(vessel) @ (moved[:, :3] - moved[:, 3:]), 1e3 * np.eye(3), atol=1e-4)

@@ -13,11 +13,11 @@ from shipid.data.windows import cut_windows
 from shipid.errors import DataError, ShipidError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, same_table, shared_tables
+from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, input_table_key, shared_tables
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.settings import Searched
-from shipid.hybrid.trials import row_of
+from shipid.hybrid.trials import trial_row
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
 
@@ -68,9 +68,9 @@ def test_inputs_without_physics_are_one_array_for_all() -> None:
     assert tables["right"]["past-2.u"] is tables["none"]["past-2.u"]
     assert "error-4.x" not in tables["none"]
     assert np.abs(tables["right"]["error-4.x"] - tables["wrong"]["error-4.x"]).max() > 0
-    assert len({same_table(table) for table in tables.values()}) == 3
+    assert len({input_table_key(table) for table in tables.values()}) == 3
     plain = shared_tables(given, Inputs(given.commands))
-    assert len({same_table(table) for table in plain.values()}) == 1
+    assert len({input_table_key(table) for table in plain.values()}) == 1
     for name, table in tables.items():
         alone = inputs.table(given.cases[name].physics, given.instants(name))
         assert table.keys() == alone.keys()
@@ -84,7 +84,7 @@ def test_a_skeleton_is_no_method(skeleton: type[Method]) -> None:
         skeleton()
 
 
-ROW = row_of(0, {}, 1.0, 0.0)
+ROW = trial_row(0, {}, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,10 @@ ROW = row_of(0, {}, 1.0, 0.0)
             "trial 0: value must be finite, not nan, unless",
         ),
         ({"right": Fitted(Unchanged({}), [], 0.0)}, "a corrector needs a trial that is complete, or give"),
-        ({"right": Fitted(Unchanged({}), [row_of(0, {}, np.nan, 0.0)], 0.0)}, "a corrector needs a trial that is comp"),
+        (
+            {"right": Fitted(Unchanged({}), [trial_row(0, {}, np.nan, 0.0)], 0.0)},
+            "a corrector needs a trial that is comp",
+        ),
         ({"right": Fitted(Unchanged({}, "1 s"), [ROW], 0.0)}, "past of the corrector must be a number, not '1 s'"),  # type: ignore[arg-type]
         (
             {"right": Fitted(Unchanged({}, -1.0), [ROW], 0.0)},

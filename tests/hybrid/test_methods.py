@@ -13,7 +13,7 @@ import pytest
 from shipid.errors import DataError, DocumentError, ResultError
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.method import Case, Fitted, Method
-from shipid.hybrid.methods import METHODS, kind_of, method_of
+from shipid.hybrid.methods import METHODS, method_kind, method_of
 from shipid.hybrid.physics import Physics
 from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, ship, world
@@ -76,7 +76,7 @@ def predicted(here, fit, physics, chosen=slice(None)):
 @EVERY
 def test_a_method_is_named_and_its_settings_are_checked(kind):
     method = quick(kind)
-    assert kind_of(method) == kind
+    assert method_kind(method) == kind
     with pytest.raises(DocumentError, match="unknown key"):
         method_of(kind, {"nonsense": 1})
     assert method.past <= 10.0

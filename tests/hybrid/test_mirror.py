@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.hybrid.mirror import reflection
+from shipid.hybrid.mirror import mirror_matrix
 
 RNG = np.random.default_rng(3)
 
@@ -22,7 +22,7 @@ AZIMUTHS = ("u", "v", "r", "v_rw", "port.n", "starboard.n", "port.alpha", "starb
 def test_the_mirror_changes_signs_and_sides() -> None:
     """Surge and shafts as they are, sway, yaw and angles the other way; port and starboard change places."""
     here = table(*AZIMUTHS)
-    matrix = reflection(here, features(*AZIMUTHS))
+    matrix = mirror_matrix(here, features(*AZIMUTHS))
     assert matrix is not None
     image = dict(zip(AZIMUTHS, (np.stack(list(here.values()), axis=1) @ matrix).T, strict=True))
     for name, sign in (("u", 1), ("v", -1), ("r", -1), ("v_rw", -1)):
@@ -34,27 +34,27 @@ def test_the_mirror_changes_signs_and_sides() -> None:
 
 @pytest.mark.parametrize("names", [AZIMUTHS, ("u", "v", "r", "propeller.n", "rudder.delta")])
 def test_a_mirror_of_the_mirror_is_the_thing(names: tuple[str, ...]) -> None:
-    matrix = reflection(table(*names), features(*names))
+    matrix = mirror_matrix(table(*names), features(*names))
     assert matrix is not None
     np.testing.assert_array_equal(matrix @ matrix, np.eye(len(names)))
 
 
 def test_words_inside_names_are_sides_too() -> None:
     names = ("main-left.n", "main-right.n")
-    matrix = reflection(table(*names), features(*names))
+    matrix = mirror_matrix(table(*names), features(*names))
     np.testing.assert_array_equal(matrix, [[0.0, 1.0], [1.0, 0.0]])
 
 
 def test_units_at_the_ends_stand_on_the_middle_line() -> None:
     names = ("fore.n", "fore.alpha", "aft.n", "aft.alpha")
-    np.testing.assert_array_equal(reflection(table(*names), features(*names)), np.diag([1.0, -1.0, 1.0, -1.0]))
+    np.testing.assert_array_equal(mirror_matrix(table(*names), features(*names)), np.diag([1.0, -1.0, 1.0, -1.0]))
 
 
 def test_one_input_may_stand_for_several_columns() -> None:
     """Shafts that turn alike are one input: its image is itself."""
     shaft = RNG.normal(size=20)
     here = {"u": RNG.normal(size=20), "port.n": shaft, "starboard.n": shaft}
-    matrix = reflection(here, {"u": ("u",), "n": ("port.n", "starboard.n")})
+    matrix = mirror_matrix(here, {"u": ("u",), "n": ("port.n", "starboard.n")})
     np.testing.assert_array_equal(matrix, np.eye(2))
 
 
@@ -72,25 +72,25 @@ def test_one_input_may_stand_for_several_columns() -> None:
     ],
 )
 def test_inputs_without_an_image_have_no_mirror(names: tuple[str, ...]) -> None:
-    assert reflection(table(*names), features(*names)) is None
+    assert mirror_matrix(table(*names), features(*names)) is None
 
 
 def test_a_bow_unit_that_turns_has_a_mirror() -> None:
     names = ("bow.n", "bow.alpha")
-    np.testing.assert_array_equal(reflection(table(*names), features(*names)), np.diag([1.0, -1.0]))
+    np.testing.assert_array_equal(mirror_matrix(table(*names), features(*names)), np.diag([1.0, -1.0]))
 
 
 def test_a_column_left_out_must_be_its_image() -> None:
     """A constant that is no input does not stop the mirror where it is symmetrical, and does where it is not."""
     here = table("u") | {"port.n": np.full(20, 2.0), "starboard.n": np.full(20, 2.0)}
-    np.testing.assert_array_equal(reflection(here, features("u")), [[1.0]])
-    assert reflection({**here, "port.n": np.full(20, 1.0)}, features("u")) is None
+    np.testing.assert_array_equal(mirror_matrix(here, features("u")), [[1.0]])
+    assert mirror_matrix({**here, "port.n": np.full(20, 1.0)}, features("u")) is None
     for other, mirrored in ((2.0, True), (1.0, False)):  # names without a side
         unsided = {"u": here["u"], "m1.n": np.full(20, 2.0), "m2.n": np.full(20, other)}
-        assert (reflection(unsided, features("u")) is not None) == mirrored
+        assert (mirror_matrix(unsided, features("u")) is not None) == mirrored
 
 
 def test_a_tunnel_that_rests_takes_no_mirror_away() -> None:
     here = table("u", "v", "propeller.n", "rudder.delta") | {"bow.n": np.zeros(20)}
-    matrix = reflection(here, features("u", "v", "propeller.n", "rudder.delta"))
+    matrix = mirror_matrix(here, features("u", "v", "propeller.n", "rudder.delta"))
     np.testing.assert_array_equal(matrix, np.diag([1.0, -1.0, 1.0, -1.0]))

@@ -8,9 +8,9 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.modules import Alarm, Modules, modules_of, shares, without
+from shipid.hybrid.modules import Alarm, Modules, module_accelerations, modules_of, physics_without_modules
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stepping import free
+from shipid.hybrid.stepping import step_alone
 from shipid.vessel.load import load_vessel
 from tests.hybrid.worlds import fitted, ship, world
 
@@ -38,7 +38,7 @@ def test_home_a_wrong_propeller(here, corrector):
 def test_modules_are_switched_off_behind_before_ahead():
     physics = Physics(load_vessel("kvlcc2-l7"), 1, 1.0)
     assert list(modules_of(physics.vessel)) == ["rudders", "thrusters", "hull"]
-    assert len(without(physics)) == 3
+    assert len(physics_without_modules(physics)) == 3
     assert modules_of(None) == {}
 
 
@@ -46,8 +46,8 @@ def test_the_share_of_a_module_is_what_its_factor_changes(here):
     """With Euler's rule an acceleration is linear in the forces: half the thrust is half the share of the thrusters."""
     whole, half = (Physics(with_thrust(factor), 1, 1.0) for factor in (1.0, 0.5))
     at = here.test.instants()
-    effects = shares(without(whole), at, free(whole, at), 1.0)
-    np.testing.assert_allclose(free(whole, at) - free(half, at), effects[:, 0] / 2, atol=1e-12)
+    effects = module_accelerations(physics_without_modules(whole), at, step_alone(whole, at), 1.0)
+    np.testing.assert_allclose(step_alone(whole, at) - step_alone(half, at), effects[:, 0] / 2, atol=1e-12)
     assert np.abs(effects).max(axis=(0, 2)).min() > 1e-3
 
 

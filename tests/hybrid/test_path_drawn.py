@@ -10,9 +10,9 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DocumentError
-from shipid.hybrid.features import Inputs, Memory, group_of
+from shipid.hybrid.features import Inputs, Memory, input_group
 from shipid.hybrid.method import Case, Task
-from shipid.hybrid.path_drawn import KINDS, MEMORIES, PathDrawn
+from shipid.hybrid.path_drawn import MEMORIES, MEMORY_KINDS, PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer, observe
 from shipid.study.prepare import at_instants
@@ -61,14 +61,14 @@ def dataset() -> Dataset:
 
 def kinds(corrector: Any) -> set[str]:
     """Groups of the inputs of all networks of a compensator."""
-    return {group_of(name) for network in corrector.networks for name in network.features}
+    return {input_group(name) for network in corrector.networks for name in network.features}
 
 
 def target(dataset: Dataset, foundation: Physics, group: str) -> Array:
     """A future that the physics misses by what one group of inputs says, (T, S, 2)."""
     given = task(dataset, {"one": foundation})
     table = Inputs(tuple(dataset.commands), EVERYTHING).table(foundation, given.instants("one"))
-    values = next(values for name, values in table.items() if group_of(name) == group)
+    values = next(values for name, values in table.items() if input_group(name) == group)
     steps = np.arange(1.0, 6.0)[:, None] * values / np.abs(values).max()
     future: Array = given.cases["one"].paths + np.stack([steps, 0.0 * steps], axis=-1)
     return future
@@ -103,7 +103,7 @@ def test_choose_chooses_between_what_the_memory_has(history: float, error: float
             PathDrawn(choose=True, memory=memory)
         return
     method = PathDrawn(choose=True, memory=memory, trials=20)
-    taken = [frozenset(KINDS) - method.left_out(point) for point in method.points()]
+    taken = [frozenset(MEMORY_KINDS) - method.left_out(point) for point in method.points()]
     assert set().union(*taken) == there
     assert frozenset() in taken
     assert max(map(taken.count, taken)) - min(map(taken.count, taken)) <= 1

@@ -11,7 +11,7 @@ import pytest
 from shipid.data.windows import Instants, Windows, cut_windows, to_frame
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, ShipidError
-from shipid.hybrid.physics import Physics, assumed, check_columns
+from shipid.hybrid.physics import Physics, check_columns, missing_columns
 from shipid.observer import MEASURED, Observer, observe
 from shipid.study.prepare import at_instants
 from shipid.vessel.dynamics import vessel_dynamics
@@ -111,8 +111,8 @@ def test_an_observer_needs_its_estimates_and_takes_no_screening(windows: Windows
 
 def test_what_is_not_measured_is_zero_and_reported() -> None:
     columns = {name: np.full(3, 0.5) for name in ("u", "v", "psi", *vessel_dynamics(SHIP).commands)}
-    assert assumed(SHIP, columns) == ["north", "east", "r", "V_w", "beta_w"]
-    zero = dict.fromkeys(assumed(SHIP, columns), np.zeros(3))
+    assert missing_columns(SHIP, columns) == ["north", "east", "r", "V_w", "beta_w"]
+    zero = dict.fromkeys(missing_columns(SHIP, columns), np.zeros(3))
     np.testing.assert_array_equal(RIGHT.paths(Instants(columns)), RIGHT.paths(Instants(columns | zero)))
 
 

@@ -11,7 +11,7 @@ from shipid.hybrid import products
 
 @pytest.fixture(params=["NumPy", "PyTorch"], autouse=True)
 def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(products, "by_numpy", lambda _: request.param == "NumPy")
+    monkeypatch.setattr(products, "is_numpy_tensor", lambda _: request.param == "NumPy")
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -20,18 +20,22 @@ def test_products_are_sums_of_products(dtype: torch.dtype) -> None:
     left, right = (torch.randn(3, 4, 5, generator=generator, dtype=dtype) for _ in range(2))
     expected = torch.einsum("fij,fkj->fik", left, right)
     tight = {"rtol": 1e-5, "atol": 1e-5} if dtype == torch.float32 else {"rtol": 1e-13, "atol": 1e-13}
-    torch.testing.assert_close(products.matmul(left, right.mT), expected, **tight)
-    torch.testing.assert_close(products.matmul(left, right.mT.contiguous()), expected, **tight)
+    torch.testing.assert_close(products.matrix_product(left, right.mT), expected, **tight)
+    torch.testing.assert_close(products.matrix_product(left, right.mT.contiguous()), expected, **tight)
     torch.testing.assert_close(
-        products.matmul(left[0][:, 1:], right[0].mT[1:]), left[0][:, 1:] @ right[0][:, 1:].T, **tight
+        products.matrix_product(left[0][:, 1:], right[0].mT[1:]), left[0][:, 1:] @ right[0][:, 1:].T, **tight
     )
-    torch.testing.assert_close(products.matmul(left, right[0].mT), torch.einsum("fij,kj->fik", left, right[0]), **tight)
-    assert products.matmul(left, right.mT).dtype == dtype
+    torch.testing.assert_close(
+        products.matrix_product(left, right[0].mT), torch.einsum("fij,kj->fik", left, right[0]), **tight
+    )
+    assert products.matrix_product(left, right.mT).dtype == dtype
 
 
 def test_a_gram_matrix_is_one_of_products() -> None:
     values = torch.randn(40, 7, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
-    torch.testing.assert_close(products.gram(values), torch.einsum("si,sj->ij", values, values), rtol=1e-13, atol=1e-13)
+    torch.testing.assert_close(
+        products.gram_matrix(values), torch.einsum("si,sj->ij", values, values), rtol=1e-13, atol=1e-13
+    )
 
 
 def test_squares_are_summed_over_rows() -> None:
@@ -66,5 +70,5 @@ def test_a_layer_is_the_tanh_of_its_sums(by_torch: bool, monkeypatch: pytest.Mon
     )
     before = [part.clone() for part in (values, weight, offset)]
     expected = torch.tanh(torch.einsum("sd,dm->sm", values, weight) + offset)
-    torch.testing.assert_close(products.hidden(values, weight, offset), expected, rtol=1e-13, atol=1e-13)
+    torch.testing.assert_close(products.hidden_layer(values, weight, offset), expected, rtol=1e-13, atol=1e-13)
     assert all(torch.equal(one, other) for one, other in zip(before, (values, weight, offset), strict=True))

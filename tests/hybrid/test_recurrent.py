@@ -6,7 +6,7 @@ import torch
 
 from shipid.data.windows import Instants
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.recurrent import GatedNetwork, Reader, Recurrent, Sequences
+from shipid.hybrid.recurrent import GatedNetwork, Recurrent, SequenceReader, Sequences
 from tests.hybrid.worlds import FINE, fitted, ship, world
 
 MEMORY = 8.0  # s
@@ -34,7 +34,7 @@ def test_the_arrays_say_what_pytorch_says():
     layers |= {"W_1": np.eye(4, 6), "c_1": np.zeros(4), "W_2": np.eye(4), "c_2": np.zeros(4)}
     past, now = rng.normal(size=(7, 5, 3)), rng.normal(size=(5, 2))
     plain = Normaliser(("u", "v"), np.zeros(2), np.ones(2))
-    network = GatedNetwork(Reader(plain, plain, None, 6), layers, np.ones((3, 2)))
+    network = GatedNetwork(SequenceReader(plain, plain, None, 6), layers, np.ones((3, 2)))
     expected = np.tanh(gru(torch.tensor(past))[1][0].detach().numpy())
     np.testing.assert_allclose(network._outputs(Sequences(past, now)), expected, rtol=0, atol=1e-12)
 

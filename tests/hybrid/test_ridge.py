@@ -8,17 +8,17 @@ from shipid.hybrid.compensator import Compensator, smooth_basis
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.ridge import (
-    SOUND,
-    SPARE,
-    _Best,
-    _blocks,
-    _chosen_without,
-    _down_to,
-    _Errors,
-    _left_out,
-    _Piece,
-    _Verdict,
-    _with_axes,
+    LEAST_PIVOT,
+    SPARE_TRIALS,
+    _BestTrials,
+    _coordinates_with_axes,
+    _fold_blocks,
+    _left_out_errors,
+    _LeftOutErrors,
+    _ridges_for_all,
+    _SidePiece,
+    _TrialVerdict,
+    _without_each_fold,
     part_of_runs,
 )
 from tests.hybrid.tasks import compensation, tune
@@ -87,16 +87,16 @@ def predicted(fits, columns):
 
 def part_of(features, targets):
     """A coordinate as the search holds it."""
-    (part,) = _with_axes(torch.tensor(features), [torch.tensor(targets)])
+    (part,) = _coordinates_with_axes(torch.tensor(features), [torch.tensor(targets)])
     return part
 
 
 @pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
 @pytest.mark.parametrize("ridge", [1e-3, 5.0])
 @pytest.mark.parametrize("kind", ["runs", "more left out than judged", "one pair"])
-@pytest.mark.parametrize(("sound", "rtol"), [(np.inf, 1e-8), (SOUND, 1e-5)], ids=["double", "single"])
+@pytest.mark.parametrize(("sound", "rtol"), [(np.inf, 1e-8), (LEAST_PIVOT, 1e-5)], ids=["double", "single"])
 def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind, sound, rtol, monkeypatch):
-    monkeypatch.setattr("shipid.hybrid.ridge.SOUND", sound)
+    monkeypatch.setattr("shipid.hybrid.ridge.LEAST_PIVOT", sound)
     rng = np.random.default_rng(0)
     folds = FOLDS
     if kind == "more left out than judged":  # neighbours that share a moment are in neither part
@@ -112,7 +112,7 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
             weights = np.linalg.solve(gram, seen[training].T @ made[training])
             expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
     parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
-    sums, others, errors = _left_out(parts, [ridge], _blocks(folds, ALL, "cpu"), 2)
+    sums, others, errors = _left_out_errors(parts, [ridge], _fold_blocks(folds, ALL, "cpu"), 2)
     np.testing.assert_allclose(sums[0], expected, rtol=rtol)
     np.testing.assert_allclose(others[0].sum(axis=0), (len(folds) - 1) * expected, rtol=rtol)
     judged = np.unique(np.concatenate([part for _, part in folds]))
@@ -150,8 +150,8 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
     for seed in (*range(30), 3026):
         parts, runs, windows = drawn_parts(seed)
         folds = [(np.setdiff1d(windows, run), run[: len(run) // 2] if part_judged else run) for run in runs]
-        blocks = _blocks(folds, windows, "cpu")
-        sums, others, errors = _left_out(parts, ridges, blocks, 2, np.ones((9, 1), dtype=bool))
+        blocks = _fold_blocks(folds, windows, "cpu")
+        sums, others, errors = _left_out_errors(parts, ridges, blocks, 2, np.ones((9, 1), dtype=bool))
         one_by_one, but_one = one_by_one_ridge(parts, ridges, blocks)
         passed = np.isinf(sums).any(axis=1)
         passed_over += int(passed.sum())
@@ -165,7 +165,7 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
 
 def one_by_one_ridge(parts, ridges, blocks):
     """Sums of squares over all folds, (ridges, K), and over all but one, (ridges, F, K), of each ridge alone."""
-    alone = [_left_out(parts, [ridge], blocks, 2) for ridge in ridges]
+    alone = [_left_out_errors(parts, [ridge], blocks, 2) for ridge in ridges]
     return tuple(np.concatenate([one[place] for one in alone]) for place in (0, 1))
 
 
@@ -184,8 +184,8 @@ def test_each_model_takes_the_ridge_to_which_it_descends_from_the_middle():
     ridges, asked, alike, curves_of_all = list(np.geomspace(1e-4, 1e4, 9)), 0, 0, 0
     for seed in range(40):
         parts, runs, windows = drawn_parts(seed, models=3)
-        blocks = _blocks([(np.setdiff1d(windows, run), run) for run in runs], windows, "cpu")
-        sums, others, _ = _left_out(parts, ridges, blocks, 2)
+        blocks = _fold_blocks([(np.setdiff1d(windows, run), run) for run in runs], windows, "cpu")
+        sums, others, _ = _left_out_errors(parts, ridges, blocks, 2)
         every, but_one = one_by_one_ridge(parts, ridges, blocks)
         for model in range(3):
             seen, known = (
@@ -222,11 +222,11 @@ def test_windows_are_taken_evenly_from_each_run(seed):
 
 def test_all_windows_choose_the_ridge_of_a_part_or_one_that_is_smaller_by_its_share():
     ridges = [1e-3, 1e-2, 1e-1, 1.0, 10.0]
-    assert _down_to(ridges, 1.0, np.array([3])).tolist() == [3]
-    assert _down_to(ridges, 0.5, np.array([3])).tolist() == [2, 3]
-    assert _down_to(ridges, 0.1, np.array([3])).tolist() == [2, 3]
-    assert _down_to(ridges, 0.03, np.array([1, 4])).tolist() == [0, 1, 2, 3, 4]
-    assert _down_to([0.5], 0.1, np.array([0])).tolist() == [0]
+    assert _ridges_for_all(ridges, 1.0, np.array([3])).tolist() == [3]
+    assert _ridges_for_all(ridges, 0.5, np.array([3])).tolist() == [2, 3]
+    assert _ridges_for_all(ridges, 0.1, np.array([3])).tolist() == [2, 3]
+    assert _ridges_for_all(ridges, 0.03, np.array([1, 4])).tolist() == [0, 1, 2, 3, 4]
+    assert _ridges_for_all([0.5], 0.1, np.array([0])).tolist() == [0]
 
 
 def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
@@ -238,7 +238,7 @@ def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
     judged = [np.square(one.left_out[:, ALL]).mean() for one in (whole, part)]
     assert judged[1] == pytest.approx(judged[0], rel=0.1)
     assert [trial["number"] for trial in part.trials] == list(range(20))
-    assert [trial["state"] for trial in part.trials].count("stopped") == 20 - 3 - SPARE
+    assert [trial["state"] for trial in part.trials].count("stopped") == 20 - 3 - SPARE_TRIALS
     ended = [trial for trial in part.trials if trial["state"] == "complete"]
     known = {trial["number"]: trial["value"] for trial in whole.trials}
     assert all(trial["value"] >= known[trial["number"]] * (1 - 1e-6) for trial in ended)  # of fewer ridges
@@ -261,23 +261,23 @@ def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, 
 
 def test_a_run_has_no_part_in_the_choice_of_what_judges_it():
     """Two trials, two folds: the first is best for fold 0 and the second for fold 1, so each judges the other fold."""
-    search, rows = _Best(most=1), [np.array([0, 1]), np.array([2, 3])]
+    search, rows = _BestTrials(most=1), [np.array([0, 1]), np.array([2, 3])]
     for number, by_fold in enumerate([[1.0, 5.0], [4.0, 2.0]]):
         left_out = sum(by_fold) - np.array(by_fold), torch.full((2, 4, 3), float(number))
-        search.consider(_Verdict(sum(by_fold), np.array([0]), {}, lambda: None, lambda kept=left_out: kept))
+        search.consider(_TrialVerdict(sum(by_fold), np.array([0]), {}, lambda: None, lambda kept=left_out: kept))
     np.testing.assert_array_equal(search.without(rows)[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 
 
 def test_a_run_has_no_part_in_the_choice_of_the_ridge_that_judges_it():
     """The first ridge is best for fold 0 and the second for fold 1, so each judges the other fold."""
-    errors = _Errors(4, 2, 2)
+    errors = _LeftOutErrors(4, 2, 2)
     folds = [(np.array([2, 3]), np.array([0, 1])), (np.array([0, 1]), np.array([2, 3]))]
-    (block,) = _blocks(folds, np.arange(4), "cpu")
-    piece = _Piece((0, 1), slice(0, 2), block, None)
+    (block,) = _fold_blocks(folds, np.arange(4), "cpu")
+    piece = _SidePiece((0, 1), slice(0, 2), block, None)
     for ridge in (0, 1):
         errors.keep(ridge, piece, [0], torch.full((2, 2, 4), float(ridge)))
     by_fold = np.array([[1.0, 5.0], [4.0, 2.0]])
-    others, chosen = _chosen_without(by_fold.sum(axis=1, keepdims=True) - by_fold, errors, 0)
+    others, chosen = _without_each_fold(by_fold.sum(axis=1, keepdims=True) - by_fold, errors, 0)
     np.testing.assert_array_equal(others, [2.0, 1.0])
     np.testing.assert_array_equal(chosen[0, :, 0], [1.0, 1.0, 0.0, 0.0])
 

@@ -16,7 +16,7 @@ from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS, method_of
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import CLOSING, TIMED, Problem, Search, SearchedAlone, affordable
+from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, Search, SearchedAlone, affordable_trials
 from shipid.hybrid.settings import Searched
 from shipid.hybrid.stored import Stored
 from tests.documented import module
@@ -126,10 +126,10 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
     """Whatever the clock says the second time: what was decided is written down."""
     file = tmp_path / "trials.log"
     method = quick(kind, budget=100.0) if kind != "path-drawn" else quick(kind, budget=100.0, averaged=1)
-    monkeypatch.setattr(searches, "affordable", lambda *known: 2 if known[-1] else None)
+    monkeypatch.setattr(searches, "affordable_trials", lambda *known: 2 if known[-1] else None)
     first = method.fit(task_in(here, kind, Journal(file)))
     assert {len(fit.trials) for fit in first.values()} == {2}
-    monkeypatch.setattr(searches, "affordable", lambda *_: 3)
+    monkeypatch.setattr(searches, "affordable_trials", lambda *_: 3)
     second = method.fit(task_in(here, kind, Journal(file)))
     assert digits(second, here, kind) == digits(first, here, kind)
     assert Journal(file).count("a+way-N0006-s2") == 2
@@ -138,15 +138,15 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
 
 
 def test_a_price_is_that_of_the_trials_after_the_first() -> None:
-    assert affordable(10.0, 0.0, []) is None
-    assert affordable(10.0, 0.0, [0.5]) is None
-    assert affordable(10.0, 0.0, [2.0, 0.5, 0.5, 0.5]) == 20 - CLOSING
-    assert affordable(10.0, 4.0, [2.0, 0.5, 0.5, 0.5]) == 12 - CLOSING
-    assert affordable(10.0, 0.0, [6.0]) == 1  # one trial took more than half
-    assert affordable(10.0, 9.0, [0.1]) == 10 - CLOSING
-    assert affordable(1.0, 0.0, [0.2] * TIMED) == 5 - CLOSING
-    assert affordable(1e-9, 0.0, [5.0]) == 1
-    assert affordable(100.0, 0.0, [0.0] * TIMED) > 1000  # a clock that does not tick
+    assert affordable_trials(10.0, 0.0, []) is None
+    assert affordable_trials(10.0, 0.0, [0.5]) is None
+    assert affordable_trials(10.0, 0.0, [2.0, 0.5, 0.5, 0.5]) == 20 - CLOSING_TRIALS
+    assert affordable_trials(10.0, 4.0, [2.0, 0.5, 0.5, 0.5]) == 12 - CLOSING_TRIALS
+    assert affordable_trials(10.0, 0.0, [6.0]) == 1  # one trial took more than half
+    assert affordable_trials(10.0, 9.0, [0.1]) == 10 - CLOSING_TRIALS
+    assert affordable_trials(1.0, 0.0, [0.2] * TIMED_TRIALS) == 5 - CLOSING_TRIALS
+    assert affordable_trials(1e-9, 0.0, [5.0]) == 1
+    assert affordable_trials(100.0, 0.0, [0.0] * TIMED_TRIALS) > 1000  # a clock that does not tick
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -155,9 +155,9 @@ def test_a_budget_is_kept_by_trials_of_any_price(seed: int) -> None:
     rng = np.random.default_rng(seed)
     price, before, budget = rng.uniform(0.01, 1.0), rng.uniform(0.0, 2.0), rng.uniform(8.0, 20.0)
     seconds: list[float] = []
-    while (trials := affordable(budget, before, seconds)) is None or len(seconds) < trials:
+    while (trials := affordable_trials(budget, before, seconds)) is None or len(seconds) < trials:
         seconds.append(price * rng.uniform(0.98, 1.02))
-    assert budget - 3 * price < before + sum(seconds) + CLOSING * price < 1.03 * budget + price
+    assert budget - 3 * price < before + sum(seconds) + CLOSING_TRIALS * price < 1.03 * budget + price
 
 
 def test_foundations_that_go_together_share_a_budget(here: World) -> None:
@@ -173,7 +173,7 @@ def test_foundations_that_go_together_share_a_budget(here: World) -> None:
     assert search.done == search.count
 
 
-class CountingProblem(Problem):
+class CountingProblem(LearningProblem):
     """What is solved from windows is a path with as many metres as there are windows and trials before."""
 
     def solve(self, number: int, point: Any, windows: Any) -> Any:

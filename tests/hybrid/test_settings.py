@@ -5,7 +5,7 @@ from shipid.errors import DocumentError
 from shipid.hybrid.methods import method_of
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
-from shipid.hybrid.settings import spread
+from shipid.hybrid.settings import spread_points
 
 
 def test_a_field_can_be_changed_in_either_method():
@@ -45,8 +45,8 @@ def test_an_unknown_kind_is_refused_with_the_names():
 
 
 def test_points_spread_evenly_and_keep_their_start():
-    points = np.array(list(spread(3, 64)))
-    np.testing.assert_array_equal(list(spread(3, 5)), points[:5])
+    points = np.array(list(spread_points(3, 64)))
+    np.testing.assert_array_equal(list(spread_points(3, 5)), points[:5])
     np.testing.assert_array_equal(points[0], 0.5)
     for quarter in range(4):  # each quarter of a range gets a quarter of the trials, give or take four
         share = (points >= quarter / 4) & (points < (quarter + 1) / 4)
@@ -54,7 +54,9 @@ def test_points_spread_evenly_and_keep_their_start():
 
 
 def test_one_dimension_is_the_golden_ratio():
-    assert np.ravel(list(spread(1, 3))) == pytest.approx([0.5, 0.5 + 0.6180339887 - 1, 0.5 + 2 * 0.6180339887 - 1])
+    assert np.ravel(list(spread_points(1, 3))) == pytest.approx(
+        [0.5, 0.5 + 0.6180339887 - 1, 0.5 + 2 * 0.6180339887 - 1]
+    )
 
 
 def test_trials_fill_their_ranges_by_the_logarithm():

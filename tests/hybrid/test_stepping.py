@@ -8,7 +8,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stepping import free, stepped_paths, true_steps
+from shipid.hybrid.stepping import step_alone, stepped_paths, true_steps
 from shipid.observer import Observer
 from tests.hybrid.worlds import HORIZON, ship, world
 
@@ -83,7 +83,9 @@ def test_the_trapezoid_takes_half_a_step_of_lag_out_of_euler(here):
 def test_without_physics_the_velocities_stay(here):
     physics = Physics(None, HORIZON, 1.0)
     instants = here.test.instants()
-    np.testing.assert_array_equal(free(physics, instants), np.stack([instants.columns[name] for name in "uvr"], 1))
+    np.testing.assert_array_equal(
+        step_alone(physics, instants), np.stack([instants.columns[name] for name in "uvr"], 1)
+    )
     straight = Instants({**instants.columns, "r": np.zeros(len(instants)), "v": np.zeros(len(instants))})
     paths = stepped_paths(physics, straight, nothing)
     np.testing.assert_allclose(paths[-1, :, 0], HORIZON * instants.columns["u"])

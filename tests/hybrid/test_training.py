@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from shipid.hybrid import training
-from shipid.hybrid.training import Length, Settings, Watch, train
+from shipid.hybrid.training import BestEpochs, Length, StackSettings, train_stack
 
 torch.set_num_threads(1)
 TRAIN, VAL = np.arange(96), np.arange(96, 128)
@@ -19,7 +19,7 @@ def settings(num_members=1, **changes):
     for name, value in changes.items():
         (common if name in common else shared if name in shared else length)[name] = value
     wide = {k: v if isinstance(v, tuple) else (v,) * num_members for k, v in common.items()}
-    return Settings(**shared, **wide, length=Length(**length))
+    return StackSettings(**shared, **wide, length=Length(**length))
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_networks_start_as_those_of_pytorch():
     widths = [5, 16, 16, 4]
     flat = training.initial_weights(widths, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)])
     for k, seed in enumerate((11, 12)):
-        layers = [(w[k].numpy(), b[k, 0].numpy()) for w, b in training._views(flat, widths)]
+        layers = [(w[k].numpy(), b[k, 0].numpy()) for w, b in training._layer_views(flat, widths)]
         assert_same_weights(layers, torch_network(seed, widths), 1e-7)
 
 
@@ -57,7 +57,7 @@ def test_networks_start_as_those_of_pytorch():
 def test_the_loop_is_that_of_torch_optim(problem, decay):
     x, y = problem
     epochs = 40
-    trained = train(x, y[:1], TRAIN, TRAIN, settings(weight_decay=decay, epochs=epochs), [7])
+    trained = train_stack(x, y[:1], TRAIN, TRAIN, settings(weight_decay=decay, epochs=epochs), [7])
     network = torch_network(7, [5, 8, 8, 6])
     if decay:
         optimiser = torch.optim.AdamW(network.parameters(), lr=1e-2, weight_decay=decay)
@@ -80,10 +80,10 @@ def test_a_member_does_not_notice_its_company(problem):
         "hidden_dropout": (0.1, 0.0, 0.0),
     }
     shared = {"batch": 20, "epochs": 25, "patience": 4}
-    together = train(x, y, TRAIN, VAL, settings(**wide, **shared), [1, 2, 3], order_seed=5)
+    together = train_stack(x, y, TRAIN, VAL, settings(**wide, **shared), [1, 2, 3], order_seed=5)
     for k in range(3):
         alone = {name: value[k] for name, value in wide.items()}
-        one = train(x, y[k : k + 1], TRAIN, VAL, settings(**alone, **shared), [k + 1], order_seed=5)
+        one = train_stack(x, y[k : k + 1], TRAIN, VAL, settings(**alone, **shared), [k + 1], order_seed=5)
         assert one.epochs[0] == together.epochs[k]
         assert one.loss[0] == pytest.approx(together.loss[k], rel=1e-4)
         for mine, theirs in zip(one.layers[0], together.layers[k], strict=True):
@@ -94,19 +94,19 @@ def test_early_stopping_keeps_the_best_epoch(problem):
     x, y = problem
     y = np.random.default_rng(1).normal(size=y.shape)  # nothing to learn: the validation loss soon rises
     run = {"learning_rate": 3e-2, "units": 64}
-    losses = [train(x, y[:1], TRAIN, VAL, settings(**run, epochs=n), [4]).loss[0] for n in range(1, 40)]
+    losses = [train_stack(x, y[:1], TRAIN, VAL, settings(**run, epochs=n), [4]).loss[0] for n in range(1, 40)]
     best = int(np.argmin(losses)) + 1
-    stopped = train(x, y[:1], TRAIN, VAL, settings(**run, epochs=500, patience=12), [4])
+    stopped = train_stack(x, y[:1], TRAIN, VAL, settings(**run, epochs=500, patience=12), [4])
     assert best < 25
     assert stopped.epochs[0] == best + 12
     assert stopped.loss[0] == losses[best - 1]
-    kept = train(x, y[:1], TRAIN, VAL, settings(**run, epochs=best), [4])
+    kept = train_stack(x, y[:1], TRAIN, VAL, settings(**run, epochs=best), [4])
     np.testing.assert_array_equal(stopped.layers[0][0][0], kept.layers[0][0][0])
 
 
 @pytest.mark.parametrize("rate", [0.1, 0.5, 0.9])
 def test_drop_out_keeps_the_expectation(rate):
-    mask = training.dropout((0.0, rate), (400, 500), [torch.Generator().manual_seed(k) for k in (0, 1)])
+    mask = training.draw_dropout((0.0, rate), (400, 500), [torch.Generator().manual_seed(k) for k in (0, 1)])
     assert (mask[0] == 1).all()
     share = (mask[1] == 0).double().mean().item()
     assert share == pytest.approx(rate, abs=0.005)
@@ -116,7 +116,7 @@ def test_drop_out_keeps_the_expectation(rate):
 def test_drop_out_of_one_leaves_a_mean_and_no_nan(problem):
     x, y = problem
     y = y[:1] + 3.0
-    trained = train(x, y, TRAIN, VAL, settings(hidden_dropout=1.0, input_dropout=1.0, epochs=1500), [0])
+    trained = train_stack(x, y, TRAIN, VAL, settings(hidden_dropout=1.0, input_dropout=1.0, epochs=1500), [0])
     assert trained.status == ("ok",)
     np.testing.assert_allclose(trained.layers[0][-1][1], y[0, TRAIN].mean(axis=0), atol=0.3)
     assert np.isfinite(trained.loss).all()
@@ -127,7 +127,7 @@ def test_a_diverged_member_harms_nobody(problem):
     broken = y.copy()
     broken[1, 3, 2] = np.nan
     config = settings(3, epochs=10, batch=32)
-    good, bad = (train(x, targets, TRAIN, VAL, config, [1, 2, 3]) for targets in (y, broken))
+    good, bad = (train_stack(x, targets, TRAIN, VAL, config, [1, 2, 3]) for targets in (y, broken))
     assert bad.status == ("ok", "diverged", "ok")
     assert np.isnan(bad.loss[1])
     np.testing.assert_array_equal(bad.loss[[0, 2]], good.loss[[0, 2]])
@@ -135,7 +135,7 @@ def test_a_diverged_member_harms_nobody(problem):
 
 def test_who_has_stopped_does_not_start_again():
     weights = torch.zeros(2, 3)
-    watch = Watch(weights, patience=2)
+    watch = BestEpochs(weights, patience=2)
     for epoch, losses in enumerate([[3.0, 9.0], [4.0, 8.0], [5.0, 7.0], [1.0, 6.0]], start=1):
         weights.fill_(epoch)
         watch.compare(torch.zeros(2), torch.tensor(losses))

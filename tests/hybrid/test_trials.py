@@ -14,13 +14,13 @@ from shipid.hybrid.method import Fitted
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.settings import Scale, Searched
 from shipid.hybrid.trials import (
-    diverged,
+    diverged_result,
     fit_each,
-    points_of,
+    is_finite_physics,
     ridge_trial,
-    row_of,
-    sound,
-    used,
+    trial_points,
+    trial_row,
+    windows_of_folds,
 )
 from tests.hybrid.tasks import task_of
 
@@ -47,19 +47,19 @@ class Counting(Searched):
     width: Scale = (1.0, 100.0)
 
     def fit(self, task):
-        return {name: diverged(self, points_of(self)) for name in task.targets}
+        return {name: diverged_result(self, trial_points(self)) for name in task.targets}
 
 
 def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     """And the journal gives every trial back to the digit, whole numbers as such."""
     method = Counting()
-    points = list(points_of(method))
+    points = list(trial_points(method))
     neighbours = {point["neighbours"] for point in points}
     assert {2.0, 3.0} <= neighbours <= {float(number) for number in range(2, 21)}
     for name, middle in (("share", 0.45), ("width", 10.0)):
         assert np.mean([point[name] < middle for point in points]) == pytest.approx(0.5, abs=0.05)
     assert all(0.2 <= point["share"] <= 0.7 and 1 <= point["width"] <= 100 for point in points)
-    rows = [row_of(number, point, 1.0, 0.0) for number, point in enumerate(points)]
+    rows = [trial_row(number, point, 1.0, 0.0) for number, point in enumerate(points)]
     Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
     kept = Journal(tmp_path / "trials.log").rows("a")
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
@@ -92,11 +92,11 @@ def test_every_foundation_is_fitted_or_has_diverged():
         (0, {"a": 1.0}, "diverged"),
         (1, {"a": 2.0}, "diverged"),
     ]
-    assert (sound(here, "one"), sound(here, "other")) == (False, True)
-    np.testing.assert_array_equal(used(here), np.arange(9))
+    assert (is_finite_physics(here, "one"), is_finite_physics(here, "other")) == (False, True)
+    np.testing.assert_array_equal(windows_of_folds(here), np.arange(9))
     once = replace(here, folds=[(np.array([1, 4]), np.array([7])), (np.array([4]), np.array([2]))])
-    assert used(once).tolist() == [1, 2, 4, 7]  # what validates alone trains the last model, too
-    assert diverged(OneStep(), []).trials == []
+    assert windows_of_folds(once).tolist() == [1, 2, 4, 7]  # what validates alone trains the last model, too
+    assert diverged_result(OneStep(), []).trials == []
 
 
 def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():
@@ -127,13 +127,13 @@ def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():
 
 @pytest.mark.parametrize(("value", "state"), [(2.0, "complete"), (np.inf, "diverged"), (np.nan, "diverged")])
 def test_a_trial_that_is_no_number_has_diverged(value, state):
-    row = row_of(3, {"ridge": 0.5}, value, 0.0, epochs=7)
+    row = trial_row(3, {"ridge": 0.5}, value, 0.0, epochs=7)
     assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
     assert row["seconds"] > 0
 
 
 def test_with_a_budget_there_is_always_another_trial():
     method = Counting(trials=3, budget=10.0)
-    assert len(list(islice(points_of(method), 9))) == 9
-    assert len(diverged(method, points_of(method)).trials) == 1
-    assert len(diverged(Counting(trials=3), points_of(Counting(trials=3))).trials) == 3
+    assert len(list(islice(trial_points(method), 9))) == 9
+    assert len(diverged_result(method, trial_points(method)).trials) == 1
+    assert len(diverged_result(Counting(trials=3), trial_points(Counting(trials=3))).trials) == 3

@@ -8,7 +8,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.hybrid.physics import assumed
+from shipid.hybrid.physics import missing_columns
 from shipid.identification.free_run import ALL, MEASURED, missing_inputs, simulate_free_runs
 from shipid.identification.settings import Identify
 from shipid.vessel.load import load_vessel
@@ -97,7 +97,7 @@ def test_a_state_whose_column_has_another_name_is_measured() -> None:
     log = trials(six, runs=1, steps=5)
     weather = ["V_w", "beta_w", "V_c", "beta_c"]
     assert missing_inputs(six, log, SETTINGS, log.runs) == weather
-    assert assumed(six, dict.fromkeys(log.frame, np.empty(0))) == weather
+    assert missing_columns(six, dict.fromkeys(log.frame, np.empty(0))) == weather
     flat = Dataset(log.frame.drop(columns="z"), log.metadata)
     assert missing_inputs(six, flat, SETTINGS, log.runs) == ["z", *weather]
 

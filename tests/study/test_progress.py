@@ -9,13 +9,13 @@ from typing import Any
 
 from shipid.files import write_json
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.settings import Span
+from shipid.hybrid.settings import SearchSpan
 from shipid.study import seals
 from shipid.study.progress import Searching, Watch
 from shipid.study.store import JOURNALS, TRIALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
-SPACE = {"units": Span(1, 100)}
+SPACE = {"units": SearchSpan(1, 100)}
 
 
 def row(number: int, value: float) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from shipid.files import TEMPORARY, read_json, write_json
 from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.trials import row_of
+from shipid.hybrid.trials import trial_row
 from shipid.metrics import position_error, summarise_errors
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
@@ -639,8 +639,8 @@ class Faulty(Method):
         if MISTAKE == "few runs":
             raise DataError("too few runs:\nmake more")
         given = SimpleNamespace(**vars(Moved({})), predict=None) if MISTAKE == "lacks" else Moved({})
-        rows = {"no trial": [], "NaN": [row_of(0, {}, 1.0, 0.0) | {"value": np.nan}]}
-        return dict.fromkeys(task.cases, Fitted(given, rows.get(MISTAKE, [row_of(0, {}, 1.0, 0.0)]), 0.0))
+        rows = {"no trial": [], "NaN": [trial_row(0, {}, 1.0, 0.0) | {"value": np.nan}]}
+        return dict.fromkeys(task.cases, Fitted(given, rows.get(MISTAKE, [trial_row(0, {}, 1.0, 0.0)]), 0.0))
 
 
 def faulty_plan(folder: Path, monkeypatch: pytest.MonkeyPatch, mistake: str) -> Plan:

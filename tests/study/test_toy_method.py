@@ -16,7 +16,7 @@ from shipid.data.dataset import read_dataset
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.method import Fitted, Method, Task, Traits
 from shipid.hybrid.methods import METHODS
-from shipid.hybrid.trials import row_of
+from shipid.hybrid.trials import trial_row
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.apply import predict_log
@@ -83,7 +83,7 @@ class Otherwise(Method):
     terms: int = 2
 
     def fit(self, given: Task) -> dict[str, Fitted]:
-        return {name: Fitted(Unchanged({}), [row_of(0, {}, 1.0, 0.0)], 0.0) for name in given.cases}
+        return {name: Fitted(Unchanged({}), [trial_row(0, {}, 1.0, 0.0)], 0.0) for name in given.cases}
 
 
 def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

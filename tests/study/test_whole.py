@@ -18,7 +18,7 @@ from shipid.answer.pages import write_pages
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.data.windows import Instants, Windows, cut_windows, from_frame
 from shipid.errors import DocumentError
-from shipid.hybrid.features import Inputs, Memory, group_of
+from shipid.hybrid.features import Inputs, Memory, input_group
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.observer import Estimates, Observer, observe
@@ -259,7 +259,7 @@ def test_no_input_sees_a_later_row(known: bool) -> None:
     )
     spared = tuple(dataset.commands) if known else ()
     (windows, table), (_, changed) = (inputs_at(d, physics, known) for d in (dataset, later_changed(dataset, spared)))
-    groups = {group_of(name) for name in table}
+    groups = {input_group(name) for name in table}
     assert groups == {"motion", "wind", "command", "history", "error", "observer"}
     before = windows.t <= NOW
     for name, values in table.items():
