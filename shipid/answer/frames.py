@@ -16,7 +16,7 @@ from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import Snapshot
 from shipid.report.selection import FEW_RUNS, spread
 from shipid.study import store
-from shipid.study.declared import NO_MODEL, Way
+from shipid.study.declared import NO_MODEL, StudyMethod
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import grid_seeds, learns_from_runs, vessels_of
 from shipid.study.prepare import constant_motion
@@ -274,7 +274,7 @@ def repairs_frame(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["kind", "column", "count", "note"])
 
 
-def _method_words(way: Way) -> str:
+def _method_words(way: StudyMethod) -> str:
     """A method in a few words: its name, its kind and how much it searches."""
     trials = way.method.num_trials()
     kind = "" if way.kind == way.name else f" ({way.kind})"

@@ -14,7 +14,7 @@ from shipid.answer.frames import insert_gaps, shown_runs
 from shipid.observer import bank, observe
 from shipid.predictor import Predictor
 from shipid.study import store
-from shipid.study.declared import Foundation, Way
+from shipid.study.declared import Foundation, StudyMethod
 from shipid.study.plan import learns_from_runs, model_label
 from shipid.study.prepare import known_by_then
 from shipid.study.results import Results
@@ -48,7 +48,7 @@ class MemoryPair:
     differs: tuple[str, ...] = ()
 
 
-def memory_pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list[MemoryPair]:
+def memory_pairs(foundations: Sequence[Foundation], ways: Sequence[StudyMethod]) -> list[MemoryPair]:
     """Every pair of a study: the same foundation with and without memory, and every observed one with its original.
 
     Methods are compared with others of their kind alone: between kinds, memory is not all that differs.
@@ -63,7 +63,7 @@ def memory_pairs(foundations: Sequence[Foundation], ways: Sequence[Way]) -> list
     return sorted(pairs, key=lambda pair: [*ADDED_WORDS].index(pair.added))
 
 
-def kinds_of_memory(way: Way, foundation: Foundation) -> frozenset[str]:
+def kinds_of_memory(way: StudyMethod, foundation: Foundation) -> frozenset[str]:
     """Kinds of memory that a method takes on a foundation: `history`, `error`, `observer`, or `past` for any other."""
     memory = way.method.traits.memory
     kinds = {"history"} if memory.history or memory.turned else set()
@@ -73,7 +73,7 @@ def kinds_of_memory(way: Way, foundation: Foundation) -> frozenset[str]:
     return frozenset(kinds | ({"observer"} if memory.observer and foundation.observer is not None else set()))
 
 
-def _method_pairs(original: Foundation, observed: Foundation, ways: Sequence[Way]) -> Iterator[MemoryPair]:
+def _method_pairs(original: Foundation, observed: Foundation, ways: Sequence[StudyMethod]) -> Iterator[MemoryPair]:
     """Each method with memory on one foundation, and the method of its kind that takes least on the other."""
     added: Added = "memory" if original is observed else "both"
     for way in (way for way in ways if observed.name in way.foundations):
@@ -89,7 +89,7 @@ def _method_pairs(original: Foundation, observed: Foundation, ways: Sequence[Way
             yield MemoryPair(added, words, *names, _differing_settings(way, rival))
 
 
-def _differing_settings(one: Way, other: Way) -> tuple[str, ...]:
+def _differing_settings(one: StudyMethod, other: StudyMethod) -> tuple[str, ...]:
     """Settings, memory's apart, that differ between two methods of a kind."""
     mine, others = one.method.model_dump(mode="json"), other.method.model_dump(mode="json")
     return tuple(name for name in mine if name not in NOT_COMPARED and mine[name] != others.get(name))

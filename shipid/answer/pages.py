@@ -134,7 +134,7 @@ def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]
     whole: list[bool] = []
     for name, part in plan.parts.items():
         mine = store.check_part(folder, name, part.plan)
-        if not (mine / store.STUDY).is_file() or not store.finished(mine, part.plan.units):
+        if not (mine / store.STUDY).is_file() or not store.finished_units(mine, part.plan.units):
             notes[name] = "no cell is finished yet"
             continue
         write_pages(mine, say)

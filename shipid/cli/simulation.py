@@ -76,7 +76,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     from shipid.data.dataset import write_dataset
     from shipid.study.envelope import envelope, envelope_table
     from shipid.study.plan import input_files, read_plan
-    from shipid.study.prepare import obtain, partition, runs_by_amount
+    from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
     check_ending(out, ".parquet")
     plan = read_plan(study, parse_changes(changes))
@@ -84,7 +84,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
     file = out or Path(f"{plan.name}.parquet")
     check_output(file, input_files(plan), "--out")
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     pool, test, _ = partition(plan, dataset)
     rows_of_sets = envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
     ranges = envelope_table(rows_of_sets, plan.study.published)

@@ -121,14 +121,14 @@ def study_variants(
     """Show the foundations of a study with their factors and accuracy A; save patches that rebuild them exactly."""
     from shipid.files import check_empty
     from shipid.study.plan import read_plan
-    from shipid.study.prepare import obtain, prepare
+    from shipid.study.prepare import obtain_runs, prepare
 
     if save is not None:
         check_empty(save)
     plan = read_plan(study, parse_changes(changes))
     models, scores = plan.foundations, {}
     if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
-        prepared = prepare(plan, obtain(plan))
+        prepared = prepare(plan, obtain_runs(plan))
         models = prepared.foundations
         known = [model.name for model in models if model.vessel and not model.fitted]
         scores = {name: prepared.accuracy(name)["mean"] for name in known}
@@ -187,14 +187,14 @@ def study_screen(
     from shipid.engine.engines import ENGINES, REPEATED, engine_by_name
     from shipid.files import write_table
     from shipid.study import screen
-    from shipid.study.prepare import obtain, partition
+    from shipid.study.prepare import obtain_runs, partition
 
     engine = "single" if single else REPEATED
     engine_by_name(engine, device)
     if single and not ENGINES[engine].available():
         raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
     plan, file = _prepare_command(study, changes, device, out, "screen")
-    wanted, dataset = screen.families(plan, family), obtain(plan)
+    wanted, dataset = screen.families(plan, family), obtain_runs(plan)
     cut = partition(plan, dataset)
     for note in screen.notes(plan, cut, wanted):
         typer.echo(note, err=True)
@@ -236,10 +236,10 @@ def study_rotate(
     """Test on every run in turn and train on all others; the same command goes on after an interruption."""
     from shipid.answer import rotate
     from shipid.files import write_table
-    from shipid.study.prepare import obtain
+    from shipid.study.prepare import obtain_runs
 
     plan, file = _prepare_command(study, changes, device, out, "rotate")
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     wanted = rotate.choose_turns(plan, dataset, tests)
     from shipid.study.plan import grid_seeds
 

@@ -14,10 +14,18 @@ from shipid.errors import DataError, shorten_line
 from shipid.hybrid.method import Case, Corrector, Fitted, Task, TrialJournal, fit_all
 from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
-from shipid.study.declared import Foundation, Way
+from shipid.study.declared import Foundation, StudyMethod
 from shipid.study.foundations import Prediction, predictions
 from shipid.study.plan import Batch, Unit
-from shipid.study.prepare import Prepared, apart, at_instants, instants_of, outside_of, physics_of, window_memory
+from shipid.study.prepare import (
+    Prepared,
+    at_instants,
+    instants_of,
+    physics_of,
+    rows_apart_from_test,
+    rows_outside_test,
+    window_memory,
+)
 from shipid.study.store import Cell
 from shipid.units import percent_text
 from shipid.version import __version__
@@ -36,12 +44,12 @@ class Work(NamedTuple):
     prepared: Prepared
     batch: Batch
     windows: Windows
-    ways: Mapping[str, Way]
+    ways: Mapping[str, StudyMethod]
     known: Mapping[str, Prediction]
     device: str
 
 
-def work_of(prepared: Prepared, unit: Unit, ways: tuple[Way, ...], device: str) -> Work:
+def work_of(prepared: Prepared, unit: Unit, ways: tuple[StudyMethod, ...], device: str) -> Work:
     """The windows of a unit, and its foundations, those fitted that are to be."""
     runs = prepared.runs(unit.batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
@@ -52,7 +60,7 @@ def work_of(prepared: Prepared, unit: Unit, ways: tuple[Way, ...], device: str) 
     )
 
 
-def fit_method(work: Work, way: Way, journal: TrialJournal | None = None) -> dict[str, Fitted]:
+def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None) -> dict[str, Fitted]:
     """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
     mine = {name: work.known[name] for name in way.foundations}
@@ -107,10 +115,10 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, Fitted]]) -> E
         for method, names in wanted.items()
         for name in names
     }
-    kept = outside_of(prepared.data, prepared.test)
+    kept = rows_outside_test(prepared.data, prepared.test)
     seen = replace(
         prepared,
-        data=apart(prepared.data, prepared.test),
+        data=rows_apart_from_test(prepared.data, prepared.test),
         estimates={name: known.select(kept) for name, known in prepared.estimates.items()},
     )
     place = np.flatnonzero(np.isin(prepared.pool.run, prepared.runs(batch)))
@@ -189,7 +197,9 @@ def _failed(status: str, sentence: str) -> dict[str, Any]:
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
-def _tested(prepared: Prepared, one: Prediction, predictor: Predictor, way: Way) -> tuple[dict[str, Any], Array | None]:
+def _tested(
+    prepared: Prepared, one: Prediction, predictor: Predictor, way: StudyMethod
+) -> tuple[dict[str, Any], Array | None]:
     """Errors [m] of a predictor on the test windows, and its paths where they are finite and within reach of a ship."""
     test, study = prepared.test, prepared.study
     failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
@@ -216,7 +226,7 @@ def _tested(prepared: Prepared, one: Prediction, predictor: Predictor, way: Way)
 
 
 def _predictor(
-    work: Work, foundation: Foundation, way: Way, corrector: Corrector, origin: Mapping[str, str]
+    work: Work, foundation: Foundation, way: StudyMethod, corrector: Corrector, origin: Mapping[str, str]
 ) -> Predictor:
     windows, study = work.windows, work.prepared.study
     named = {"cell": work.batch.cell(foundation.name, way.name), "foundation": foundation.name, "method": way.name}

@@ -31,7 +31,7 @@ def check_folder(folder: Path) -> Checked:
     lines: list[str] = []
     faults: dict[Path, list[Fault]] = {}
     for place in (*sorted((folder / store.PARTS).glob("*/")), folder):
-        faults[place] = seals.faults(place)
+        faults[place] = seals.sealed_faults(place)
         lines += [f"{place / fault.file}: {fault.words}" for fault in faults[place]]
     every = [fault for found in faults.values() for fault in found]
     try:
@@ -51,7 +51,7 @@ def _count_words(faults: list[Fault]) -> str:
 def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> list[str]:
     """Lines on how far one folder is, who works in it, what killed runs left, and by what it was computed."""
     store.stored_plan(folder)  # reports what was edited
-    done = sum(len(unit.pairs) for unit in store.finished(folder, plan.units))
+    done = sum(len(unit.pairs) for unit in store.finished_units(folder, plan.units))
     lines = [] if plan.parts else [f"{name}{done} of {plan.cells} cells finished, {_count_words(faults)}"]
     if writer := current_writer(folder):
         lines.append(f"{name}at work: {writer}")

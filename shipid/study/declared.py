@@ -55,7 +55,7 @@ class Foundation:
 
 
 @dataclass(frozen=True)
-class Way:
+class StudyMethod:
     """A method of the study under its name.
 
     foundations : those that it meets, by name. left_out : those with an observer that its families would include, but
@@ -107,12 +107,12 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
             foundations.append(
                 Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer)
             )
-    if twice := same_file([foundation.name for foundation in foundations]):
+    if twice := names_of_one_file([foundation.name for foundation in foundations]):
         raise DocumentError(f"two models would be called {twice}: rename a family", file=file, path="family")
     return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "no physics: data alone"))
 
 
-def same_file(names: Sequence[str]) -> str:
+def names_of_one_file(names: Sequence[str]) -> str:
     """The first two names that would be one file, in words; empty where there are none.
 
     Many file systems do not tell capitals from small letters: the files of one model would replace those of the other.
@@ -171,13 +171,13 @@ def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Pa
     return settings
 
 
-def methods_of(study: Study, foundations: Sequence[Foundation], file: Path) -> tuple[Way, ...]:
+def methods_of(study: Study, foundations: Sequence[Foundation], file: Path) -> tuple[StudyMethod, ...]:
     """The methods with their settings checked, and the foundations that each meets."""
-    ways: list[Way] = []
+    ways: list[StudyMethod] = []
     families = list(dict.fromkeys(foundation.family for foundation in foundations))
     for index, block in enumerate(study.method):
         path = f"method.{index}"
-        if twice := same_file([*(way.name for way in ways), block.name]):
+        if twice := names_of_one_file([*(way.name for way in ways), block.name]):
             raise DocumentError(f"two methods are called {twice}", file=file, path=f"{path}.name")
         try:
             method = method_of(block.kind, block.settings, path)
@@ -202,7 +202,7 @@ def methods_of(study: Study, foundations: Sequence[Foundation], file: Path) -> t
         for family, base in bases.items():
             if words := method.unfit(base):
                 raise DocumentError(f"{family} with {block.kind}: {words}", file=file, path=path)
-        ways.append(Way(block.name, block.kind, method, taken, left_out))
+        ways.append(StudyMethod(block.name, block.kind, method, taken, left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
     if idle is not None:

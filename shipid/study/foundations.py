@@ -14,7 +14,7 @@ from shipid.data.windows import Windows
 from shipid.errors import ShipidError
 from shipid.observer import Estimates
 from shipid.study.declared import Foundation
-from shipid.study.prepare import Prepared, apart, chosen_observer, estimates_of, paths_of
+from shipid.study.prepare import Prepared, chosen_observer, estimates_of, paths_of, rows_apart_from_test
 
 if TYPE_CHECKING:
     from shipid.identification.settings import Identify
@@ -61,7 +61,7 @@ def predictions(
             paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
             result[one.name] = Prediction(one, *paths, estimates=prepared.estimates.get(one.name))
         else:
-            data = apart(prepared.data, prepared.test) if data is None else data
+            data = rows_apart_from_test(prepared.data, prepared.test) if data is None else data
             result[one.name] = _fitted(prepared, one, runs, data, windows, device, known)
     return result
 

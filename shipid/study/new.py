@@ -31,7 +31,7 @@ from shipid.simulation.standard import shaft_speed
 from shipid.study.declared import NO_MODEL
 from shipid.study.first_look import Look, first_look
 from shipid.study.plan import Plan, build_plan
-from shipid.study.prepare import all_windows, obtain, over_gaps, partition, prepare
+from shipid.study.prepare import all_windows, obtain_runs, over_gaps, partition, prepare
 from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
 from shipid.units import GRAVITY, RPM, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
@@ -278,7 +278,7 @@ def _first_that_runs(
         ]
         plan = _build_draft_plan(choices, out, vessels)
         try:
-            _check_that_runs(plan, obtain(plan) if dataset is None else dataset)
+            _check_that_runs(plan, obtain_runs(plan) if dataset is None else dataset)
         except DivergenceError as error:
             last = error
         else:

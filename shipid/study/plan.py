@@ -28,12 +28,12 @@ from shipid.study.code import users_code
 from shipid.study.declared import (
     NO_MODEL,
     Foundation,
-    Way,
+    StudyMethod,
     check_claims,
     foundations_of,
     methods_of,
     named_vessel,
-    same_file,
+    names_of_one_file,
 )
 from shipid.study.ranges import LONGEST_NAME, check_memory, check_ranges, check_seeds, window_numbers
 from shipid.study.schema import Data, Study, check_version
@@ -120,14 +120,14 @@ class Plan:
     document: Document = field(repr=False)
     study: Study = field(repr=False)
     foundations: tuple[Foundation, ...] = field(repr=False)
-    methods: tuple[Way, ...] = field(repr=False)
+    methods: tuple[StudyMethod, ...] = field(repr=False)
     batches: tuple[Batch, ...] = field(repr=False)
     truth: Vessel | None = None
     vessels: Mapping[str, Vessel] = field(default_factory=dict, repr=False)
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
     families: tuple[Family, ...] = field(default=(), repr=False)
-    pairs: tuple[tuple[str, Way], ...] = field(default=(), repr=False)
+    pairs: tuple[tuple[str, StudyMethod], ...] = field(default=(), repr=False)
     units: tuple[Unit, ...] = field(default=(), repr=False)
     cells: int = 0
     digest: str = ""
@@ -148,7 +148,7 @@ def completed_plan(plan: Plan) -> Plan:
 
 
 def _shared_pairs(
-    foundations: Iterable[Foundation], pairs: Iterable[tuple[str, Way]]
+    foundations: Iterable[Foundation], pairs: Iterable[tuple[str, StudyMethod]]
 ) -> list[tuple[tuple[str, str], ...]]:
     """The cells of a batch in groups: one group shares a fit of several foundations, or one to the runs."""
     known = {one.name: one for one in foundations}
@@ -196,7 +196,7 @@ def input_files(plan: Plan) -> list[Path]:
     named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
     vessels = [Path(vessel.file) for vessel in plan.vessels.values()]
     of_parts = (name for part in plan.parts.values() for name in input_files(part.plan))
-    mine = (beside(here.parent, name) for name in named if name is not None)
+    mine = (path_beside_study(here.parent, name) for name in named if name is not None)
     return list(dict.fromkeys([here, *vessels, *mine, *of_parts]))
 
 
@@ -381,21 +381,21 @@ def build_plan(
 ) -> Plan:
     """Check a study document and expand it into models and batches; known `vessels` and `sources` need no file."""
     try:
-        return _built(document, file, vessels, sources, changes)
+        return _check_and_expand(document, file, vessels, sources, changes)
     except DocumentError as error:
-        raise _named(error, document, tuple(changes or ())) from None
+        raise _error_by_name(error, document, tuple(changes or ())) from None
 
 
-def _named(error: DocumentError, document: Document, changes: Sequence[str]) -> DocumentError:
+def _error_by_name(error: DocumentError, document: Document, changes: Sequence[str]) -> DocumentError:
     """The error with paths by which a person finds the block, families and methods by name; whether --set made it."""
     path = error.path and documents.path_with_names(document, error.path)
-    others = [_named(other, document, changes) for other in error.others if isinstance(other, DocumentError)]
+    others = [_error_by_name(other, document, changes) for other in error.others if isinstance(other, DocumentError)]
     changed = any(f"{place}.".startswith(f"{change}.") for place in (error.path, path) for change in changes)
     message = f"--set: {error.message}" if changed else error.message
     return type(error)(message, file=error.file, path=path, others=others)
 
 
-def _built(
+def _check_and_expand(
     document: Document,
     file: Path,
     vessels: Mapping[str, Vessel] | None,
@@ -454,7 +454,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
         return {}
     names = [condition.name for condition in conditions]
     for place in range(len(names)):
-        if twice := same_file(names[: place + 1]):
+        if twice := names_of_one_file(names[: place + 1]):
             raise DocumentError(f"two conditions are called {twice}", file=file, path=f"condition.{place}.name")
     for path, values in repeat.items():
         again = [value for place, value in enumerate(values) if value in values[:place]]
@@ -469,8 +469,8 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
             name = "-".join(words)
             mine: dict[str, Any] = {} if condition is None else condition.set
-            part = build_plan(_changed(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
-            part = build_plan(_changed(part.document, turn, "repeat", file), file, known, plan.sources)
+            part = build_plan(_changed_document(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
+            part = build_plan(_changed_document(part.document, turn, "repeat", file), file, known, plan.sources)
             if part.study.data != plan.study.data:
                 part = completed_plan(replace(part, sources=_of_part(name, part, parts, sources)))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
@@ -493,7 +493,7 @@ def _of_part(name: str, part: Plan, made: Mapping[str, Part], stored: Mapping[st
     return _sources(part.study.data, Path(part.file)) if same is None else same
 
 
-def _changed(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
+def _changed_document(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
     """A document with changes; DocumentError that names the key of the change where it reaches nothing."""
     for path, value in changes.items():
         if path.split(".", 1)[0] not in set(Study.model_fields) - set(OF_PARTS):
@@ -536,7 +536,7 @@ def _check_memory(plan: Plan) -> None:
     check_memory(numbers, words, "prediction.interval", plan.file)
 
 
-def beside(folder: Path, name: str) -> Path:
+def path_beside_study(folder: Path, name: str) -> Path:
     """A file that a study names: from the study's folder, else from the working folder."""
     return folder / name if (folder / name).exists() else Path(name)
 
@@ -544,7 +544,7 @@ def beside(folder: Path, name: str) -> Path:
 def mapping_of(data: Data, file: Path) -> str | None:
     """The mapping that a study names: a bundled name as it is, a path from the study's folder on."""
     named = data.mapping
-    return str(beside(file.parent, named)) if named is not None and named.endswith(".toml") else named
+    return str(path_beside_study(file.parent, named)) if named is not None and named.endswith(".toml") else named
 
 
 def _sources(data: Data | None, file: Path) -> dict[str, str]:
@@ -557,9 +557,9 @@ def _sources(data: Data | None, file: Path) -> dict[str, str]:
         digests["mapping"] = mapping.digest
         if data.log is not None:
             with suppress(DataError):
-                digests["log"] = log_digest(mapping, beside(file.parent, data.log))
-    if data.dataset is not None and beside(file.parent, data.dataset).is_file():
-        digests["dataset"] = file_digest(beside(file.parent, data.dataset))
+                digests["log"] = log_digest(mapping, path_beside_study(file.parent, data.log))
+    if data.dataset is not None and path_beside_study(file.parent, data.dataset).is_file():
+        digests["dataset"] = file_digest(path_beside_study(file.parent, data.dataset))
     return digests
 
 

@@ -43,7 +43,7 @@ from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of_runs
-from shipid.study.plan import Batch, Plan, beside, mapping_of, past_steps
+from shipid.study.plan import Batch, Plan, mapping_of, past_steps, path_beside_study
 from shipid.study.ranges import check_memory, window_numbers
 from shipid.study.schema import Study
 from shipid.units import percent_text, plural_word
@@ -97,7 +97,7 @@ class Prepared:
 
     def runs(self, batch: Batch) -> tuple[str, ...]:
         """Training and validation runs of a batch: nested over N_D for one seed."""
-        return nested(self.study, self.pool, batch)
+        return nested_run_names(self.study, self.pool, batch)
 
     def folds(self, batch: Batch, windows: Windows, validation: str) -> list[tuple[Array, Array]]:
         """(Training, validation) indices into the windows of a batch, split by run, sharing no moment.
@@ -117,7 +117,7 @@ def _located(plan: Plan) -> Iterator[None]:
         raise type(error)(error.message, file=error.file or plan.file, path=error.path) from None
 
 
-def obtain(plan: Plan) -> Dataset:
+def obtain_runs(plan: Plan) -> Dataset:
     """The runs of a study: simulated by its truth, imported from its log, or read."""
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
@@ -130,10 +130,10 @@ def obtain(plan: Plan) -> Dataset:
         return Dataset(frame, {**known, "manoeuvres": manoeuvres})
     assert study.data is not None
     if study.data.dataset is not None:
-        return read_dataset(beside(folder, study.data.dataset))
+        return read_dataset(path_beside_study(folder, study.data.dataset))
     source = mapping_of(study.data, Path(plan.file))
     assert source is not None
-    log = fetch_log(source) if study.data.log is None else beside(folder, study.data.log)
+    log = fetch_log(source) if study.data.log is None else path_beside_study(folder, study.data.log)
     return import_log(read_mapping(source), log, without=study.data.without)
 
 
@@ -171,7 +171,7 @@ def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:
     for batch in plan.batches:
         if batch.N_D == 1:
             try:
-                part_folds(rest.select(rest.run == nested(plan.study, rest, batch)[0]))
+                part_folds(rest.select(rest.run == nested_run_names(plan.study, rest, batch)[0]))
             except DataError as error:
                 raise DocumentError(f"1: {error.message}; take 2 runs or more", path="grid.N_D") from None
 
@@ -228,7 +228,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
     notes += [
         f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
     ]
-    notes += _copied(dataset, rest, test)
+    notes += _copied_run_notes(dataset, rest, test)
     longest = max(float(np.ptp(rows["t"])) for _, rows in stretches_of_runs(dataset))
     for foundation in plan.foundations:
         if foundation.identify is not None and foundation.identify.horizon / 2 > longest:
@@ -264,7 +264,7 @@ def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
     return Dataset(dataset.frame[[*others, *commands]], dataset.metadata)
 
 
-def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
+def _copied_run_notes(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
     """Sentences on runs that move as others: test runs as runs that train, and each among themselves."""
     pairs = {
         "test runs that move as runs that train do ({}): their errors say nothing of new runs: "
@@ -281,7 +281,7 @@ def _copied(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
     ]
 
 
-def nested(study: Study, pool: Windows, batch: Batch) -> tuple[str, ...]:
+def nested_run_names(study: Study, pool: Windows, batch: Batch) -> tuple[str, ...]:
     """Training and validation runs of a batch: nested over N_D for one seed."""
     return nested_runs(pool.spans, study.grid.N_D, batch.seed)[batch.N_D]
 
@@ -388,11 +388,11 @@ def estimates_of(study: Study, foundation: Foundation, dataset: Dataset, test: W
     assert foundation.vessel is not None
     known = known_by_then(study, dataset)
     whole = observe(foundation.vessel, known, foundation.observer, calls=calls)
-    kept = outside_of(dataset, test)
+    kept = rows_outside_test(dataset, test)
     rest = np.flatnonzero(kept & ~dataset.frame["run"].isin(list(test.spans)).to_numpy())
     if kept.all() or not len(rest):
         return whole
-    others = apart(known, test)
+    others = rows_apart_from_test(known, test)
     mine = ~others.frame["run"].isin(list(test.spans)).to_numpy()
     part = observe(foundation.vessel, others, foundation.observer, calls=calls).select(mine)
     for name, values in part.columns.items():
@@ -402,14 +402,14 @@ def estimates_of(study: Study, foundation: Foundation, dataset: Dataset, test: W
     return whole
 
 
-def outside_of(dataset: Dataset, test: Windows) -> NDArray[np.bool_]:
+def rows_outside_test(dataset: Dataset, test: Windows) -> NDArray[np.bool_]:
     """Rows (N,) that share no moment with the test windows; all, where every run has its clock."""
     return rows_outside_spans(dataset, test.spans.values() if test.shared_clock else ())
 
 
-def apart(dataset: Dataset, test: Windows) -> Dataset:
+def rows_apart_from_test(dataset: Dataset, test: Windows) -> Dataset:
     """The dataset without the moments that the test windows see, broken there: on a shared clock runs may overlap."""
-    return keep_rows(dataset, outside_of(dataset, test))
+    return keep_rows(dataset, rows_outside_test(dataset, test))
 
 
 def chosen_observer(study: Study, foundation: Foundation, dataset: Dataset, windows: Windows) -> Observer:
@@ -550,7 +550,7 @@ def constant_motion(windows: Windows) -> Array:
     return path
 
 
-def describe(foundation: Foundation) -> dict[str, Any]:
+def foundation_record(foundation: Foundation) -> dict[str, Any]:
     """A foundation as plain data: what it is, where it comes from, its factors."""
     variant = foundation.variant
     row: dict[str, Any] = {"foundation": foundation.name, "family": foundation.family, "member": foundation.member}

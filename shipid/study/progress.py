@@ -60,7 +60,7 @@ class Watch:
         self._looks += 1
         left: list[tuple[int, Searching]] = []
         for folder, trials in self._trials.items():
-            finished = seals.sealed(folder)
+            finished = seals.seal_names(folder)
             for file in (folder / JOURNALS).glob("*.log"):
                 if file.stem in finished:
                     continue

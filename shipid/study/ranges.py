@@ -15,7 +15,7 @@ from shipid.errors import DocumentError
 from shipid.simulation.truth import LONGEST
 from shipid.study.schema import Prediction, Study
 
-UNUSUAL = "unusual"
+UNUSUAL_KEY = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
 MOST_SEED = 2**32 - 1  # of the generators of several libraries
 LONGEST_NAME = 200  # characters of the file of a cell: file systems allow 255
@@ -51,7 +51,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 
 def check_ranges(document: Document, file: Path | str) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
-    meant = document.get(UNUSUAL, [])
+    meant = document.get(UNUSUAL_KEY, [])
     for path, value in documents.document_leaves(document):
         if not isinstance(value, int | float) or isinstance(value, bool):
             continue
@@ -62,7 +62,7 @@ def check_ranges(document: Document, file: Path | str) -> None:
         least, most, unit = limits
         if not least <= value <= most:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
-            remedy = f'if it is meant, write {UNUSUAL} = ["{named}"] at the top of the study'
+            remedy = f'if it is meant, write {UNUSUAL_KEY} = ["{named}"] at the top of the study'
             raise DocumentError(f"{message}; {remedy}", file=file, path=path)
 
 

@@ -154,7 +154,8 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     frames = [
         _cells(place, part.plan).assign(condition=part.condition, part=name)
         for name, part in plan.parts.items()
-        if (place := store.check_part(folder, name, part.plan)).is_dir() and store.finished(place, part.plan.units)
+        if (place := store.check_part(folder, name, part.plan)).is_dir()
+        and store.finished_units(place, part.plan.units)
     ]
     if not frames:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
@@ -162,7 +163,7 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
 
 
 def _cells(folder: Path, plan: Plan) -> pd.DataFrame:
-    seals.check(folder, "batches/")
+    seals.check_seals(folder, "batches/")
     return _labelled(store.read_rows(folder, plan), plan)
 
 
@@ -183,7 +184,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
     if plan.parts:
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
-    seals.check(folder)
+    seals.check_seals(folder)
     cells = _labelled(store.read_rows(folder, plan), plan)
     test, physics, naive = store.read_test(folder)
     bands: dict[str, Bands] = {}

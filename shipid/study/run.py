@@ -30,7 +30,7 @@ from shipid.study.cluster import Known, Line, SentSearches, on_dask
 from shipid.study.envelope import envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
-from shipid.study.prepare import Prepared, describe, obtain, prepare, runs_by_amount
+from shipid.study.prepare import Prepared, foundation_record, obtain_runs, prepare, runs_by_amount
 from shipid.study.sessions import Code, Sessions, check_workers, machine, session_at_worker, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
@@ -95,7 +95,7 @@ def run_study(
     check_device(device)
     if scheduler is None:
         import_for_workers()
-        if own_code(plan) and len(store.finished(folder, plan.units)) < len(plan.units):
+        if own_code(plan) and len(store.finished_units(folder, plan.units)) < len(plan.units):
             check_workers(plan)
     means = Means(workers, scheduler, device, shard)
     yield from (_run_parts if plan.parts else _run_one)(plan, folder, means)
@@ -123,7 +123,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     if shard is not None:
         check_prepared(folder, plan, (DATA, COMMON))
     with store.open_folder(place, plan):
-        for words in (*seals.mend(place), *(take_in(folder, plan) if shard is None else ())):
+        for words in (*seals.remove_damaged(place), *(take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
         sessions = Sessions(place, session_on(means.device, own_code(plan)))
         if changed := sessions.note(sessions.now):
@@ -166,7 +166,7 @@ def run_unit(
 def _dataset(plan: Plan, folder: Path, sessions: Sessions) -> Dataset:
     """The runs of a study as they are stored, obtained before where they are not."""
     if not seals.is_sealed(folder, DATA):
-        dataset = obtain(plan)
+        dataset = obtain_runs(plan)
         store.check_place(folder, plan.digest)
         sessions.note_engine(noted_engine())
         write_dataset(dataset, folder / store.DATASET)
@@ -186,7 +186,7 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared, sessions: Sessio
     rows = envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
     known = {one.name: accuracy_of(paths[one.name], test) for one in fixed if one.base is not None}
-    described = [{**describe(one), **known.get(one.name, NO_ACCURACY)} for one in prepared.foundations]
+    described = [{**foundation_record(one), **known.get(one.name, NO_ACCURACY)} for one in prepared.foundations]
     write_json(folder / store.FOUNDATIONS, described)
     seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])
 
@@ -287,7 +287,7 @@ def _units(plan: Plan, folder: Path, shard: tuple[int, int] | None) -> tuple[Seq
     """The units of a plan, or of a shard of it, and those that are not finished."""
     mine = plan.units if shard is None else plan.units[shard[0] - 1 :: shard[1]]
     places = (folder,) if shard is None else (folder, shard_folder(folder, shard))
-    finished = {unit.key for place in places for unit in store.finished(place, mine)}
+    finished = {unit.key for place in places for unit in store.finished_units(place, mine)}
     return mine, [unit for unit in mine if unit.key not in finished]
 
 

@@ -59,7 +59,7 @@ def is_sealed(folder: Path, name: str) -> bool:
     return seal_file(folder, name).is_file()
 
 
-def sealed(folder: Path) -> set[str]:
+def seal_names(folder: Path) -> set[str]:
     """Names of all seals; 10,000 take some milliseconds."""
     try:
         return {entry.name.removesuffix(".sha256") for entry in os.scandir(folder / FOLDER)}
@@ -74,7 +74,7 @@ def write_seal(folder: Path, name: str, files: Iterable[Path]) -> None:
     write_text(seal_file(folder, name), "".join(lines))
 
 
-def remove(folder: Path, name: str) -> None:
+def remove_seal(folder: Path, name: str) -> None:
     """Remove a seal, before files that it names are written anew."""
     seal_file(folder, name).unlink(missing_ok=True)
 
@@ -84,7 +84,7 @@ def named_files(folder: Path, name: str) -> list[str]:
     return [path for _, path in _read(seal_file(folder, name))[1]]
 
 
-def faults(folder: Path, among: str = "", names: Collection[str] = ()) -> list[Fault]:
+def sealed_faults(folder: Path, among: str = "", names: Collection[str] = ()) -> list[Fault]:
     """Every sealed file that is not as it was written; a seal that is damaged itself is one.
 
     among : how the paths in the folder of the files begin that are looked at. names : of the seals; by default all.
@@ -93,34 +93,34 @@ def faults(folder: Path, among: str = "", names: Collection[str] = ()) -> list[F
     return [fault for file in files if not names or file.stem in names for fault in _faults(folder, file, among)]
 
 
-def check(folder: Path, among: str = "") -> None:
-    """Raise ResultError for the first of the `faults` of a folder; nothing is mended."""
-    for fault in faults(folder, among):
-        raise wrong(folder, fault)
+def check_seals(folder: Path, among: str = "") -> None:
+    """Raise ResultError for the first of the `sealed_faults` of a folder; nothing is mended."""
+    for fault in sealed_faults(folder, among):
+        raise fault_error(folder, fault)
 
 
-def wrong(folder: Path, fault: Fault) -> ResultError:
+def fault_error(folder: Path, fault: Fault) -> ResultError:
     """The error for a file that is not as it was written."""
     return ResultError(fault.words, file=folder / fault.file)
 
 
-def mend(folder: Path) -> list[str]:
+def remove_damaged(folder: Path) -> list[str]:
     """Remove the seals of files that are missing or damaged, so that they are computed again; a sentence each.
 
     Raises ResultError, before anything is removed, for a file that can be read and is not what was written, and for one
     that cannot be read: on a file server, or of another user, it may be whole.
     """
-    damaged, sentences = faults(folder), []
+    damaged, sentences = sealed_faults(folder), []
     for fault in damaged:
         if fault.kind in ("edited", "unreadable", "foreign"):
-            raise wrong(folder, fault)
+            raise fault_error(folder, fault)
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
     for name in dict.fromkeys(fault.seal for fault in damaged):
         these = [fault for fault in damaged if fault.seal == name]
         for fault in these:
             (folder / fault.file).unlink(missing_ok=True)
-        remove(folder, name)
+        remove_seal(folder, name)
         sentences.append(f"{', '.join(f'{fault.file} {fault.kind}' for fault in these)}: computed again")
     return sentences
 

@@ -32,8 +32,8 @@ def check_prepared(folder: Path, plan: Plan, names: Sequence[str]) -> None:
         raise ResultError("is not prepared for shards: `shipid study prepare` does that, once", file=folder)
     if store.provenance(folder)["digest"] != plan.digest:
         raise ResultError("is prepared for another study, or another version of it: choose another --out", file=folder)
-    for fault in seals.faults(folder, names=names):
-        raise seals.wrong(folder, fault)
+    for fault in seals.sealed_faults(folder, names=names):
+        raise seals.fault_error(folder, fault)
 
 
 def take_in(folder: Path, plan: Plan) -> Iterator[str]:
@@ -46,8 +46,8 @@ def take_in(folder: Path, plan: Plan) -> Iterator[str]:
     for place in sorted((folder / SHARDS).glob("*-of-*")):
         with sole_writer(place):
             _check_shard(folder, place, plan)
-            yield from seals.mend(place)
-            finished = store.finished(place, plan.units)
+            yield from seals.remove_damaged(place)
+            finished = store.finished_units(place, plan.units)
             for unit in finished:
                 _take_unit(folder, place, units[unit.key])
         with temporary_folder(folder / SHARDS) as gone:  # what a kill leaves of it is no shard
@@ -69,7 +69,7 @@ def _check_shard(folder: Path, place: Path, plan: Plan) -> None:
 def _take_unit(folder: Path, place: Path, unit: Unit) -> None:
     """Copy the files of a unit; ResultError where the folder has other results of it."""
     files = seals.named_files(place, unit.key)
-    if store.finished(folder, [unit]):
+    if store.finished_units(folder, [unit]):
         for name in files:
             if _content(folder / name) != _content(place / name):
                 message = f"differs from {place / name}, of the same unit: delete one of the two with its seal"

@@ -334,9 +334,9 @@ def read_predictor(file: Path) -> Predictor:
     Raises ResultError for a file that is not as the study wrote it.
     """
     folder = file.absolute().parent.parent
-    for fault in seals.faults(folder, f"cells/{file.name}"):
+    for fault in seals.sealed_faults(folder, f"cells/{file.name}"):
         if fault.file == f"cells/{file.name}":
-            raise seals.wrong(folder, fault)
+            raise seals.fault_error(folder, fault)
     return Predictor.load(file)
 
 
@@ -350,9 +350,9 @@ def part_folder(folder: Path, part: str) -> Path:
     return folder / PARTS / part
 
 
-def finished(folder: Path, units: Iterable[Unit]) -> list[Unit]:
+def finished_units(folder: Path, units: Iterable[Unit]) -> list[Unit]:
     """Units whose results are stored whole."""
-    sealed = seals.sealed(folder)
+    sealed = seals.seal_names(folder)
     return [unit for unit in units if unit.key in sealed]
 
 
@@ -366,7 +366,7 @@ def write_unit(folder: Path, unit: Unit, results: Sequence[Cell]) -> None:
             files.append(paths_file(folder, row["cell"]))
             write_arrays(files[-1], {"paths": paths})
     write_json(rows_file(folder, unit.key), [cell.row for cell in results])
-    seals.remove(folder, RESULTS)  # of the tables, which do not hold this unit
+    seals.remove_seal(folder, RESULTS)  # of the tables, which do not hold this unit
     seals.write_seal(folder, unit.key, [rows_file(folder, unit.key), *files])
 
 
@@ -396,7 +396,7 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
 
     Other files, such as copies by a program that synchronises folders, are left out.
     """
-    wanted = seals.sealed(folder) if plan is None else {unit.key for unit in finished(folder, plan.units)}
+    wanted = seals.seal_names(folder) if plan is None else {unit.key for unit in finished_units(folder, plan.units)}
     files = sorted(file for file in (folder / "batches").glob("*.json") if file.stem in wanted)
     rows = [row for file in files for row in read_json(file)]
     if not rows:
@@ -417,7 +417,7 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
 
     whole : whether all cells are there; only then the tables have a seal, which says that a run has ended.
     """
-    seals.remove(folder, RESULTS)
+    seals.remove_seal(folder, RESULTS)
     keys = ["cell", "foundation", "family", "member", "method", "N_D", "runs", "minutes", "seed", "status"]
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
     table["unit"] = table["metric"].map(UNITS)

@@ -83,7 +83,7 @@ def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
         monkeypatch.undo()
         assert "4 of 8 cells" in report.read_text()
         assert set(pd.read_parquet(folder / "results.parquet")["cell"]) == set(read_results(tiny_run).cells["cell"])
-        assert seals.faults(folder) == []
+        assert seals.sealed_faults(folder) == []
         assert "4 of 8 cells" not in write_pages(folder).read_text()
 
 

@@ -34,7 +34,7 @@ from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.metrics import coverage_by_run, coverage_share
 from shipid.predictor import limits_of
 from shipid.study.plan import Batch, model_label, read_plan, whole_unit
-from shipid.study.prepare import instants_of, obtain, partition, prepare
+from shipid.study.prepare import instants_of, obtain_runs, partition, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks import coverage
@@ -252,7 +252,7 @@ def recorded(folder: Path, commands: str) -> pd.DataFrame:
     log = folder / "gunnerus_2022" / "RVG_ManeuveringTests.csv"
     changes = {"family": FAMILIES, "method": WAYS, "claims": None, "data.log": str(log)}
     plan = read_plan("full-scale", {**changes, "prediction.commands": commands, "grid.seeds": [0]})
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     parts = []
     for test in (run for run in dataset.runs if str(run).startswith("ZZ")):
         split = plan.study.split.model_copy(update={"test": [test], "folds": 1})

@@ -7,7 +7,7 @@ from typing import Any
 
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import read_plan, whole_unit
-from shipid.study.prepare import obtain, prepare
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 
 
@@ -15,7 +15,7 @@ def run() -> dict[str, Any]:
     """Seconds per cell of each batch, and the mean H over the foundations with physics [m]."""
     plan = read_plan("calm")
     start = time.perf_counter()
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     result: dict[str, Any] = {"simulate, roll out [s]": round(time.perf_counter() - start, 2)}
     for batch in plan.batches:
         start = time.perf_counter()

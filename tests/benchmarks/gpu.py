@@ -9,7 +9,7 @@ import torch
 
 from shipid.engine.rollout import rollout
 from shipid.study.plan import read_plan, whole_unit
-from shipid.study.prepare import obtain, prepare
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.rollouts import STEPS, inputs, variants
@@ -58,7 +58,7 @@ def _rollouts(samples: int, count: int) -> dict[str, Any]:
 
 def _batches() -> dict[str, Any]:
     plan = read_plan("simulation", {"method.0.kind": "path-drawn"})
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     of_amount = {batch.N_D: batch for batch in plan.batches}
     ends = [of_amount[10], of_amount[10], of_amount[100]]
     figures, errors = {}, {}

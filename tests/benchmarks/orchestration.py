@@ -28,7 +28,7 @@ from shipid.hybrid.method import Fitted, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import run as study
 from shipid.study.plan import Plan, Unit, read_plan
-from shipid.study.prepare import Prepared, obtain, prepare
+from shipid.study.prepare import Prepared, obtain_runs, prepare
 from tests.benchmarks.timing import best_of, clock
 
 CELL = 1.0  # s
@@ -49,8 +49,8 @@ def run() -> dict[str, Any]:
 def overhead() -> dict[str, Any]:
     """A study of 1-second cells by `run_study` with live progress, over its preparation and cells on bare processes."""
     plan = read_plan("calm", KNOWN)
-    prepared = prepare(plan, obtain(plan))  # compiled once, so that neither way compiles
-    preparing = best_of({"prepare": lambda: prepare(plan, obtain(plan))}, rounds=3)["prepare"]
+    prepared = prepare(plan, obtain_runs(plan))  # compiled once, so that neither way compiles
+    preparing = best_of({"prepare": lambda: prepare(plan, obtain_runs(plan))}, rounds=3)["prepare"]
     with _processes(2, plan, prepared) as pool:
         bare = clock(lambda: list(pool.map(_bare_unit, plan.units)))
     with patch.object(study, "run_unit", known_unit):
@@ -105,7 +105,7 @@ def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
 def gain() -> dict[str, Any]:
     """Gain of a whole study, truly tuned, from a second worker, over that of a matrix product in two processes."""
     plan = read_plan("calm", REAL)
-    prepare(plan, obtain(plan))
+    prepare(plan, obtain_runs(plan))
     product = _product_gain()
     one, two = (_study(plan, count)[0] for count in WORKERS)
     product = max(product, _product_gain())

@@ -15,7 +15,7 @@ import pandas as pd
 
 from shipid.engine.engines import REPEATED
 from shipid.study.plan import read_plan
-from shipid.study.prepare import obtain
+from shipid.study.prepare import obtain_runs
 from shipid.study.screen import families, joined, screen
 
 STUDY, FAMILY, MEMBERS, ALL = "simulation", "high", 1000, 10_000
@@ -49,7 +49,7 @@ def _timed(plan: Any, wanted: Any, members: int, engine: str = REPEATED) -> tupl
     """Wall time of all blocks and of the first, time that all threads were busy, and the rows."""
     start, busy = time.perf_counter(), time.process_time()
     blocks, begun = [], 0.0
-    for block in screen(plan, obtain(plan), wanted, members, engine=engine):
+    for block in screen(plan, obtain_runs(plan), wanted, members, engine=engine):
         begun = begun or time.perf_counter() - start
         blocks.append(block)
     return time.perf_counter() - start, begun, time.process_time() - busy, joined(blocks)

@@ -30,7 +30,7 @@ from shipid.data.dataset import Dataset
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.study.plan import Plan, read_plan
-from shipid.study.prepare import constant_motion, obtain, partition, path_source, window_memory
+from shipid.study.prepare import constant_motion, obtain_runs, partition, path_source, window_memory
 from shipid.study.results import judged_cells, read_results
 from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw
@@ -179,7 +179,7 @@ def _studied(ship: RawStranger, desk: Desk, times: int, stage: str) -> dict[str,
         "grid.seeds": [0],
     }  # fmt: skip
     plan = read_plan(str(desk.folder / "study.toml"), changes)
-    left = len(partition(plan, obtain(plan))[0].spans)  # fewer at a longer horizon, if some runs are short
+    left = len(partition(plan, obtain_runs(plan))[0].spans)  # fewer at a longer horizon, if some runs are short
     changes["grid.N_D"] = [min(left, document["grid"]["N_D"][-1])]
     words = [word for path, value in changes.items() for word in ("--set", f"{path}={json.dumps(value)}")]
     folder = desk.folder / f"results-{times}"

@@ -13,7 +13,7 @@ from shipid.engine import torch as engine
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.study.plan import whole_unit
-from shipid.study.prepare import obtain, prepare
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import load_vessel
 from tests.drawn_ships import drawn_ship, extreme_inputs
@@ -76,7 +76,7 @@ def test_strange_ships_on_a_gpu_are_those_of_the_processor(seed: int) -> None:
 @on_gpu
 def test_a_study_on_a_gpu_gives_the_errors_of_the_processor(tmp_path: Path) -> None:
     plan = mixed_plan(tmp_path)
-    data = obtain(plan)
+    data = obtain_runs(plan)
     units = [whole_unit(plan, batch) for batch in plan.batches]
     rows = []
     for device in ("cpu", "cuda"):

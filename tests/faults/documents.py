@@ -15,7 +15,7 @@ from shipid.errors import DocumentError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
 from shipid.study.plan import plan_text, read_plan, whole_unit
-from shipid.study.prepare import obtain, prepare
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -40,7 +40,7 @@ def study(seed: int) -> None:
         steps = truth.manoeuvres * truth.length / truth.step
         searched = max(getattr(way.method, "trials", 1) * getattr(way.method, "units", 1) for way in plan.methods)
         if steps < RUNNABLE and plan.study.prediction.horizon < 100 and searched < 50:
-            prepared = prepare(plan, obtain(plan))
+            prepared = prepare(plan, obtain_runs(plan))
             run_unit(plan, prepared, whole_unit(plan, plan.batches[-1]), "cpu")
 
 
@@ -150,7 +150,7 @@ def memory(seed: int) -> None:
         file.write_text((BAD / "studies" / "plain.toml").read_text())
         try:
             plan = read_plan(file, changes)
-            prepare(plan, obtain(plan))
+            prepare(plan, obtain_runs(plan))
         except DocumentError as error:
             if "GiB" not in error.message:
                 raise Failure("no line of an error", str(error)) from None

@@ -158,7 +158,7 @@ def _same_as_reference(folder: Path, what: str) -> None:
     for name in sorted(wanted.keys() | present.keys()):
         if wanted.get(name) != present.get(name):
             raise Failure("mixed", what, name)
-    if faults := seals.faults(folder):
+    if faults := seals.sealed_faults(folder):
         raise Failure("not sealed", what, faults[0].file)
     left = [*folder.rglob(f"{TEMPORARY}*"), *folder.parent.glob(f"{TEMPORARY}*")]
     if left:

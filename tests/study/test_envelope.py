@@ -12,7 +12,7 @@ from shipid.cli import app
 from shipid.data.dataset import read_dataset
 from shipid.study.envelope import envelope, envelope_table
 from shipid.study.plan import read_plan
-from shipid.study.prepare import obtain, partition, runs_by_amount
+from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
 AT_REST = 0.25  # m/s: what waves add to a ship that starts at rest
 
@@ -20,7 +20,7 @@ AT_REST = 0.25  # m/s: what waves add to a ship that starts at rest
 def test_the_truth_fills_the_published_envelope() -> None:
     """All manoeuvres together: every least and greatest value within 20 % of the paper's Table 1."""
     plan = read_plan("simulation")
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     pool, test, _ = partition(plan, dataset)
     rows = envelope_table(
         envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands), plan.study.published
@@ -48,7 +48,7 @@ def test_simulate_writes_a_dataset_and_shows_the_envelope(tmp_path: Path) -> Non
 def test_the_first_manoeuvres_stay_when_more_are_asked_for() -> None:
     """Each manoeuvre, its sea included, depends on its number alone."""
     few, more = (
-        obtain(read_plan("simulation-small", {"truth.manoeuvres": n, "split.test": 2, "grid.N_D": [4]}))
+        obtain_runs(read_plan("simulation-small", {"truth.manoeuvres": n, "split.test": 2, "grid.N_D": [4]}))
         for n in (8, 11)
     )
     numbers = few.frame.select_dtypes("number").columns

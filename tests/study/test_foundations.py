@@ -25,7 +25,7 @@ from shipid.study import prepare as preparing
 from shipid.study.cells import accuracy_of
 from shipid.study.foundations import predictions
 from shipid.study.plan import Batch, Plan, fitted_families, judged_method, whole_unit
-from shipid.study.prepare import apart, instants_of, prepare
+from shipid.study.prepare import instants_of, prepare, rows_apart_from_test
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
 from tests.study.tiny import run_here
@@ -194,11 +194,11 @@ def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(rec
 def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     prepared = prepare(plan, dataset)
-    assert apart(dataset, prepared.test) is dataset  # every run has a separate clock
+    assert rows_apart_from_test(dataset, prepared.test) is dataset  # every run has a separate clock
     frame = dataset.frame.copy()
     frame["t"] += 30.0 * (frame["run"].str[0].map(ord) - ord("a"))  # the next begins before one ends
     test = replace(prepared.test, t=prepared.test.t + 150.0, shared_clock=True)
-    left = apart(Dataset(frame, {**dataset.metadata, "clock": "shared"}), test).frame
+    left = rows_apart_from_test(Dataset(frame, {**dataset.metadata, "clock": "shared"}), test).frame
     assert set(left["run"]) == set("abcde")
     assert left[left["run"] == "e"]["t"].max() < 150.0
     assert len(left) == 4 * 41 + 30
@@ -286,7 +286,7 @@ def test_a_hole_breaks_a_run(recorded: Recorded) -> None:
     plan, dataset = study(recorded, BOTH)
     test = prepare(plan, dataset).test
     middle = replace(test, t=np.full(len(test), 15.0), shared_clock=True)  # five seconds ahead
-    parts = [rows["t"] for run, rows in stretches_of_runs(apart(dataset, middle)) if run == "a"]
+    parts = [rows["t"] for run, rows in stretches_of_runs(rows_apart_from_test(dataset, middle)) if run == "a"]
     assert [(part.min(), part.max()) for part in parts] == [(0.0, 14.0), (21.0, 40.0)]
 
 

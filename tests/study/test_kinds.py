@@ -10,7 +10,7 @@ import pytest
 
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
 from shipid.study.kinds import STOPPED_SHAFT, kind_by_motion, kinds_of_runs
-from shipid.study.prepare import obtain
+from shipid.study.prepare import obtain_runs
 from tests.study.tiny import logged, tiny_plan
 
 T = np.arange(0.0, 200.0)
@@ -66,7 +66,7 @@ def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
     ]
     for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM, RANDOM], strict=True):
         plan = tiny_plan(tmp_path, {"truth.manoeuvre": [block], "truth.manoeuvres": 10})
-        assert set(kinds_of_runs(obtain(plan)).values()) == {kind}
+        assert set(kinds_of_runs(obtain_runs(plan)).values()) == {kind}
 
 
 def test_the_motion_of_the_test_says_nothing_of_other_runs() -> None:

@@ -32,7 +32,7 @@ from shipid.study.new import (
     wind_for_length,
 )
 from shipid.study.plan import read_plan
-from shipid.study.prepare import obtain, prepare
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.survey import separation_of_sources, survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
@@ -108,7 +108,7 @@ def test_a_study_parses_prepares_and_says_why(tmp_path: Path) -> None:
     plan = read_plan(tmp_path / "study.toml")
     assert plan.document == document
     assert [one.name for one in plan.foundations] == [SHIP, "inaccurate", "none"]
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     assert len(prepared.pool.spans) == plan.study.grid.N_D[-1] == 7
     assert document["split"]["test"] == ["zz 3"] or document["split"]["test"] == ["zz 4"]
     assert document["prediction"]["ahead"] == 19  # 2.5 x 33.9 m / 4.35 m/s

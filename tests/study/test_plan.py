@@ -35,7 +35,7 @@ from shipid.study.plan import (
     read_plan,
     run_command,
 )
-from shipid.study.prepare import all_windows, obtain
+from shipid.study.prepare import all_windows, obtain_runs
 from shipid.study.schema import Data
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import mixed_plan, tiny_plan
@@ -145,7 +145,7 @@ def test_the_first_instant_comes_after_the_run_up() -> None:
     few = {"truth.manoeuvres": 4, "split.test": 1, "grid.N_D": [2], "truth.step": 0.5}
     plan = read_plan("zigzags", {"truth.run_up": 32.0, **few})
     assert past_steps(plan) == 32
-    windows = all_windows(plan, obtain(plan))
+    windows = all_windows(plan, obtain_runs(plan))
     assert (windows.t.min(), windows.t.max()) == (32.0, 32.0 + 59.0)
     assert set(windows.spans.values()) == {(0.0, 32.0 + 59.0 + 15.0)}
 

@@ -30,7 +30,7 @@ from shipid.study.prepare import (
     constant_motion,
     estimates_of,
     instants_of,
-    obtain,
+    obtain_runs,
     over_gaps,
     prepare,
     runs_by_amount,
@@ -49,7 +49,7 @@ ONE_FAMILY = {"name": "right", "base": "gunnerus-28.9"}
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, Prepared]:
     plan = tiny_plan(tmp_path_factory.mktemp("plan"), {"grid.seeds": [0, 1], "grid.N_D": [2, 4, 6, 8]})
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     return plan, dataset, prepare(plan, dataset)
 
 
@@ -58,7 +58,7 @@ def test_the_order_of_columns_changes_no_digit(tmp_path: Path) -> None:
     drawn = {"name": "drawn", "kind": "path-drawn", "trials": 2, "units": 16, "terms": 4}
     stepped = {"name": "stepped", "kind": "one-step", "trials": 1, "units": 8, "families": ["right", "none"]}
     plan = tiny_plan(tmp_path, {"method": [drawn, stepped], "grid.N_D": [4]})
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     turned = Dataset(dataset.frame[["run", *[name for name in dataset.frame if name != "run"][::-1]]], dataset.metadata)
     assert turned.commands == dataset.commands[::-1]
     first, again = (
@@ -157,7 +157,7 @@ def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, Prepared]) -
 
 def test_samples_are_the_first_of_each_run(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"prediction.samples": 3})
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     for windows in (prepared.pool, prepared.test):
         assert all((windows.t[windows.run == run] == [0.0, 1.0, 2.0]).all() for run in windows.spans)
 
@@ -165,7 +165,7 @@ def test_samples_are_the_first_of_each_run(tmp_path: Path) -> None:
 def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     """A truth of the same equations, step and rule leaves A = 0: windows, frames and held commands add no error."""
     plan = tiny_plan(tmp_path, {"truth.step": 1.0, "truth.method": "euler"})
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     assert prepared.accuracy("right")["rms"] < 1e-9
     assert prepared.accuracy("wrong-1")["mean"] > 0.01
     np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
@@ -186,7 +186,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatc
     family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
     family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
     plan = tiny_plan(tmp_path, {"family": [family]})
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     rule = resolve_families(plan.study.family)[0]
     redrawn = 0
     for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
@@ -200,7 +200,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatc
         assert np.isfinite(prepared.pool_paths[model.name]).all()
     assert 0 < redrawn < 6
     assert len(followed) == 2
-    again = prepare(plan, obtain(plan))
+    again = prepare(plan, obtain_runs(plan))
     assert [m.variant for m in again.foundations] == [m.variant for m in prepared.foundations]
 
 
@@ -212,7 +212,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.Mo
         family["perturb"][0]["factor"] = factor  # type: ignore[index]
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
         with pytest.raises(DivergenceError, match=message) as caught:
-            prepare(plan, obtain(plan))
+            prepare(plan, obtain_runs(plan))
         assert caught.value.path == "family.lost"
 
 
@@ -385,7 +385,7 @@ def test_files_are_looked_for_beside_the_study(
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert plan.study.data is not None
     plan.study.data.dataset = "log.parquet"
-    assert obtain(plan).runs == dataset.runs
+    assert obtain_runs(plan).runs == dataset.runs
 
 
 def test_a_mapping_is_looked_for_beside_the_study(
@@ -401,7 +401,7 @@ def test_a_mapping_is_looked_for_beside_the_study(
     )
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    assert obtain(plan).runs == ["good"]
+    assert obtain_runs(plan).runs == ["good"]
 
 
 def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset, Prepared]) -> None:
@@ -437,7 +437,7 @@ def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest
     """Method, section 5: the 20/20 zigzag at 4150-4350 s; no other window, nor the other part of its fold, sees it."""
     monkeypatch.setenv("SHIPID_DATA", str(shared_data))
     plan = read_plan("full-scale")
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     assert list(prepared.test.spans) == ["ZZ 20/20"]
     first, last = prepared.test.spans["ZZ 20/20"]
     assert 4150 <= first < last <= 4350

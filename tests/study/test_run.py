@@ -32,7 +32,7 @@ from shipid.predictor import Predictor
 from shipid.study import cells, run, seals, sessions, store
 from shipid.study.check import check_folder
 from shipid.study.plan import Plan, completed_plan, own_code, program_of, read_plan, whole_unit
-from shipid.study.prepare import obtain, prepare
+from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.results import provenance_words, read_results
 from shipid.study.run import run_study, run_unit
 from shipid.version import __version__
@@ -263,7 +263,7 @@ def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> No
 def test_a_unit_has_the_digits_of_its_whole_batch(tmp_path: Path) -> None:
     """Every method, an identified family and refits: units of work against all cells at once, bit by bit."""
     plan = mixed_plan(tmp_path, {"bands": {"refits": 2}})
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     whole = {
         row["cell"]: (row, one) for row, one, _ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")
     }
@@ -367,7 +367,9 @@ def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
         return paths
 
     monkeypatch.setattr(Predictor, "predict", wild)
-    rows = [row for row, *_ in run_unit(plan, prepare(plan, obtain(plan)), whole_unit(plan, plan.batches[0]), "cpu")]
+    rows = [
+        row for row, *_ in run_unit(plan, prepare(plan, obtain_runs(plan)), whole_unit(plan, plan.batches[0]), "cpu")
+    ]
     assert {row["status"] for row in rows} == {"diverged"}
     assert all("farther than any ship gets, on 50.0" in row["sentence"] for row in rows)
     assert np.isnan([row["H"] for row in rows]).all()
@@ -390,7 +392,7 @@ def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
 def test_absent_device_is_one_line(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path)
     with pytest.raises(ShipidError, match="no such device") as caught:
-        run_unit(plan, prepare(plan, obtain(plan)), whole_unit(plan, plan.batches[0]), "cuda:99")
+        run_unit(plan, prepare(plan, obtain_runs(plan)), whole_unit(plan, plan.batches[0]), "cuda:99")
     assert caught.value.path == "--device cuda:99"
 
 
@@ -595,7 +597,7 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
         return {name: Fitted(None, [], 0.0) for name in task.cases}
 
     monkeypatch.setattr(PathDrawn, "fit", fit)
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     for batch in plan.batches:
         run_unit(plan, prepared, whole_unit(plan, batch), "cpu")
     assert seen == [batch.seed for batch in plan.batches]

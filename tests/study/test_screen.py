@@ -19,7 +19,7 @@ from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error, summarise_errors
 from shipid.study import screen as module
 from shipid.study.plan import Plan
-from shipid.study.prepare import obtain, partition, prepare, window_memory
+from shipid.study.prepare import obtain_runs, partition, prepare, window_memory
 from shipid.study.screen import drivers, families, joined, notes, screen, spread
 from shipid.vessel.perturb import Family, draw_members
 from tests.study.test_commands import weaving
@@ -32,13 +32,13 @@ def plan(tmp_path: Path) -> Plan:
 
 
 def screened(plan: Plan, count: int, name: str = "wrong") -> pd.DataFrame:
-    return joined(list(screen(plan, obtain(plan), families(plan, name), count)))
+    return joined(list(screen(plan, obtain_runs(plan), families(plan, name), count)))
 
 
 def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
     """A, A_90 and share of failures of each member by way of its paths on pool and test."""
     (family,), base = families(plan, "wrong"), plan.vessels["gunnerus-28.9"]
-    dataset = obtain(plan)
+    dataset = obtain_runs(plan)
     rows = []
     for variant in draw_members(family.model_copy(update={"members": count}), base):
         vessel, errors = base.with_values(variant.values), []
@@ -68,7 +68,7 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
 @pytest.mark.skipif(native.find_compiler() is None, reason="no C compiler on this machine")
 def test_single_precision_gives_six_digits(plan: Plan) -> None:
     double, single = (
-        joined(list(screen(plan, obtain(plan), families(plan, "wrong"), 5, engine=engine)))
+        joined(list(screen(plan, obtain_runs(plan), families(plan, "wrong"), 5, engine=engine)))
         for engine in ("repeated", "single")
     )
     assert not np.array_equal(double["A"], single["A"])
@@ -79,7 +79,7 @@ def test_single_precision_gives_six_digits(plan: Plan) -> None:
 
 def test_members_are_those_of_the_study(plan: Plan) -> None:
     """A member keeps its number and draw whatever the size of the family."""
-    prepared = prepare(plan, obtain(plan))
+    prepared = prepare(plan, obtain_runs(plan))
     factors_of = {
         model.name: model.variant.factors for model in prepared.foundations if model.family == "wrong" and model.variant
     }
@@ -94,7 +94,7 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
     monkeypatch.setattr(module, "MEMBERS", 3)
     pd.testing.assert_frame_equal(screened(plan, 7), whole, check_exact=True)
     monkeypatch.setattr(module, "NUMBERS", 1)
-    assert [len(block) for block in screen(plan, obtain(plan), families(plan, "wrong"), 3)] == [1, 1, 1]
+    assert [len(block) for block in screen(plan, obtain_runs(plan), families(plan, "wrong"), 3)] == [1, 1, 1]
 
 
 def test_members_with_other_lags_start_from_another_memory(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
         {"name": "other", "base": "gunnerus-28.9", "members": 2, "perturb": more},
     ]
     plan = tiny_plan(tmp_path, {"family": family})
-    frame = joined(list(screen(plan, obtain(plan), families(plan), 2)))
+    frame = joined(list(screen(plan, obtain_runs(plan), families(plan), 2)))
     assert list(frame["family"]) == ["wrong", "wrong", "other", "other"]
     assert list(frame["inertia.I_z"][:2]) == [1, 1]
     assert list(frame["inertia.m"][2:]) == [1, 1]
@@ -221,4 +221,4 @@ def test_a_wrong_argument_is_one_line(plan: Plan, wrong: dict[str, Any], message
     """Before, a negative count gave no rows without a word, and the others were tracebacks."""
     given: dict[str, Any] = {"wanted": plan.families, "count": 2, **wrong}
     with pytest.raises(ShipidError, match=message):
-        next(screen(plan, obtain(plan), **given))
+        next(screen(plan, obtain_runs(plan), **given))

@@ -28,9 +28,9 @@ def folder(tiny_run: Path, tmp_path: Path) -> Path:
 
 
 def test_a_finished_run_is_sealed(folder: Path) -> None:
-    assert seals.faults(folder) == []
-    seals.check(folder)
-    assert list(seals.mend(folder)) == []
+    assert seals.sealed_faults(folder) == []
+    seals.check_seals(folder)
+    assert list(seals.remove_damaged(folder)) == []
     lines = [line for file in (folder / "seals").iterdir() for line in file.read_text().splitlines()]
     sealed = {line.split("  ")[1] for line in lines if not line.startswith("#")}
     for name in ("dataset.parquet", "test.npz", "envelope.json", "foundations.json", "results.parquet"):
@@ -58,18 +58,18 @@ def test_what_cannot_be_read_is_computed_again(kind: str, pattern: str, folder: 
     elif kind != "missing":
         file.write_bytes(b"" if kind == "empty" else content[: len(content) // 2])
     elif pattern.startswith("seals"):
-        assert seals.faults(folder) == []  # then the batch is not done
-        assert len(store.finished(folder, store.stored_plan(folder).units)) == 1
+        assert seals.sealed_faults(folder) == []  # then the batch is not done
+        assert len(store.finished_units(folder, store.stored_plan(folder).units)) == 1
         return
     with pytest.raises(ResultError, match="missing or damaged"):
-        seals.check(folder)
+        seals.check_seals(folder)
     if kind == "folder":
         with pytest.raises(ResultError, match="a folder where a file belongs"):
-            list(seals.mend(folder))
+            list(seals.remove_damaged(folder))
         return
-    (words,) = list(seals.mend(folder))
+    (words,) = list(seals.remove_damaged(folder))
     assert "computed again" in words
-    assert seals.faults(folder) == []
+    assert seals.sealed_faults(folder) == []
 
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EIO, errno.ESTALE])
@@ -88,7 +88,7 @@ def test_what_the_system_does_not_give_may_be_whole_and_is_not_removed(
 
     monkeypatch.setattr(seals, "_digest", refused)
     words = re.escape(f"cannot be read ({os.strerror(number)})")
-    for look in (lambda: list(seals.mend(folder)), lambda: seals.check(folder)):
+    for look in (lambda: list(seals.remove_damaged(folder)), lambda: seals.check_seals(folder)):
         with pytest.raises(ResultError, match=words) as caught:
             look()
         assert caught.value.file == str(file)
@@ -117,7 +117,7 @@ def test_what_was_edited_is_refused(folder: Path) -> None:
     write_json(file, rows)
     before = sorted(folder.rglob("*"))
     with pytest.raises(ResultError, match="was changed after it was written") as caught:
-        list(seals.mend(folder))
+        list(seals.remove_damaged(folder))
     assert caught.value.file == str(file)
     assert sorted(folder.rglob("*")) == before
     check = check_folder(folder)
@@ -149,13 +149,13 @@ def test_a_cell_of_another_study_is_refused_though_its_seal_came_with_it(folder:
     """Where two folders are merged, cells of one name take each other's place: the report mixed two studies."""
     record = read_json(folder / store.PROVENANCE)
     write_json(folder / store.PROVENANCE, {**record, "digest": "0123456789abcdef"})
-    found = seals.faults(folder)
+    found = seals.sealed_faults(folder)
     assert {fault.kind for fault in found} == {"foreign"}
-    assert {fault.seal for fault in found} == seals.sealed(folder)
+    assert {fault.seal for fault in found} == seals.seal_names(folder)
     unit = next(fault for fault in found if fault.seal not in seals.FIRST)
     assert unit.reason == f"trials/{unit.seal}.log"
     with pytest.raises(ResultError, match=r"is of another study: delete it and .*, and cont") as caught:
-        list(seals.mend(folder))
+        list(seals.remove_damaged(folder))
     assert caught.value.file == str(folder / found[0].file)
 
 
@@ -165,7 +165,7 @@ def test_a_dataset_of_another_study_is_refused_though_its_seal_came_with_it(fold
     run_here(other, tmp_path / "other")
     for name in ("dataset.parquet", "seals/dataset.sha256"):
         shutil.copyfile(tmp_path / "other" / name, folder / name)
-    (fault,) = seals.faults(folder)
+    (fault,) = seals.sealed_faults(folder)
     assert (fault.file, fault.kind, fault.reason) == ("dataset.parquet", "foreign", "seals/dataset.sha256")
 
 
@@ -197,5 +197,5 @@ def test_copies_of_a_program_that_synchronises_are_no_results(folder: Path) -> N
 def test_a_seal_names_files_inside_the_folder_only(folder: Path) -> None:
     seal = next((folder / "seals").glob("N*"))
     seal.write_text(f"{'0' * 64}  ../../etc/passwd\n")
-    (fault,) = seals.faults(folder)
+    (fault,) = seals.sealed_faults(folder)
     assert (fault.kind, fault.file) == ("damaged", f"seals/{seal.name}")

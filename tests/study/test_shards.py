@@ -32,7 +32,7 @@ def alike(folder: Path, other: Path) -> None:
     assert stored(folder) == stored(other)
     tables = [pd.read_parquet(place / "results.parquet") for place in (folder, other)]
     pd.testing.assert_frame_equal(*(table[table["metric"] != "seconds"] for table in tables), check_exact=True)
-    assert seals.faults(folder) == []
+    assert seals.sealed_faults(folder) == []
 
 
 def test_pool_cluster_and_shards_give_the_same_digits(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_shards_of_a_study_of_parts_go_on_counting(tmp_path: Path) -> None:
     compute(plan, tmp_path / "run", (1, 2), (2, 2))
     places = [(tmp_path / "run" / "parts" / name, part.plan) for name, part in plan.parts.items()]
     computed = [
-        len(store.finished(shard, part.units)) for place, part in places for shard in (place / SHARDS).glob("*")
+        len(store.finished_units(shard, part.units)) for place, part in places for shard in (place / SHARDS).glob("*")
     ]
     assert sorted(computed) == [0, 0, 1, 1]
     events = run_here(plan, tmp_path / "run")

@@ -241,11 +241,11 @@ def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
         file.parent.mkdir(exist_ok=True)
         file.write_text(json.dumps([{**row, "N_D": unit.batch.N_D, "seed": unit.batch.seed, "H": None}]))
         seals.write_seal(tmp_path, unit.key, [file])
-    assert store.finished(tmp_path, batches) == batches[:2]
+    assert store.finished_units(tmp_path, batches) == batches[:2]
     rows = store.read_rows(tmp_path)
     assert rows["seed"].tolist() == [0, 1]
     assert rows["H"].isna().all()
-    seals.remove(tmp_path, batches[0].key)  # as after a damaged predictor: the unit is computed again
+    seals.remove_seal(tmp_path, batches[0].key)  # as after a damaged predictor: the unit is computed again
     assert store.read_rows(tmp_path)["seed"].tolist() == [0]
     with pytest.raises(ResultError, match="no cell is finished"):
         store.read_rows(tmp_path / "empty")
@@ -270,7 +270,7 @@ def test_tables_lose_their_seal_when_a_unit_is_stored_after_them(tmp_path: Path)
     batch = Batch(4, 0)
     unit = Unit(batch, (("right", "drawn"),), batch.key)
     store.write_unit(tmp_path, unit, [store.Cell({"cell": "right+drawn-4-0"})])
-    assert store.finished(tmp_path, [unit]) == [unit]
+    assert store.finished_units(tmp_path, [unit]) == [unit]
     assert not seals.is_sealed(tmp_path, store.RESULTS)
 
 
