@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.answer.comparison import CellErrors, compare_cells
-from shipid.answer.findings import findings
+from shipid.answer.findings import judge_findings
 from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
 from shipid.arguments import as_path
 from shipid.document import Document
@@ -149,7 +149,7 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
         here_errors, away_errors = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
         differences.append(compare_cells(away_errors, here_errors))
-        row: dict[str, Any] = {key: _label(part, key) for key in ("family", "method")}
+        row: dict[str, Any] = {key: _name_of_both(part, key) for key in ("family", "method")}
         row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
         sides = {"first": here_errors, "other": away_errors}
         row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in sides.items()}
@@ -186,7 +186,7 @@ def _keys_in_words(results: Results) -> str:
     return "; ".join(f"{key} {words}" for key, words in names.items())
 
 
-def _label(part: pd.DataFrame, key: str) -> str:
+def _name_of_both(part: pd.DataFrame, key: str) -> str:
     here, there = part[key].iloc[0], part[f"{key} there"].iloc[0]
     return str(here) if here == there else f"{here} ~ {there}"
 
@@ -300,7 +300,7 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
     low and high are Student's 95 % interval over worlds, within what the number can be.
     """
     rows = []
-    for same in zip(*(findings(results) for results in worlds), strict=True):
+    for same in zip(*(judge_findings(results) for results in worlds), strict=True):
         verdicts = ", ".join(f"{count} {word}" for word, count in Counter(one["verdict"] for one in same).most_common())
         for name in dict.fromkeys(name for one in same for name in one["numbers"]) or [""]:
             values = np.array([one["numbers"][name] for one in same if name in one["numbers"]], dtype=float)

@@ -27,7 +27,7 @@ from shipid.answer.findings_simulation import trend_over_accuracy, trend_verdict
 from shipid.answer.verdict import (
     EQUAL_A,
     ClaimRule,
-    Finding,
+    JudgedClaim,
     Judgement,
     Undecided,
     count_manoeuvres,
@@ -86,7 +86,7 @@ class BandEvidence:
     shares: Sequence[float] = ()
 
 
-def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[Finding]:
+def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[JudgedClaim]:
     """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
 
     rivals : as in `Widths`.

@@ -37,7 +37,7 @@ from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, Metri
 from shipid.answer.verdict import (
     SAME_A,
     ClaimRule,
-    Finding,
+    JudgedClaim,
     Judgement,
     Undecided,
     Verdict,
@@ -116,7 +116,7 @@ class ErrorGrid:
         return length_in_metres(self.table.mean(model, place))
 
 
-def simulation_findings(results: Results) -> list[Finding]:
+def simulation_findings(results: Results) -> list[JudgedClaim]:
     """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
     try:
         grid = read_grid(results)

@@ -18,8 +18,8 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.plan import judged_method, learns_from_runs
 from shipid.study.results import Results
 
-EVERY = "with physics"  # all families but `none` and those that saw the test runs
-COLUMNS = [
+WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
+METHOD_COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
     *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
@@ -45,7 +45,7 @@ def compare_methods(results: Results) -> pd.DataFrame:
 def methods_frame(results: Results) -> pd.DataFrame:
     """Compare the methods of one run, see `method_table`; no rows where fewer than two learn from data."""
     if sum(way.method.compensates for way in results.plan.methods) < 2:
-        return pd.DataFrame(columns=COLUMNS)
+        return pd.DataFrame(columns=METHOD_COLUMNS)
     return compare_methods(results)
 
 
@@ -82,7 +82,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     less over the cells that both have. The family `with physics` is all of them but `none` and those that saw the test
     runs.
     """
-    frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=EVERY)]
+    frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
     rows = []
     for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):
@@ -97,7 +97,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row["ahead"] = ", ".join(name for name, others in by_method.items() if _is_lower(others, errors))
             row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
             rows.append(row | _interval_of_mean(errors))
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return pd.DataFrame(rows, columns=METHOD_COLUMNS)
 
 
 def _errors_by_cell(cells: pd.DataFrame) -> ErrorsByCell:

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from shipid.answer import bands, frames, memory, methods, sentences
 from shipid.answer.error_table import intervals_frame
-from shipid.answer.findings import findings
+from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
 from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 Say = Callable[[str], object]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
-FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
+REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
     "orders": memory.orders_frame,
     "kinds": frames.kinds_frame,
@@ -48,19 +48,19 @@ FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
 def report_content(results: Results, say: Say | None = None) -> ReportContent:
     """Assemble everything that the report of a study shows. say : called with a few words on how far it is."""
     plan, tables = results.plan, {}
-    for name, frame in FRAMES.items():
+    for name, frame in REPORT_FRAMES.items():
         if say is not None:
             say(f"{plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
         tables[name] = frames.count_from_start(results, frame(results))
     if say is not None:
         say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
-    words = *sentences.answer(results, verdicts(tables["methods"])), *bands.answer_on_bands(results)
+    words = *sentences.answer_sentences(results, verdicts(tables["methods"])), *bands.answer_on_bands(results)
     best, naive = sentences.best_model(results), summarise_errors(results.naive)
     return ReportContent(
         title=plan.study.question,
         name=plan.name,
         answer=[Sentence(text, figure) for text, figure in words],
-        findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in findings(results)],
+        findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in judge_findings(results)],
         cells=results.cells,
         naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
         models=_shown_models(results),
@@ -100,22 +100,22 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     store.stored_plan(folder)
     store.check_writable(folder)
     with sole_writer(folder, PAGES, wait=True):
-        return _write(folder, say)
+        return _write_all_pages(folder, say)
 
 
-def _write(folder: Path, say: Say | None) -> Path:
+def _write_all_pages(folder: Path, say: Say | None) -> Path:
     """Write the pages, alone; those of an unfinished run are as old as the results that were read for them."""
     plan = store.stored_plan(folder)
     with temporary_folder(folder) as place:
         read = place.stat().st_mtime_ns
     with threadpool_limits(1, user_api="blas"):  # products are small: on a busy machine threads cost half of the time
-        report, whole = _write_parts(plan, folder, say) if plan.parts else _write_one(folder, say)
+        report, whole = _write_pages_of_parts(plan, folder, say) if plan.parts else _write_pages_of_run(folder, say)
     if not whole:
         os.utime(report, ns=(read, read))
     return report
 
 
-def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
+def _write_pages_of_run(folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of one run, and whether all of its cells are in them."""
     results = read_results(folder, say)
     store.write_results(folder, results.plan, results.cells, whole=results.complete)
@@ -127,7 +127,7 @@ def _write_one(folder: Path, say: Say | None) -> tuple[Path, bool]:
     return report, results.complete
 
 
-def _write_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:
+def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:
     """The pages of all parts that have results and one that compares methods over them, and whether all is in it."""
     cells: list[pd.DataFrame] = []
     notes: dict[str, str] = {}

@@ -15,7 +15,7 @@ import pandas as pd
 from shipid import document as documents
 from shipid.answer.error_table import ErrorTable
 from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals, judge_rivals
-from shipid.answer.verdict import Finding, leave_undecided
+from shipid.answer.verdict import JudgedClaim, leave_undecided
 from shipid.data.checks import copies_of_earlier_runs
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, suggest_name
@@ -66,7 +66,7 @@ def repeated_runs_in_words(plan: Plan, dataset: Dataset) -> str:
     return f"{words} runs: leave out copies" if same else ""
 
 
-def rotate(
+def rotate_test_runs(
     plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu", kept: Path | None = None
 ) -> Iterator[pd.DataFrame]:
     """Set one run aside after the other, train on all others, and yield the cells of each turn.
@@ -122,7 +122,7 @@ def turns_table(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[Finding]:
+def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[JudgedClaim]:
     """Verdicts on R1-R4 over the turns, each a test manoeuvre; R4 by the mean over the horizon.
 
     Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Undecided where

@@ -67,7 +67,7 @@ def best_model(results: Results) -> str | None:
 
 
 @dataclass(frozen=True)
-class Sides:
+class ModelSides:
     """Names of models that are shown to be better than a rival, shown to be worse, and the others."""
 
     better: list[str]
@@ -117,17 +117,17 @@ class AnswerCase:
         interval = self.table.interval(model, self.ends[amount]) if known else (np.nan, np.nan)
         return length_in_metres(error) + interval_after(*interval, error)
 
-    def sides(self, models: Sequence[str], differences: Differences) -> Sides:
+    def sides(self, models: Sequence[str], differences: Differences) -> ModelSides:
         """Models that are better (above 0) and worse; by sign alone where there are too few test manoeuvres."""
         if too_few_manoeuvres(self.table.runs):
             above, below = differences.mean > 0, differences.mean < 0
         else:
             above, below = which_significant(differences.above), which_significant(differences.below)
         groups = (above, below, ~(above | below))
-        return Sides(*([m for m, chosen in zip(models, group, strict=True) if chosen] for group in groups))
+        return ModelSides(*([m for m, chosen in zip(models, group, strict=True) if chosen] for group in groups))
 
     @cached_property
-    def against_none(self) -> dict[int, tuple[Sides, Estimate | None]]:
+    def against_none(self) -> dict[int, tuple[ModelSides, Estimate | None]]:
         """Which physics models do better than none at the least and the greatest N_D, and up to which error A they do.
 
         No such A where too few models are known, or where it does not divide them: a line that says that all pay, or
@@ -157,7 +157,7 @@ class AnswerCase:
         return "" if tried <= set(self.table.H) else IN_EVERY_CELL
 
 
-def answer(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str]]:
+def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str]]:
     """A few sentences built from the results, each with the anchor of the figure that carries it.
 
     methods : sentences that compare the methods; of a study of several that learn they come first.
@@ -334,7 +334,7 @@ def _judged_method(case: AnswerCase) -> Iterator[str]:
     yield f"{words} {judged_method(plan)!r}, the one that the study judges by."
 
 
-def _sides_in_words(case: AnswerCase, sides: Sides) -> str:
+def _sides_in_words(case: AnswerCase, sides: ModelSides) -> str:
     """Which models are better than no physics and which are worse."""
     count = len(sides.better) + len(sides.worse) + len(sides.unknown)
     if len(sides.better) == count:

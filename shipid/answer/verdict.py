@@ -22,7 +22,7 @@ SAME_A = "all physics models have the same A, so nothing can rise with it"
 EQUAL_A = "it is not shown which of them is more accurate"
 
 
-class Finding(TypedDict):
+class JudgedClaim(TypedDict):
     """A claim of the method with its verdict, the evidence in words, and its key numbers by name and unit."""
 
     id: str
@@ -51,19 +51,21 @@ class ClaimRule(Generic[Judged]):
             return "undecided", str(reason), {}
 
 
-def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[Finding]:
+def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[JudgedClaim]:
     """The finding of each rule, in order. note : what is added to the evidence of all."""
-    findings: list[Finding] = []
+    findings: list[JudgedClaim] = []
     for key, rule in rules.items():
         decided, evidence, numbers = rule.decide(case)
         words = "; ".join(part for part in (evidence, note) if part)
-        findings.append(Finding(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
+        findings.append(JudgedClaim(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
     return findings
 
 
-def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[Finding]:
+def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[JudgedClaim]:
     """Every claim undecided, for the same reason."""
-    return [Finding(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()]
+    return [
+        JudgedClaim(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()
+    ]
 
 
 def verdict_of(confirmed: bool, refuted: bool) -> Verdict:

@@ -74,7 +74,7 @@ def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> 
 def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
     """The dataset of a study, and its envelope beside the published one."""
     from shipid.data.dataset import write_dataset
-    from shipid.study.envelope import envelope, envelope_table
+    from shipid.study.envelope import envelope_table, input_envelope
     from shipid.study.plan import input_files, read_plan
     from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
@@ -86,7 +86,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     check_output(file, input_files(plan), "--out")
     dataset = obtain_runs(plan)
     pool, test, _ = partition(plan, dataset)
-    rows_of_sets = envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
+    rows_of_sets = input_envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
     ranges = envelope_table(rows_of_sets, plan.study.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [

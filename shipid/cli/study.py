@@ -194,17 +194,17 @@ def study_screen(
     if single and not ENGINES[engine].available():
         raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
     plan, file = _prepare_command(study, changes, device, out, "screen")
-    wanted, dataset = screen.families(plan, family), obtain_runs(plan)
+    wanted, dataset = screen.drawn_families(plan, family), obtain_runs(plan)
     cut = partition(plan, dataset)
-    for note in screen.notes(plan, cut, wanted):
+    for note in screen.notes_on_windows(plan, cut, wanted):
         typer.echo(note, err=True)
     blocks = count_blocks(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
-    frame = screen.joined(list(blocks))
+    frame = screen.join_blocks(list(blocks))
     write_table(file, frame)
-    spread = screen.spread(frame)
-    shares = [percent_text(share) for share in screen.SHARES]
+    spread = screen.accuracy_quantiles(frame)
+    shares = [percent_text(share) for share in screen.QUANTILES_OF_A]
     rows = [[*map(str, row[:3]), *map(length_text, row[3:])] for row in spread.itertuples(index=False)]
-    correlations = screen.drivers(frame)
+    correlations = screen.drivers_of_accuracy(frame)
     pairs = [
         (str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in correlations.itertuples()
     ]
@@ -247,7 +247,7 @@ def study_rotate(
     import pandas as pd
 
     kept = rotate.kept_folder(file, plan, dataset, device)
-    blocks = rotate.rotate(plan, dataset, wanted, device, kept)
+    blocks = rotate.rotate_test_runs(plan, dataset, wanted, device, kept)
     sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
     frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
     write_table(file, frame)

@@ -13,10 +13,10 @@ from shipid.hybrid.features import choose_features, feature_table
 from shipid.physics.signals import read_unit, signal_of
 from shipid.study.schema import Published, published_keys
 
-LIMITS = ("min", "mean", "max")
+ENVELOPE_COLUMNS = ("min", "mean", "max")
 
 
-def envelope(
+def input_envelope(
     pool: Windows, test: Windows, runs: Mapping[int, Sequence[str]], commands: Sequence[str]
 ) -> list[dict[str, Any]]:
     """Least, mean and greatest input [SI] at the instants of prediction, per D_10 ... and test.
@@ -41,11 +41,11 @@ def envelope_table(rows: Iterable[Mapping[str, Any]], published: Published | Non
     shown = []
     for row in rows:
         unit, factor = read_unit(row["quantity"])
-        shown.append({**row, "unit": unit, **{name: row[name] * factor for name in LIMITS}})
-    return pd.DataFrame([*shown, *_published(published, [row["quantity"] for row in shown])])
+        shown.append({**row, "unit": unit, **{name: row[name] * factor for name in ENVELOPE_COLUMNS}})
+    return pd.DataFrame([*shown, *_published_rows(published, [row["quantity"] for row in shown])])
 
 
-def _published(published: Published | None, quantities: Sequence[str]) -> list[dict[str, Any]]:
+def _published_rows(published: Published | None, quantities: Sequence[str]) -> list[dict[str, Any]]:
     """Rows of the published envelope for those quantities that the study has."""
     rows = []
     for key, limits in (published.envelope if published else {}).items():
@@ -53,6 +53,6 @@ def _published(published: Published | None, quantities: Sequence[str]) -> list[d
         for quantity in dict.fromkeys(quantities):
             if signal_of(quantity) == signal:
                 unit, factor = read_unit(quantity)
-                values = dict(zip(LIMITS, (to_SI * factor * limit for limit in limits), strict=True))
+                values = dict(zip(ENVELOPE_COLUMNS, (to_SI * factor * limit for limit in limits), strict=True))
                 rows.append({"set": "published", "quantity": quantity, "unit": unit, **values})
     return rows

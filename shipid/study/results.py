@@ -25,7 +25,7 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Plan, families_aside, families_set_from, judged_method, model_label
 
-STRIDE = 20  # cells read between words on how far it is
+CELLS_BETWEEN_WORDS = 20  # cells read between words on how far it is
 MOST_KEPT = 2**30  # bytes of predicted paths in memory
 
 
@@ -150,9 +150,9 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     folder = as_path("folder", folder)
     plan = store.stored_plan(folder)
     if not plan.parts:
-        return _cells(folder, plan)
+        return _read_part_cells(folder, plan)
     frames = [
-        _cells(place, part.plan).assign(condition=part.condition, part=name)
+        _read_part_cells(place, part.plan).assign(condition=part.condition, part=name)
         for name, part in plan.parts.items()
         if (place := store.check_part(folder, name, part.plan)).is_dir()
         and store.finished_units(place, part.plan.units)
@@ -162,12 +162,12 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-def _cells(folder: Path, plan: Plan) -> pd.DataFrame:
+def _read_part_cells(folder: Path, plan: Plan) -> pd.DataFrame:
     seals.check_seals(folder, "batches/")
-    return _labelled(store.read_rows(folder, plan), plan)
+    return _with_model_names(store.read_rows(folder, plan), plan)
 
 
-def _labelled(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
+def _with_model_names(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
     """The cells with the name that figures give their models."""
     return cells.assign(
         model=[model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
@@ -185,13 +185,13 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check_seals(folder)
-    cells = _labelled(store.read_rows(folder, plan), plan)
+    cells = _with_model_names(store.read_rows(folder, plan), plan)
     test, physics, naive = store.read_test(folder)
     bands: dict[str, Bands] = {}
     no_band: dict[str, str] = {}
     good = [str(cell) for cell in cells["cell"][cells["status"] == "ok"]]
     for count, cell in enumerate(good, start=1):
-        if say is not None and count % STRIDE == 0:
+        if say is not None and count % CELLS_BETWEEN_WORDS == 0:
             say(f"reading cells: {count} of {len(good)}")
         band, reason = read_bands(store.cell_file(folder, cell))
         if band is not None:
@@ -204,7 +204,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         folder=folder,
         plan=plan,
         cells=cells,
-        models=_models(folder, physics, test),
+        models=_read_models(folder, physics, test),
         test=test,
         physics=physics,
         naive=naive,
@@ -216,7 +216,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
     )
 
 
-def _models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
+def _read_models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
     """One row per model: accuracy [m], also by axis of the frame (11), and whether it diverged on the test windows."""
     frame = pd.DataFrame(read_json(folder / store.FOUNDATIONS))
     frame["model"] = frame["foundation"]

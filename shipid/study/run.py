@@ -27,7 +27,7 @@ from shipid.hybrid.method import TrialJournal as Searches
 from shipid.study import seals, store
 from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
 from shipid.study.cluster import Known, Line, SentSearches, on_dask
-from shipid.study.envelope import envelope
+from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
 from shipid.study.prepare import Prepared, foundation_record, obtain_runs, prepare, runs_by_amount
@@ -183,7 +183,7 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared, sessions: Sessio
     test, fixed = prepared.test, [one for one in prepared.foundations if not one.fitted]
     paths = {one.name: prepared.test_paths[one.name] for one in fixed}
     store.write_test(folder, test, paths, prepared.naive)
-    rows = envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
+    rows = input_envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
     known = {one.name: accuracy_of(paths[one.name], test) for one in fixed if one.base is not None}
     described = [{**foundation_record(one), **known.get(one.name, NO_ACCURACY)} for one in prepared.foundations]

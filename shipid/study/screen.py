@@ -28,16 +28,16 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, Variant, draw_members
 
 Array = np.ndarray
-Cut = tuple[Windows, Windows, list[str]]  # what `partition` gives
-MEMBERS = 512  # of a block
+CutWindows = tuple[Windows, Windows, list[str]]  # what `partition` gives
+MEMBERS_OF_BLOCK = 512  # of a block
 # Sums of windows and tallies of a block, for each of pool and test: fewer members if windows are many.
-NUMBERS = 12_000_000
-SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
-DRIVERS = 5  # of a family that are named
-FIXED = ("family", "member", "A", "A_90", "diverged")
+NUMBERS_OF_BLOCK = 12_000_000
+QUANTILES_OF_A = (0.05, 0.25, 0.5, 0.75, 0.95)
+MOST_DRIVERS = 5  # of a family that are named
+ROW_COLUMNS = ("family", "member", "A", "A_90", "diverged")
 
 
-def families(plan: Plan, name: str | None = None) -> list[Family]:
+def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
     drawn = [family for family in plan.families if any(block.drawn for block in family.perturb)]
     if name is None and not drawn:
@@ -51,7 +51,7 @@ def families(plan: Plan, name: str | None = None) -> list[Family]:
     return chosen
 
 
-def notes(plan: Plan, cut: Cut, wanted: Sequence[Family]) -> list[str]:
+def notes_on_windows(plan: Plan, cut: CutWindows, wanted: Sequence[Family]) -> list[str]:
     """Windows that a study leaves out, and inputs that the base vessels need and the runs do not have."""
     pool, _, left_out = cut
     return [*left_out, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
@@ -64,7 +64,7 @@ def screen(
     count: int,
     device: str = "cpu",
     engine: str = REPEATED,
-    cut: Cut | None = None,
+    cut: CutWindows | None = None,
 ) -> Iterator[pd.DataFrame]:
     """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
 
@@ -85,7 +85,7 @@ def screen(
         check_choice(f"base of the family {family.name!r}", family.base, plan.vessels)
     count = check_whole_number("count", count, 1)
     pool, test, _ = partition(plan, dataset) if cut is None else cut
-    size = min(MEMBERS, max(1, NUMBERS // (len(pool) + len(test) + BINS)))
+    size = min(MEMBERS_OF_BLOCK, max(1, NUMBERS_OF_BLOCK // (len(pool) + len(test) + BINS)))
     for family in wanted:
         base = plan.vessels[str(family.base)]
         check_columns(base, test.columns, plan.file)
@@ -93,10 +93,10 @@ def screen(
             numbers = range(first, min(first + size, count))
             named = family.model_copy(update={"members": count})
             variants = draw_members(named, base, plan.file, numbers)
-            yield _rows(plan, dataset, (pool, test), base, variants, device, engine)
+            yield _rows_of_block(plan, dataset, (pool, test), base, variants, device, engine)
 
 
-def _rows(
+def _rows_of_block(
     plan: Plan,
     dataset: Dataset,
     parts: Sequence[Windows],
@@ -145,34 +145,34 @@ def _equal_lags(base: Vessel, values: Array) -> list[Array]:
     return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
 
 
-def joined(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
+def join_blocks(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """All rows as one frame; a parameter that a family leaves alone has the factor 1."""
     frame = pd.concat(blocks, ignore_index=True)
-    drawn = [name for name in frame.columns if name not in FIXED]
+    drawn = [name for name in frame.columns if name not in ROW_COLUMNS]
     return frame.fillna(dict.fromkeys(drawn, 1.0))
 
 
-def spread(frame: pd.DataFrame) -> pd.DataFrame:
+def accuracy_quantiles(frame: pd.DataFrame) -> pd.DataFrame:
     """A row per family: members, how many diverged, and quantiles of A [m] over the others."""
     rows = []
     for name, part in frame.groupby("family", sort=False):
         A = part["A"].dropna()
         row = {"family": name, "members": len(part), "diverged": len(part) - len(A)}
-        rows.append(row | {share: A.quantile(share) for share in SHARES})
+        rows.append(row | {share: A.quantile(share) for share in QUANTILES_OF_A})
     return pd.DataFrame(rows)
 
 
-def drivers(frame: pd.DataFrame) -> pd.DataFrame:
+def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
     """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
 
-    The `DRIVERS` largest of those that chance hardly makes, a row each: family, paths (those drawn together count
+    The `MOST_DRIVERS` largest of those that chance hardly makes, a row each: family, paths (those drawn together count
     once), factor, away. Chance is judged by Kendall's rank correlation, whose p-values are exact for few members,
     corrected for the number of pairs in a family.
     """
     rows = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
         A, alike = part["A"].to_numpy(), dict[bytes, list[str]]()
-        for path in frame.columns.difference(list(FIXED), sort=False):
+        for path in frame.columns.difference(list(ROW_COLUMNS), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
         pairs = {", ".join(paths): (part[paths[0]], (part[paths[0]] - 1).abs()) for paths in alike.values()}
@@ -186,7 +186,7 @@ def drivers(frame: pd.DataFrame) -> pd.DataFrame:
                 rows.append((name, named, *strength, max(map(abs, strength))))
     effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
     largest = (
-        effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(DRIVERS)
+        effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(MOST_DRIVERS)
     )
     order = largest["family"].map(list(dict.fromkeys(effects["family"])).index)
     return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from typer.testing import CliRunner
 
 from shipid.answer import bands
-from shipid.answer.findings import findings
+from shipid.answer.findings import judge_findings
 from shipid.cli import app
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
@@ -118,13 +118,13 @@ def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(resu
     cells = results.cells.assign(status=results.cells["status"].mask(lost, "failed"))
     kept = {cell: path for cell, path in results.paths.items() if cell not in set(cells["cell"][lost])}
     known = {cell: band for cell, band in results.bands.items() if cell in kept}
-    verdicts = findings(replace(results, cells=cells, paths=kept, bands=known))
+    verdicts = judge_findings(replace(results, cells=cells, paths=kept, bands=known))
     assert [one["id"] for one in verdicts][-2:] == ["B1", "B2"]
     assert verdicts[-1]["numbers"]
 
 
 def test_findings_say_what_the_cells_hold(results: Results) -> None:
-    verdicts = {one["id"]: one for one in findings(results)}
+    verdicts = {one["id"]: one for one in judge_findings(results)}
     top = results.cells[results.cells["N_D"] == results.cells["N_D"].max()].groupby("foundation")[
         ["A", "coverage", "width"]
     ]

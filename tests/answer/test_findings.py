@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.answer.findings import findings
+from shipid.answer.findings import judge_findings
 from shipid.answer.findings_bands import BAND_RULES as BANDS
 from shipid.answer.findings_full_scale import FULL_SCALE_RULES as CLAIMS
 from shipid.study.results import Results, read_results
@@ -19,7 +19,7 @@ RUNS = 8  # test manoeuvres, all alike but for a tenth
 
 
 def verdicts(results: Results) -> dict[str, str]:
-    claims = findings(results)
+    claims = judge_findings(results)
     assert [finding["id"] for finding in claims] == [*CLAIMS, *BANDS]
     claims = [finding for finding in claims if finding["id"] in CLAIMS]
     return {finding["id"]: finding["verdict"] for finding in claims}
@@ -51,7 +51,7 @@ def test_refuted(made: Any, H: tuple[float, float, float], refuted: set[str]) ->
 def test_a_gap_shrinks_whichever_model_has_the_larger_error(made: Any) -> None:
     """The `accurate` model errs more in this test: 6 m and 2 m alone; 1.5 m and 1.4 m, 1 m and 5.5 m, compensated."""
     alone = {"good": 6.0, "bad": 2.0}
-    shrunk = {one["id"]: one for one in findings(made(one(1.5, 1.4, 9.0), alone=alone, runs=RUNS))}["R3"]
+    shrunk = {one["id"]: one for one in judge_findings(made(one(1.5, 1.4, 9.0), alone=alone, runs=RUNS))}["R3"]
     assert shrunk["verdict"] == "confirmed"
     assert shrunk["evidence"].startswith("gap 4.00 m before, 0.10 m after: 3.90 m [3.")
     assert verdicts(made(one(1.0, 5.5, 9.0), alone=alone, runs=RUNS))["R3"] == "refuted"
@@ -72,7 +72,7 @@ def test_which_model_is_inaccurate_is_seen_from_the_test(
 ) -> None:
     """A claim of 3 m compensated against 2 m alone was confirmed where the study calls the 6 m model accurate."""
     results = made(one(*H, 9.0), alone=dict(zip(("good", "bad"), alone, strict=True)), runs=RUNS)
-    finding = {one["id"]: one for one in findings(results)}["R2"]
+    finding = {one["id"]: one for one in judge_findings(results)}["R2"]
     assert finding["verdict"] == expected
     assert finding["evidence"].startswith(f"inaccurate and compensated {H[0]:.2f} m") or alone == (2.0, 2.0)
     assert ("it is not shown which of them is more accurate" in finding["evidence"]) == (alone == (2.0, 2.0))
@@ -83,8 +83,8 @@ def test_physics_that_made_the_data_are_no_traceback(made: Any) -> None:
     """No error at all, alone and compensated: nothing is left to gain, and no number is missing."""
     results = made(one(0.0, 0.0, 9.0), alone={"good": 0.0, "bad": 0.0}, runs=RUNS)
     assert verdicts(results) == {"R1": "undecided", "R2": "confirmed", "R3": "undecided", "R4": "confirmed"}
-    assert all(np.isfinite(list(finding["numbers"].values())).all() for finding in findings(results))
-    assert not any("nan" in finding["evidence"] for finding in findings(results))
+    assert all(np.isfinite(list(finding["numbers"].values())).all() for finding in judge_findings(results))
+    assert not any("nan" in finding["evidence"] for finding in judge_findings(results))
 
 
 def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
@@ -95,8 +95,8 @@ def test_what_another_training_could_turn_round_is_undecided(made: Any) -> None:
 def test_one_test_manoeuvre_decides_nothing(made: Any) -> None:
     results = made(one(1.0, 1.9, 9.0))
     assert set(verdicts(results).values()) == {"undecided"}
-    assert all("1 test manoeuvre gives no interval" in finding["evidence"] for finding in findings(results)[:4])
-    assert all("shipid study rotate" in finding["evidence"] for finding in findings(results)[:4])
+    assert all("1 test manoeuvre gives no interval" in finding["evidence"] for finding in judge_findings(results)[:4])
+    assert all("shipid study rotate" in finding["evidence"] for finding in judge_findings(results)[:4])
 
 
 def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> None:
@@ -105,7 +105,7 @@ def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> Non
     for name, run, decided in (("good", "h", "undecided"), ("bad", "a", "undecided"), ("good", "z", "confirmed")):
         seen = [one | {"seen": [run]} if one["name"] == name else one for one in families]
         results = made(one(1.0, 1.9, 9.0), runs=RUNS, changes={"family": seen})
-        claims = {finding["id"]: finding for finding in findings(results)}
+        claims = {finding["id"]: finding for finding in judge_findings(results)}
         assert {claims[key]["verdict"] for key in CLAIMS} == {decided}
         assert results.aside == ({name} if decided == "undecided" else set())
         if decided == "undecided":
@@ -118,21 +118,21 @@ def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
     curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
     results = made(one(1.0, 1.9, 7.0), curves=curves, runs=RUNS)
     assert verdicts(results)["R4"] == "undecided"
-    assert "worst at 75 % of the steps" in findings(results)[3]["evidence"]
-    assert 'most often worst: "no physics"' in findings(results)[3]["evidence"], "`none` would mean nobody"
+    assert "worst at 75 % of the steps" in judge_findings(results)[3]["evidence"]
+    assert 'most often worst: "no physics"' in judge_findings(results)[3]["evidence"], "`none` would mean nobody"
     results = made(one(1.0, 1.9, 3.0), runs=RUNS)
-    assert "worst at 0 % of the steps" in findings(results)[3]["evidence"]
-    assert "most often worst: bad alone" in findings(results)[3]["evidence"]
+    assert "worst at 0 % of the steps" in judge_findings(results)[3]["evidence"]
+    assert "most often worst: bad alone" in judge_findings(results)[3]["evidence"]
 
 
 def test_evidence_names_the_numbers_and_their_intervals(made: Any) -> None:
-    evidence = {finding["id"]: finding["evidence"] for finding in findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
+    evidence = {finding["id"]: finding["evidence"] for finding in judge_findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
     assert evidence["R1"].startswith("good 2.00 m -> 1.00 m, 1.00 m [0.9")
     assert "; bad 6.00 m -> 2.10 m, 3.90 m [3." in evidence["R1"]
     assert evidence["R1"].endswith("; 8 test manoeuvres")
     assert evidence["R2"].startswith("inaccurate and compensated 2.10 m, accurate alone 2.00 m: -0.10 m [-")
     assert evidence["R3"].startswith("gap 4.00 m before, 1.10 m after: 2.90 m [2.")
-    numbers = {finding["id"]: finding["numbers"] for finding in findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
+    numbers = {finding["id"]: finding["numbers"] for finding in judge_findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
     assert numbers["R1"] == {"H / A, accurate": pytest.approx(0.5), "H / A, inaccurate": pytest.approx(0.35)}
     assert numbers["R3"] == {"gap before [m]": pytest.approx(4.0), "gap after [m]": pytest.approx(1.1)}
 
@@ -143,14 +143,14 @@ def test_a_missing_cell_leaves_all_undecided(made: Any) -> None:
 
 
 def test_no_claims_no_findings(made: Any) -> None:
-    assert findings(made(one(1.0, 2.0, 9.0), claims=None)) == []
-    assert findings(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (30,)))) == []
-    assert findings(made(one(1.0, 2.0, 9.0), claims={"nominal": "good"})) == []
+    assert judge_findings(made(one(1.0, 2.0, 9.0), claims=None)) == []
+    assert judge_findings(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (30,)))) == []
+    assert judge_findings(made(one(1.0, 2.0, 9.0), claims={"nominal": "good"})) == []
 
 
 def test_both_sets_of_findings_can_be_asked_for(made: Any) -> None:
     cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
-    claims = findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
+    claims = judge_findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
     assert [finding["id"] for finding in claims] == [*CLAIMS, *(f"S{k}" for k in range(1, 8)), *BANDS]
 
 
@@ -163,7 +163,7 @@ def test_a_judged_method_that_is_never_without_physics_leaves_those_of_a_growing
     ]
     plan = tiny_plan(tmp_path, {"method": methods, "claims": {"moderate": "right", "high": "wrong"}})
     run_here(plan, tmp_path / "run")
-    found = [one for one in findings(read_results(tmp_path / "run")) if one["id"].startswith("S")]
+    found = [one for one in judge_findings(read_results(tmp_path / "run")) if one["id"].startswith("S")]
     assert len(found) == 7
     assert {one["verdict"] for one in found} == {"undecided"}
     assert all("'both' is not run without physics" in one["evidence"] for one in found)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.answer.findings import findings
+from shipid.answer.findings import judge_findings
 from shipid.answer.findings_simulation import SIMULATION_RULES as CLAIMS
 from shipid.answer.findings_simulation import compare_roughness
 from shipid.study.results import Results
@@ -49,7 +49,7 @@ def judged(made: Any) -> Any:
     def judge(rows: Rows = H, *, seeds: int = 1, wobble: Mapping[str, float] | None = None, **options: Any) -> Any:
         made_up = cells(rows, seeds=seeds, wobble=wobble) if "none" in rows else rows
         options = {"family": FAMILY, "alone": ALONE, "claims": ROLES, "runs": 8, **options}
-        claims = [one for one in findings(made(made_up, **options)) if one["id"].startswith("S")]
+        claims = [one for one in judge_findings(made(made_up, **options)) if one["id"].startswith("S")]
         assert [finding["id"] for finding in claims] == list(CLAIMS)
         assert all("nan" not in finding["evidence"].split() for finding in claims)
         return {finding["id"]: finding for finding in claims}
@@ -218,7 +218,7 @@ def test_nothing_is_decided_without_the_whole(judged: Any, made: Any) -> None:
     some = cells(H)
     del some["high-1", 30, 0]
     partial: Results = made(some, planned=18, family=FAMILY, alone=ALONE, claims=ROLES)
-    assert {f["evidence"] for f in findings(partial)} == {"1 of 18 cells are not finished"}
+    assert {f["evidence"] for f in judge_findings(partial)} == {"1 of 18 cells are not finished"}
 
 
 def test_a_family_without_results_is_reported(judged: Any) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 import shipid
 from shipid.answer.comparison import CellErrors
-from shipid.answer.methods import COLUMNS, EVERY, method_table
+from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS, method_table
 from shipid.study.schema import Claims
 
 
@@ -41,14 +41,14 @@ def cells(
     return pd.DataFrame(rows)
 
 
-def row(frame: pd.DataFrame, method: str = "other", family: str = EVERY) -> Any:
+def row(frame: pd.DataFrame, method: str = "other", family: str = WITH_PHYSICS) -> Any:
     return frame[frame.method.eq(method) & frame.family.eq(family)].iloc[0]
 
 
 def test_the_difference_is_that_of_the_means() -> None:
     made = cells(np.random.default_rng(0), 0.5)
     table = method_table(made, "drawn")
-    assert list(table.columns) == COLUMNS
+    assert list(table.columns) == METHOD_COLUMNS
     for family in ("moderate", "none"):
         mine = made[made.family.eq(family)].groupby("method").H.mean()
         assert row(table, family=family).difference == pytest.approx(mine["other"] - mine["drawn"])
@@ -85,7 +85,9 @@ def test_the_mean_over_physics_is_without_families_that_the_claims_set_aside(tin
     for one, families in ((results, ["right", "wrong"]), (apart, ["right"])):
         table, cells = shipid.compare_methods(one), results.cells
         mean = cells[cells.family.isin(families)].groupby("N_D")["H"].mean()
-        pd.testing.assert_series_equal(table[table.family == EVERY].set_index("N_D")["H"], mean, check_names=False)
+        pd.testing.assert_series_equal(
+            table[table.family == WITH_PHYSICS].set_index("N_D")["H"], mean, check_names=False
+        )
 
 
 @pytest.mark.slow

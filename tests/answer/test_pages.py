@@ -46,7 +46,7 @@ def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
 
 
 def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(pages.FRAMES, "failed", lambda results: results.cells[results.cells["status"] != "ok"])
+    monkeypatch.setitem(pages.REPORT_FRAMES, "failed", lambda results: results.cells[results.cells["status"] != "ok"])
     assert len(report_content(read_results(tiny_run)).frames["failed"]) == 0
 
 

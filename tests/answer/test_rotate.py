@@ -18,7 +18,7 @@ from shipid.answer.rotate import (
     kept_folder,
     remove_kept,
     repeated_runs_in_words,
-    rotate,
+    rotate_test_runs,
     turn_findings,
     turns_table,
 )
@@ -66,9 +66,9 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
     """The same call goes on where it was interrupted, and yields the same digits."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     with without_workers():
-        next(rotate(plan, dataset, ["a", "b"], kept=tmp_path / "kept"))
+        next(rotate_test_runs(plan, dataset, ["a", "b"], kept=tmp_path / "kept"))
         before = [file.stat().st_mtime_ns for file in tmp_path.glob("kept/*/batches/*")]
-        rows_of_turns = pd.concat(list(rotate(plan, dataset, ["a", "b"], kept=tmp_path / "kept")))
+        rows_of_turns = pd.concat(list(rotate_test_runs(plan, dataset, ["a", "b"], kept=tmp_path / "kept")))
     after = [file.stat().st_mtime_ns for file in tmp_path.glob("kept/*/batches/*")]
     assert set(before) < set(after), "the first turn is not computed again"
     for test in ("a", "b"):

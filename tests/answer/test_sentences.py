@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.answer.sentences import _bounds, answer, best_model, errors_by_model
+from shipid.answer.sentences import _bounds, answer_sentences, best_model, errors_by_model
 from shipid.answer.worth import Estimate
 from shipid.report.section import declared
 from shipid.report.sections import SECTIONS
@@ -19,7 +19,7 @@ from tests.answer.byhand import grid
 
 
 def text(results: Results) -> str:
-    sentences = answer(results)
+    sentences = answer_sentences(results)
     assert all(anchor in declared(SECTIONS) for _, anchor in sentences)
     for sentence, _ in sentences:
         assert re.fullmatch(r"[\"A-Z0-9].*\.", sentence), sentence
@@ -348,9 +348,9 @@ def test_bounds_are_those_that_the_study_covers() -> None:
 
 def test_the_comparison_of_methods_comes_first(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
-    plain = [sentence for sentence, _ in answer(results, ["Memory errs least."])]
+    plain = [sentence for sentence, _ in answer_sentences(results, ["Memory errs least."])]
     monkeypatch.setattr(type(results.plan), "learning", ["drawn", "memory"])
-    sentences = [sentence for sentence, _ in answer(results, ["Memory errs least."])]
+    sentences = [sentence for sentence, _ in answer_sentences(results, ["Memory errs least."])]
     assert sentences[0] == "Memory errs least."
     assert [one for one in sentences[1:] if "judges by" not in one] == plain
     assert len(sentences) == len(plain) + 2

@@ -88,7 +88,7 @@ def test_each_kind_of_number_has_its_limits(
     of_worlds = iter((0.0, 1.0, 0.4))
     monkeypatch.setattr(
         module,
-        "findings",
+        "judge_findings",
         lambda _: [{"id": "S", "claim": "", "verdict": "undecided", "numbers": {name: next(of_worlds)}}],
     )
     row = compare_findings([SimpleNamespace()] * 3).iloc[0]  # type: ignore[list-item]

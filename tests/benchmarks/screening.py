@@ -16,7 +16,7 @@ import pandas as pd
 from shipid.engine.engines import REPEATED
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain_runs
-from shipid.study.screen import families, joined, screen
+from shipid.study.screen import drawn_families, join_blocks, screen
 
 STUDY, FAMILY, MEMBERS, ALL = "simulation", "high", 1000, 10_000
 
@@ -24,7 +24,7 @@ STUDY, FAMILY, MEMBERS, ALL = "simulation", "high", 1000, 10_000
 def run(members: int = MEMBERS) -> dict[str, Any]:
     """Wall time of a tenth of the members and of all, drawing and checking them included, and the greatest memory."""
     plan = read_plan(STUDY)
-    wanted = families(plan, FAMILY)
+    wanted = drawn_families(plan, FAMILY)
     few, begun, few_busy, _ = _timed(plan, wanted, members // 10)
     _, _, few_single, _ = _timed(plan, wanted, members // 10, "single")
     few_memory = _memory()
@@ -52,7 +52,7 @@ def _timed(plan: Any, wanted: Any, members: int, engine: str = REPEATED) -> tupl
     for block in screen(plan, obtain_runs(plan), wanted, members, engine=engine):
         begun = begun or time.perf_counter() - start
         blocks.append(block)
-    return time.perf_counter() - start, begun, time.process_time() - busy, joined(blocks)
+    return time.perf_counter() - start, begun, time.process_time() - busy, join_blocks(blocks)
 
 
 def _memory() -> float:

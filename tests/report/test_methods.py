@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.answer.methods import COLUMNS, EVERY
+from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS
 from shipid.report.comparison import write_comparison
 from shipid.report.methods import MethodsContent, methods, methods_table, verdicts
 from tests.report.views import views
@@ -19,14 +19,14 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
     rng = np.random.default_rng(seed)
     rows = []
     for condition in conditions:
-        for family in ("nominal", "none", EVERY):
+        for family in ("nominal", "none", WITH_PHYSICS):
             for N_D in (3, 30):
                 for method in ("a", "b", "c", *(["lost"] if failing else [])):
                     H = float(rng.uniform(0.5, 9)) if method != "lost" else np.nan
                     difference = 0.0 if method == "a" else H - 3
                     failed = {"c": 1 if failing else 0, "lost": 4}.get(method, 0)
                     rows.append(
-                        dict(zip(COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 0.9 * H, 1.2 * H,
+                        dict(zip(METHOD_COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 0.9 * H, 1.2 * H,
                                  2 * H, 1.7 * H, 2.0, 8.0, "a",
                              4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
                              difference + 0.1, np.nan, np.nan, ""], strict=True))
@@ -45,7 +45,9 @@ def test_the_sentences_name_the_least_error_among_methods_that_never_failed() ->
     for sentence, condition in zip(verdicts(rows), ("calm", "rough"), strict=True):
         assert sentence.startswith(f"{condition.capitalize()}: with N_D = 3 ")
         for N_D in (3, 30):
-            mine = rows[rows.condition.eq(condition) & rows.family.eq(EVERY) & rows.N_D.eq(N_D) & rows.failed.eq(0)]
+            mine = rows[
+                rows.condition.eq(condition) & rows.family.eq(WITH_PHYSICS) & rows.N_D.eq(N_D) & rows.failed.eq(0)
+            ]
             assert f"with N_D = {N_D} {mine.loc[mine.H.idxmin()].method} errs least" in sentence
         assert sentence.count("c (1 of 4) and lost (4 of 4)") == 2
 
@@ -62,7 +64,7 @@ def test_a_method_that_does_not_run_on_every_model_is_not_the_best() -> None:
 def three(H: tuple[float, float, float], **more: list[object]) -> str:
     """The sentence of three methods at one amount of data, differences are to `a`."""
     rows = frame(1, ("",), failing=False)
-    rows = rows[rows.family.eq(EVERY) & rows.N_D.eq(3)].assign(H=H, difference=np.array(H) - H[0], **more)
+    rows = rows[rows.family.eq(WITH_PHYSICS) & rows.N_D.eq(3)].assign(H=H, difference=np.array(H) - H[0], **more)
     rows = rows.assign(low=rows.difference - 0.5, high=rows.difference + 0.5)
     (sentence,) = verdicts(rows)
     return sentence
@@ -127,7 +129,7 @@ def test_errors_of_a_model_ship_are_no_zeros_in_the_table() -> None:
 def test_methods_are_in_the_order_that_the_page_says() -> None:
     """The best at the top: with physics, or without where a method has none; at the foot what gave no result."""
     rows = frame(2, ("",))
-    rows.loc[rows.family.eq(EVERY), "H"] = rows.method.map({"a": 3.0, "b": 1.0, "c": 5.0})
+    rows.loc[rows.family.eq(WITH_PHYSICS), "H"] = rows.method.map({"a": 3.0, "b": 1.0, "c": 5.0})
     rows.loc[rows.family.eq("none") & rows.method.eq("b"), "H"] = 99.0
     rival = rows[rows.method.eq("a") & rows.family.eq("none")]
     rivals = [rival.assign(method=name, H=H) for name, H in (("r", 2.0), ("s", 4.0))]

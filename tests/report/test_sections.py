@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipid.answer.pages import FRAMES
+from shipid.answer.pages import REPORT_FRAMES
 from shipid.report import ReportContent, checks, identification, manoeuvre
 from shipid.report.page import render_page
 from shipid.report.section import OF_EVERY_PAGE, Section, drawn
@@ -67,6 +67,6 @@ def test_a_full_study_draws_every_declared_item(simulation_drawn):
 
 
 def test_needs_are_parts_of_the_content():
-    known = {field.name for field in fields(ReportContent)} | set(FRAMES)
+    known = {field.name for field in fields(ReportContent)} | set(REPORT_FRAMES)
     for name, section in SECTIONS.items():
         assert set(section.needs) <= known, name

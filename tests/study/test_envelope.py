@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.data.dataset import read_dataset
-from shipid.study.envelope import envelope, envelope_table
+from shipid.study.envelope import envelope_table, input_envelope
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
@@ -23,7 +23,7 @@ def test_the_truth_fills_the_published_envelope() -> None:
     dataset = obtain_runs(plan)
     pool, test, _ = partition(plan, dataset)
     rows = envelope_table(
-        envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands), plan.study.published
+        input_envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands), plan.study.published
     )
     theirs = rows[rows["set"] == "published"].set_index("quantity")
     ours = rows[rows["set"].isin(["D_100", "test"])].groupby("quantity").agg({"min": "min", "max": "max"})

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.answer.sentences import answer
+from shipid.answer.sentences import answer_sentences
 from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
@@ -262,7 +262,7 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
         paths = predictor.predict(instants_of(plan.study, predictor.vessel, dataset, test))
         np.testing.assert_allclose(results.paths[str(row.cell)], paths, atol=1e-9)
     assert "fitted" not in results.physics  # its numbers depend on the cell
-    assert not any("alone" in text and "+" in text for text, _ in answer(results))
+    assert not any("alone" in text and "+" in text for text, _ in answer_sentences(results))
 
 
 def test_what_cannot_be_identified_fails_in_its_cells(tmp_path: Path, recorded: Recorded) -> None:

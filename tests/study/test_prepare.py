@@ -22,7 +22,7 @@ from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor, limits_of
 from shipid.study import prepare as module
-from shipid.study.envelope import envelope
+from shipid.study.envelope import input_envelope
 from shipid.study.plan import Plan, read_plan, whole_unit
 from shipid.study.prepare import (
     Prepared,
@@ -409,7 +409,9 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
     plan, _, prepared = tiny
     rows = {
         (row["set"], row["quantity"]): row
-        for row in envelope(prepared.pool, prepared.test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
+        for row in input_envelope(
+            prepared.pool, prepared.test, runs_by_amount(plan.study, prepared.pool), prepared.commands
+        )
     }
     batches = {f"D_{batch.N_D}": batch for batch in plan.batches if batch.seed == min(plan.study.grid.seeds)}
     assert {name for name, _ in rows} == {*batches, "test"}

@@ -20,7 +20,14 @@ from shipid.metrics import position_error, summarise_errors
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain_runs, partition, prepare, window_memory
-from shipid.study.screen import drivers, families, joined, notes, screen, spread
+from shipid.study.screen import (
+    accuracy_quantiles,
+    drawn_families,
+    drivers_of_accuracy,
+    join_blocks,
+    notes_on_windows,
+    screen,
+)
 from shipid.vessel.perturb import Family, draw_members
 from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
@@ -32,12 +39,12 @@ def plan(tmp_path: Path) -> Plan:
 
 
 def screened(plan: Plan, count: int, name: str = "wrong") -> pd.DataFrame:
-    return joined(list(screen(plan, obtain_runs(plan), families(plan, name), count)))
+    return join_blocks(list(screen(plan, obtain_runs(plan), drawn_families(plan, name), count)))
 
 
 def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
     """A, A_90 and share of failures of each member by way of its paths on pool and test."""
-    (family,), base = families(plan, "wrong"), plan.vessels["gunnerus-28.9"]
+    (family,), base = drawn_families(plan, "wrong"), plan.vessels["gunnerus-28.9"]
     dataset = obtain_runs(plan)
     rows = []
     for variant in draw_members(family.model_copy(update={"members": count}), base):
@@ -68,7 +75,7 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
 @pytest.mark.skipif(native.find_compiler() is None, reason="no C compiler on this machine")
 def test_single_precision_gives_six_digits(plan: Plan) -> None:
     double, single = (
-        joined(list(screen(plan, obtain_runs(plan), families(plan, "wrong"), 5, engine=engine)))
+        join_blocks(list(screen(plan, obtain_runs(plan), drawn_families(plan, "wrong"), 5, engine=engine)))
         for engine in ("repeated", "single")
     )
     assert not np.array_equal(double["A"], single["A"])
@@ -91,10 +98,10 @@ def test_members_are_those_of_the_study(plan: Plan) -> None:
 
 def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = screened(plan, 7)
-    monkeypatch.setattr(module, "MEMBERS", 3)
+    monkeypatch.setattr(module, "MEMBERS_OF_BLOCK", 3)
     pd.testing.assert_frame_equal(screened(plan, 7), whole, check_exact=True)
-    monkeypatch.setattr(module, "NUMBERS", 1)
-    assert [len(block) for block in screen(plan, obtain_runs(plan), families(plan, "wrong"), 3)] == [1, 1, 1]
+    monkeypatch.setattr(module, "NUMBERS_OF_BLOCK", 1)
+    assert [len(block) for block in screen(plan, obtain_runs(plan), drawn_families(plan, "wrong"), 3)] == [1, 1, 1]
 
 
 def test_members_with_other_lags_start_from_another_memory(tmp_path: Path) -> None:
@@ -123,7 +130,7 @@ def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
     assert frame["A"].isna().equals(bad)
     assert frame["A_90"].isna().equals(bad)
     assert (frame["diverged"] <= 1).all()
-    assert spread(frame)["diverged"].item() == bad.sum()
+    assert accuracy_quantiles(frame)["diverged"].item() == bad.sum()
 
 
 def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
@@ -133,7 +140,7 @@ def test_what_drives_the_error_comes_first(tmp_path: Path) -> None:
         {"parameters": ["hull.derivatives.X_rr"], "factor": [0.99, 1.01]},
     ]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": rules}]
-    ranking = drivers(screened(tiny_plan(tmp_path, {"family": family}), 24))
+    ranking = drivers_of_accuracy(screened(tiny_plan(tmp_path, {"family": family}), 24))
     assert list(ranking["paths"]) == ["thruster.port.D_p, thruster.starboard.D_p"]
     assert ranking["away"][0] > 0.8  # too large and too small are wrong alike
     assert abs(ranking["factor"][0]) < ranking["away"][0]
@@ -147,8 +154,8 @@ def test_chance_drives_nothing(members: int) -> None:
     A = rng.lognormal(size=200 * members)
     family = np.repeat([f"f{number}" for number in range(200)], members)
     frame = pd.DataFrame({"family": family, "member": family, "A": A, "A_90": A, "diverged": 0.0} | columns)
-    assert drivers(frame)["family"].nunique() <= stats.binom.ppf(0.999, 200, 0.05)
-    driven = drivers(frame.assign(A=A * frame["p3"] ** 12)).groupby("family", sort=False)["paths"].first()
+    assert drivers_of_accuracy(frame)["family"].nunique() <= stats.binom.ppf(0.999, 200, 0.05)
+    driven = drivers_of_accuracy(frame.assign(A=A * frame["p3"] ** 12)).groupby("family", sort=False)["paths"].first()
     assert members < 100 or (len(driven), set(driven)) == (200, {"p3"})
 
 
@@ -160,11 +167,11 @@ def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
         {"name": "other", "base": "gunnerus-28.9", "members": 2, "perturb": more},
     ]
     plan = tiny_plan(tmp_path, {"family": family})
-    frame = joined(list(screen(plan, obtain_runs(plan), families(plan), 2)))
+    frame = join_blocks(list(screen(plan, obtain_runs(plan), drawn_families(plan), 2)))
     assert list(frame["family"]) == ["wrong", "wrong", "other", "other"]
     assert list(frame["inertia.I_z"][:2]) == [1, 1]
     assert list(frame["inertia.m"][2:]) == [1, 1]
-    assert list(spread(frame)["family"]) == ["wrong", "other"]
+    assert list(accuracy_quantiles(frame)["family"]) == ["wrong", "other"]
 
 
 @pytest.mark.parametrize(
@@ -172,7 +179,7 @@ def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
 )
 def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
     with pytest.raises(DocumentError, match=remedy) as caught:
-        families(plan, name)
+        drawn_families(plan, name)
     assert "\n" not in str(caught.value)
 
 
@@ -201,7 +208,7 @@ def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Da
         {"name": "wide", "base": "gunnerus-28.9", "perturb": [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]}
     ]
     plan, dataset = recorded(weaving(), split={"test": 2}, family=families_)
-    assert notes(plan, partition(plan, dataset), families(plan)) == [
+    assert notes_on_windows(plan, partition(plan, dataset), drawn_families(plan)) == [
         "R/V Gunnerus, 28.9 m: V_w, beta_w not measured, assumed 0"
     ]
 
