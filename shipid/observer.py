@@ -48,28 +48,43 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 
 Motion = Literal["north", "east", "psi", "u", "v", "r"]
-MEASURED: tuple[Motion, ...] = ("north", "east", "psi", "u", "v", "r")
-STATES = (*MEASURED, "a_u", "a_v", "a_r", "current_north", "current_east", "x_w", "y_w", "psi_w", "u_w", "v_w", "r_w")
-LOW = 11  # states before those of the waves
-NUMBERS = (
+MEASURED_MOTION: tuple[Motion, ...] = ("north", "east", "psi", "u", "v", "r")
+FILTER_STATES = (
+    *MEASURED_MOTION,
+    "a_u",
+    "a_v",
+    "a_r",
+    "current_north",
+    "current_east",
+    "x_w",
+    "y_w",
+    "psi_w",
+    "u_w",
+    "v_w",
+    "r_w",
+)
+NUM_LOW_STATES = 11  # states before those of the waves
+FILTER_NUMBERS = (
     *("q_u", "q_v", "q_r", "force_u", "force_v", "force_r", "current", "jump", "settle", "memory"),
     *("wave_u", "wave_v", "wave_r", "omega", "zeta"),
 )
-COLUMNS = (*MEASURED, "X", "Y", "N", "current_north", "current_east")
+ESTIMATE_COLUMNS = (*MEASURED_MOTION, "X", "Y", "N", "current_north", "current_east")
 """Estimates as columns, `observer.u`, ...; X, Y, N are the slow force as acceleration, M^-1 tau [m/s^2, rad/s^2]."""
-AGE = "observer.age"
+AGE_COLUMN = "observer.age"
 """Column: time [s] since the observer began. It needs some 20 sqrt(L / g) to settle."""
 DIVERGED = 1e9  # SI: no state, variance or likelihood of a sound filter is so large
 SPIKE = 300.0  # standard deviations: a measurement as far off is a fault of the log and moves nothing
 FADES = (0.0, 3.0, 6.0, 12.0, 20.0, 40.0, 1e6)  # x sqrt(L / g): between which `tune_observer` chooses
-YAW = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
-LONGEST = 0.6  # x sqrt(L / g): by longer steps of the filters the midpoint rule takes its own error for a force
-MOST_PARTS = 1000  # steps of the filters between two rows: rows further apart are a clock in a wrong unit
-PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the physics did is worse than to begin anew
-ROUNDING = 1e-5  # of a step: so much longer than the longest it is still one
-CALM = 1e-6  # m/s: keeps the direction of no wind defined
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
-Positive = Annotated[FiniteFloat, Field(gt=0)]
+YAW_CHANGE = 3.0  # change of the moment, x I_z g / L, over that of the force, x m g
+LONGEST_FILTER_STEP = (
+    0.6  # x sqrt(L / g): by longer steps of the filters the midpoint rule takes its own error for a force
+)
+MOST_FILTER_STEPS = 1000  # steps of the filters between two rows: rows further apart are a clock in a wrong unit
+LONGEST_PAUSE = 6.0  # x sqrt(L / g): after a longer time without rows what the physics did is worse than to begin anew
+STEP_SLACK = 1e-5  # of a step: so much longer than the longest it is still one
+CALM_WIND = 1e-6  # m/s: keeps the direction of no wind defined
+NotNegativeNumber = Annotated[FiniteFloat, Field(ge=0)]
+PositiveNumber = Annotated[FiniteFloat, Field(gt=0)]
 
 
 class Observer(CheckedModel, BaseModel):
@@ -80,34 +95,44 @@ class Observer(CheckedModel, BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    measured: Annotated[tuple[Motion, ...], Field(description="columns that are measurements; always `psi`")] = MEASURED
-    force: Annotated[NotNegative, Field(description="standard deviation of the slow force at first, x m g")] = 3e-3
-    moment: Annotated[NotNegative, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
+    measured: Annotated[tuple[Motion, ...], Field(description="columns that are measurements; always `psi`")] = (
+        MEASURED_MOTION
+    )
+    force: Annotated[NotNegativeNumber, Field(description="standard deviation of the slow force at first, x m g")] = (
+        3e-3
+    )
+    moment: Annotated[NotNegativeNumber, Field(description="the same of the yaw moment, x I_z g / L")] = 9e-3
     change: Annotated[
-        tuple[NotNegative, ...],
+        tuple[NotNegativeNumber, ...],
         Field(
             min_length=1,
             description="levels: change of the force in 1 s, x m g; of the moment 3 times, x I_z g / L",
         ),
     ] = (1e-5, 2e-4)
     model_error: Annotated[
-        NotNegative,
+        NotNegativeNumber,
         Field(description="white acceleration over the change of the slow one, sqrt(s); level 0 of `waves` alone"),
     ] = 10.0
-    jump: Annotated[NotNegative, Field(description="share of a change by an order that the physics may miss")] = 1.0
-    settle: Annotated[Positive, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
-    current: Annotated[NotNegative, Field(description="standard deviation of the current, x sqrt(g L); 0: none")] = 0.03
+    jump: Annotated[NotNegativeNumber, Field(description="share of a change by an order that the physics may miss")] = (
+        1.0
+    )
+    settle: Annotated[PositiveNumber, Field(description="time in which that ends, x sqrt(L / g)")] = 2.0
+    current: Annotated[
+        NotNegativeNumber, Field(description="standard deviation of the current, x sqrt(g L); 0: none")
+    ] = 0.03
     waves: Annotated[
-        tuple[NotNegative, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
+        tuple[NotNegativeNumber, ...], Field(min_length=1, description="levels of wave-frequency u and v, x sqrt(g L)")
     ] = (0.0, 5e-3, 2e-2)
-    period: Annotated[Positive, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
+    period: Annotated[PositiveNumber, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
     damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.5
     noise: Annotated[
-        dict[str, Positive], Field(description="column -> standard deviation of a sample, SI; others by size")
+        dict[str, PositiveNumber], Field(description="column -> standard deviation of a sample, SI; others by size")
     ] = {}
-    memory: Annotated[Positive, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = 20.0
+    memory: Annotated[PositiveNumber, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = (
+        20.0
+    )
     fade: Annotated[
-        NotNegative,
+        NotNegativeNumber,
         Field(description="time in which the force fades ahead, x sqrt(L / g); 0: no force; very large: it lasts"),
     ] = 12.0
     choose: Annotated[
@@ -128,7 +153,7 @@ class Observer(CheckedModel, BaseModel):
 
 
 @dataclass(frozen=True)
-class Bank:
+class FilterBank:
     """Numbers of every filter of one vessel in SI units.
 
     numbers : (K, len(NUMBERS)). noise : (6,) standard deviations of samples. first : (K, 17) those of the first state
@@ -159,10 +184,10 @@ class Bank:
 
     def parts(self, dt: Array) -> NDArray[np.int64]:
         """Number of equal steps that the filters take in a time dt [s] between rows, the last with the measurement."""
-        return np.maximum(np.ceil(dt / self.longest - ROUNDING), 1).astype(np.int64)
+        return np.maximum(np.ceil(dt / self.longest - STEP_SLACK), 1).astype(np.int64)
 
 
-def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
+def filter_bank(vessel: Vessel, settings: Observer | None = None) -> FilterBank:
     """Filters for a vessel of three degrees of freedom; DocumentError for another, or for what is none."""
     check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     if settings is not None:
@@ -173,9 +198,11 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
             f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends"
         )
         raise DocumentError(message, file=vessel.file, path="dof")
-    unknown = next((name for name in settings.noise if name not in MEASURED), None)
+    unknown = next((name for name in settings.noise if name not in MEASURED_MOTION), None)
     if unknown is not None:
-        raise DocumentError(f"no measured column: {suggest_name(unknown, MEASURED)}", path=f"observer.noise.{unknown}")
+        raise DocumentError(
+            f"no measured column: {suggest_name(unknown, MEASURED_MOTION)}", path=f"observer.noise.{unknown}"
+        )
     length = vessel.length or 0.0
     if not length:
         message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
@@ -186,7 +213,7 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
     omega = 2 * np.pi / (settings.period * time)
     numbers, first = [], []
     for change, current, wave in product(settings.change, currents, settings.waves):
-        a = change * linear, change * linear, change * YAW * yaw
+        a = change * linear, change * linear, change * YAW_CHANGE * yaw
         w = wave * speed + 1e-9, wave * speed + 1e-9, 2.5 * wave / time + 1e-9
         q = (0.0 if wave else settings.model_error * x for x in a)  # in waves their motion takes its place
         numbers.append(
@@ -199,9 +226,9 @@ def bank(vessel: Vessel, settings: Observer | None = None) -> Bank:
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
     sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
     noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
-    return Bank(
+    return FilterBank(
         vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass,
-        LONGEST * time, PAUSE * time,
+        LONGEST_FILTER_STEP * time, LONGEST_PAUSE * time,
     )  # fmt: skip
 
 
@@ -211,38 +238,40 @@ def filter_function(model: Dynamics) -> ca.Function:
 
     (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
     state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
-    remembered; their lengths are `sizes`. commands and environment are those in force since the instant before; a
+    remembered; their lengths are `filter_state_sizes`. commands and environment are those in force since the instant before; a
     measurement (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction, before any
     update.
     """
-    count, (num_memory, num_commands) = len(STATES), (len(model.memory), len(model.commands))
-    state = SX.sym("state", sum(sizes(model)))
-    x, packed, memory, unsettled, before, likelihood = ca.vertsplit(state, [0, *np.cumsum(sizes(model)).tolist()])
+    count, (num_memory, num_commands) = len(FILTER_STATES), (len(model.memory), len(model.commands))
+    state = SX.sym("state", sum(filter_state_sizes(model)))
+    x, packed, memory, unsettled, before, likelihood = ca.vertsplit(
+        state, [0, *np.cumsum(filter_state_sizes(model)).tolist()]
+    )
     covariance = ca.reshape(packed, count, count)
     commands, environment = SX.sym("commands", num_commands), SX.sym("environment", len(model.environment))
     parameters, measured = SX.sym("parameters", len(model.parameters)), SX.sym("measured", 6)
-    noise, numbers, dt = SX.sym("noise", 6), SX.sym("numbers", len(NUMBERS)), SX.sym("dt")
-    number = dict(zip(NUMBERS, ca.vertsplit(numbers), strict=True))
+    noise, numbers, dt = SX.sym("noise", 6), SX.sym("numbers", len(FILTER_NUMBERS)), SX.sym("dt")
+    number = dict(zip(FILTER_NUMBERS, ca.vertsplit(numbers), strict=True))
     assert memory.shape[0] == num_memory
 
     def rates(low: SX, inner: SX, orders: SX) -> SX:
-        return _rates(model, low, inner, orders, environment, parameters)
+        return _low_rates(model, low, inner, orders, environment, parameters)
 
     def advance(inner: SX, step: Any) -> SX:
         return model.advance(x[:6], inner, commands, environment, parameters, step)
 
-    middle = x[:LOW] + dt / 2 * rates(x[:LOW], memory, commands)
-    low = x[:LOW] + dt * rates(middle, advance(memory, dt / 2), commands)
+    middle = x[:NUM_LOW_STATES] + dt / 2 * rates(x[:NUM_LOW_STATES], memory, commands)
+    low = x[:NUM_LOW_STATES] + dt * rates(middle, advance(memory, dt / 2), commands)
     reached = advance(memory, dt)
-    jump = ca.fabs(rates(x[:LOW], reached, commands) - rates(x[:LOW], memory, before))[3:6]
+    jump = ca.fabs(rates(x[:NUM_LOW_STATES], reached, commands) - rates(x[:NUM_LOW_STATES], memory, before))[3:6]
     restless = unsettled * ca.exp(-dt / number["settle"]) + jump
-    wave, wave_noise = _waves(number, dt)
-    ahead = ca.vertcat(low, wave @ x[LOW:])
-    spread = ca.diagcat(_growth(number, x[2], restless, dt), wave_noise)
+    wave, wave_noise = _wave_transition(number, dt)
+    ahead = ca.vertcat(low, wave @ x[NUM_LOW_STATES:])
+    spread = ca.diagcat(_covariance_growth(number, x[2], restless, dt), wave_noise)
     slope = ca.jacobian(ahead, x)
-    predicted = _symmetric(slope @ covariance @ slope.T + spread)
+    predicted = _symmetric_from_lower(slope @ covariance @ slope.T + spread)
     seen = SX.sym("seen", count)
-    output = _output(seen)
+    output = _measured_output(seen)
     rows = ca.substitute(ca.jacobian(output, seen), seen, ahead)
     output = ca.substitute(output, seen, ahead)
     after, left, likelihood = ahead, predicted, likelihood * ca.exp(-dt / number["memory"])
@@ -250,7 +279,7 @@ def filter_function(model: Dynamics) -> ca.Function:
     for i in range(6):  # one at a time: independent noise, and no matrix to invert
         given = ca.fabs(measured[i]) < np.inf  # false for NaN; x == x would be simplified away
         innovation = ca.if_else(given, measured[i], output[i]) - output[i]
-        if MEASURED[i] == "psi":  # a compass counts from 0 again
+        if MEASURED_MOTION[i] == "psi":  # a compass counts from 0 again
             innovation -= 2 * np.pi * ca.floor(innovation / (2 * np.pi) + 0.5)
         innovations.append(innovation)
         spreads.append(rows[i, :] @ predicted @ rows[i, :].T + noise[i] ** 2)
@@ -259,14 +288,14 @@ def filter_function(model: Dynamics) -> ca.Function:
         surprise = innovation - rows[i, :] @ (after - ahead)
         square = surprise**2 / variance
         share = ca.if_else(ca.logic_and(given, square < SPIKE**2), 1 / variance, 0)
-        after, left = after + column * (share * surprise), _symmetric(left - column @ column.T * share)
+        after, left = after + column * (share * surprise), _symmetric_from_lower(left - column @ column.T * share)
         likelihood -= ca.if_else(given, (ca.fmin(square, SPIKE**2) + ca.log(variance)) / 2, 0)
     left = ca.reshape(ca.densify(left), -1, 1)
     packed_after = ca.vertcat(after, left, reached, restless, commands, likelihood)
     return ca.Function(
         "observer_filter",
         [state, commands, environment, parameters, measured, noise, numbers, dt],
-        [packed_after, after[:LOW], ca.vertcat(*innovations), ca.vertcat(*spreads)],
+        [packed_after, after[:NUM_LOW_STATES], ca.vertcat(*innovations), ca.vertcat(*spreads)],
         ["state", "commands", "environment", "parameters", "measured", "noise", "numbers", "dt"],
         ["after", "estimate", "innovation", "spread"],
         {"cse": True},
@@ -285,12 +314,12 @@ def filters_function(model: Dynamics, num_filters: int) -> ca.Function:
 
 @lru_cache(maxsize=16)
 def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
-    """The whole observer's step as a pure function of CasADi, for K filters: `observe` and exports in C do the same.
+    """The whole observer's step as a pure function of CasADi, for K filters: `run_observer` and exports in C do the same.
 
     (states (n, K), commands, environment, parameters, measured, noise, numbers (., K), dt) -> (states, estimate (11,),
     innovation (6,), spread (6,), weights (K,)); estimates are means by the weights, the innovation that of the mixture.
     A dt beyond `Bank.longest` is to be divided by `Bank.parts`: call it for each part, with NaN for the measurement in
-    all but the last. After a pause beyond `Bank.pause` take the states of `begin`.
+    all but the last. After a pause beyond `Bank.pause` take the states of `first_filter_states`.
     """
     one = filter_function(model)
     inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
@@ -298,41 +327,41 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
     after, estimate, innovation, spread = filters_function(model, num_filters)(*inputs)
     sound = ca.sum1(ca.fabs(after) < DIVERGED) > after.size1() - 0.5  # false for what is not a number, too
-    after = _finite(after)
+    after = _bounded_expression(after)
     likelihood = after[-1, :] * sound - DIVERGED * (1 - sound)
     weights = ca.exp(likelihood - ca.mmax(likelihood)).T
     weights = weights / ca.sum1(weights)
     best = likelihood == ca.mmax(likelihood)
     likely = after @ (best / ca.sum2(best)).T
     after = after * ca.repmat(sound, after.size1(), 1) + likely @ (1 - sound)  # a filter that diverged begins again
-    results = [after, *(_finite(part) @ weights for part in (estimate, innovation, spread)), weights]
+    results = [after, *(_bounded_expression(part) @ weights for part in (estimate, innovation, spread)), weights]
     names = [one.name_in(i) for i in range(one.n_in())]
     return ca.Function("observer", inputs, results, names, ["after", "estimate", "innovation", "spread", "weights"])
 
 
-def _finite(matrix: ca.MX) -> ca.MX:
+def _bounded_expression(matrix: ca.MX) -> ca.MX:
     """The matrix within +-DIVERGED; what is not a number becomes a bound, since fmax and fmin leave NaN out."""
     return ca.fmin(ca.fmax(matrix, -DIVERGED), DIVERGED)
 
 
-def _symmetric(matrix: SX) -> SX:
+def _symmetric_from_lower(matrix: SX) -> SX:
     """The lower triangle on both sides: the other half is never computed."""
     return ca.tril2symm(ca.tril(matrix))
 
 
-def sizes(model: Dynamics) -> tuple[int, ...]:
+def filter_state_sizes(model: Dynamics) -> tuple[int, ...]:
     """Lengths of what a filter's state packs: x, P, memory, unsettled, commands before, log-likelihood."""
-    return len(STATES), len(STATES) ** 2, len(model.memory), 3, len(model.commands), 1
+    return len(FILTER_STATES), len(FILTER_STATES) ** 2, len(model.memory), 3, len(model.commands), 1
 
 
-def _rates(model: Dynamics, low: SX, memory: SX, commands: SX, environment: SX, parameters: SX) -> SX:
+def _low_rates(model: Dynamics, low: SX, memory: SX, commands: SX, environment: SX, parameters: SX) -> SX:
     """d(low)/dt (11): the vessel's equations in water that moves with the current."""
     psi, r, north, east = low[2], low[5], low[9], low[10]
     c, s = ca.cos(psi), ca.sin(psi)
     u_c, v_c = c * north + s * east, c * east - s * north
     names = dict(zip(model.environment, ca.vertsplit(environment) if model.environment else [], strict=True))
     if "V_w" in names:
-        ahead = names["V_w"] * ca.cos(names["beta_w"]) - north + CALM
+        ahead = names["V_w"] * ca.cos(names["beta_w"]) - north + CALM_WIND
         across = names["V_w"] * ca.sin(names["beta_w"]) - east
         names |= {"V_w": ca.sqrt(ahead**2 + across**2), "beta_w": ca.atan2(across, ahead)}
     names |= {name: SX(0) for name in ("V_c", "beta_c") if name in names}
@@ -346,7 +375,7 @@ def _rates(model: Dynamics, low: SX, memory: SX, commands: SX, environment: SX, 
     )
 
 
-def _growth(number: Mapping[str, SX], psi: SX, restless: SX, dt: SX) -> SX:
+def _covariance_growth(number: Mapping[str, SX], psi: SX, restless: SX, dt: SX) -> SX:
     """Covariance (11, 11) that white accelerations, changing forces and currents add in dt."""
     turn = SX(3, 3)
     turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1], turn[2, 2] = ca.cos(psi), -ca.sin(psi), ca.sin(psi), ca.cos(psi), 1
@@ -358,7 +387,7 @@ def _growth(number: Mapping[str, SX], psi: SX, restless: SX, dt: SX) -> SX:
     return ca.diagcat(moving, force * dt, SX.eye(2) * number["current"] ** 2 * dt)
 
 
-def _waves(number: Mapping[str, SX], dt: SX) -> tuple[SX, SX]:
+def _wave_transition(number: Mapping[str, SX], dt: SX) -> tuple[SX, SX]:
     """Exact transition (6, 6) of the three wave oscillators in dt, and the covariance that keeps them stationary."""
     omega, zeta = number["omega"], number["zeta"]
     damped = omega * ca.sqrt(1 - zeta**2)
@@ -372,26 +401,26 @@ def _waves(number: Mapping[str, SX], dt: SX) -> tuple[SX, SX]:
     return transition, steady - transition @ steady @ transition.T
 
 
-def _output(x: SX) -> SX:
+def _measured_output(x: SX) -> SX:
     """The measurement (6) of a state."""
     c, s = ca.cos(x[2]), ca.sin(x[2])
     return ca.vertcat(x[0] + c * x[11] - s * x[12], x[1] + s * x[11] + c * x[12], x[2] + x[13], x[3:6] + x[14:17])
 
 
-def begin(filters: Bank, measured: Array, commands: Array) -> Array:
+def first_filter_states(filters: FilterBank, measured: Array, commands: Array) -> Array:
     """States (n, K) at the first instant: measured (6,) and commands (nc,), which every actuator has reached.
 
     What is missing (NaN) is zero with a wide spread.
     """
     model, wide = filters.model, np.array([1e3, 1e3, np.pi, 5.0, 1.0, 0.1])
-    missing = ~np.isfinite(measured) | ~np.isin(MEASURED, filters.settings.measured)
-    x = np.zeros(len(STATES))
+    missing = ~np.isfinite(measured) | ~np.isin(MEASURED_MOTION, filters.settings.measured)
+    x = np.zeros(len(FILTER_STATES))
     x[:6] = np.where(missing, 0.0, measured)
     memory = np.asarray(commands)[[model.commands.index(name) for name in model.memory]]
     columns = []
     for first in filters.first:
         deviations = first.copy()
-        motion = np.hypot(2 * filters.noise, first[LOW:])
+        motion = np.hypot(2 * filters.noise, first[NUM_LOW_STATES:])
         deviations[:6] = np.where(missing, wide, motion)
         columns.append(np.concatenate([x, np.diag(deviations**2).ravel(), memory, np.zeros(3), commands, [0.0]]))
     return np.stack(columns, axis=1)
@@ -416,7 +445,7 @@ class Estimates:
     @property
     def age(self) -> Array:
         """Time [s] since the observer began, (N,): `observer.age`."""
-        return self.columns[AGE]
+        return self.columns[AGE_COLUMN]
 
     def select(self, rows: Array) -> Estimates:
         """Estimates at some rows: a mask or indices."""
@@ -424,7 +453,7 @@ class Estimates:
         return Estimates(columns, *(part[rows] for part in (self.innovation, self.spread, self.weights)))
 
 
-def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
+def run_observer(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
     """Run the observer along every unbroken stretch of a dataset, all of them together.
 
     It begins anew after a pause in the rows of more than 6 sqrt(L / g), as the recorder of exported C does. Wind that
@@ -433,7 +462,7 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
     the dataset lacks, DataError for rows hours apart.
     """
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
-    filters, frame = bank(vessel, settings), dataset.frame
+    filters, frame = filter_bank(vessel, settings), dataset.frame
     model = filters.model
     missing = next((name for name in model.commands if name not in frame), None)
     if missing is not None:
@@ -451,17 +480,21 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
         np.array([table.get(name, zero) for name in names]).reshape(-1, len(frame)).T
         for names in (model.commands, model.environment)  # a ship adrift has no commands
     )
-    measured = np.stack([table[name] for name in MEASURED], axis=1)
-    measured[:, [name not in filters.settings.measured for name in MEASURED]] = np.nan
+    measured = np.stack([table[name] for name in MEASURED_MOTION], axis=1)
+    measured[:, [name not in filters.settings.measured for name in MEASURED_MOTION]] = np.nan
     noise = np.tile(filters.noise, (len(frame), 1))
     for name, column in STANDARD_DEVIATIONS.items():
         if column in table:
-            noise[:, MEASURED.index(name)] = np.hypot(noise[:, MEASURED.index(name)], table[column])
+            noise[:, MEASURED_MOTION.index(name)] = np.hypot(noise[:, MEASURED_MOTION.index(name)], table[column])
     count = filters.num_filters
     innovation, spread = np.full((len(frame), 6), np.nan), np.full((len(frame), 6), np.nan)
-    estimate, weights, age = np.zeros((len(frame), LOW)), np.full((len(frame), count), 1 / count), np.zeros(len(frame))
+    estimate, weights, age = (
+        np.zeros((len(frame), NUM_LOW_STATES)),
+        np.full((len(frame), count), 1 / count),
+        np.zeros(len(frame)),
+    )
     starts = np.array([rows[0] for rows in places])
-    states = np.concatenate([begin(filters, measured[row], commands[row]) for row in starts], axis=1)
+    states = np.concatenate([first_filter_states(filters, measured[row], commands[row]) for row in starts], axis=1)
     estimate[starts, :6] = np.where(np.isnan(measured[starts]), 0.0, measured[starts])
     values = np.array(list(vessel.parameters.values()))
     step = map_over_samples(filter_function(model), calls * len(frame) * count, shared=["parameters"])
@@ -475,30 +508,30 @@ def observe(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, 
         each = (np.repeat(part[rows].T, count, axis=1) for part, rows in ((commands, past), (weather, past)))
         seen = (np.repeat(part[now].T, count, axis=1) for part in (measured, noise))
         given = (*each, values, *seen, np.tile(filters.numbers.T, (1, going)))
-        results = _divided(step, filters, states[:, : going * count], given, np.repeat(dt, count))
-        states, estimate[now], innovation[now], spread[now], weights[now] = _mixed(results, count)
+        results = _step_in_parts(step, filters, states[:, : going * count], given, np.repeat(dt, count))
+        states, estimate[now], innovation[now], spread[now], weights[now] = _mix_filters(results, count)
         innovation[now] = np.where(np.isnan(measured[now]), np.nan, innovation[now])
         age[now] = age[past] + dt
-    columns = {f"observer.{name}": estimate[:, i] for i, name in enumerate(COLUMNS)}
+    columns = {f"observer.{name}": estimate[:, i] for i, name in enumerate(ESTIMATE_COLUMNS)}
     with np.errstate(invalid="ignore"):
         squares = innovation**2 / spread
         given = squares < SPIKE**2  # false for NaN, and for a fault of the log, which moves nothing
     columns["observer.test"] = np.where(given, squares, 0.0).sum(axis=1) / np.maximum(given.sum(axis=1), 1)
-    columns[AGE] = age
+    columns[AGE_COLUMN] = age
     return Estimates(columns, innovation, spread, weights)
 
 
-def _check_intervals(dataset: Dataset, filters: Bank, places: Sequence[NDArray[np.intp]]) -> None:
+def _check_intervals(dataset: Dataset, filters: FilterBank, places: Sequence[NDArray[np.intp]]) -> None:
     """DataError where rows that are no pause lie so far apart that the filters would take all day between them."""
     t = dataset.frame["t"].to_numpy()
     apart = max((float(np.max(np.diff(t[rows]), initial=0.0)) for rows in places), default=0.0)
-    if apart > MOST_PARTS * filters.longest:
-        limit = f"the observer takes rows of {filters.vessel.name} at most {MOST_PARTS * filters.longest:.3g} s apart"
+    if apart > MOST_FILTER_STEPS * filters.longest:
+        limit = f"the observer takes rows of {filters.vessel.name} at most {MOST_FILTER_STEPS * filters.longest:.3g} s apart"
         raise DataError(f"rows are up to {apart:.3g} s apart: {limit}; is the unit of the clock right?", path="t")
 
 
-def _divided(
-    step: Callable[..., list[Array]], filters: Bank, states: Array, given: Sequence[Array], dt: Array
+def _step_in_parts(
+    step: Callable[..., list[Array]], filters: FilterBank, states: Array, given: Sequence[Array], dt: Array
 ) -> list[Array]:
     """What `step` gives after dt (S,), in the parts that the filters take; `given` as by `filter_function`.
 
@@ -513,7 +546,7 @@ def _divided(
     return step(states, *given, (dt / parts)[None])
 
 
-def _mixed(results: Sequence[Array], count: int) -> tuple[Array, ...]:
+def _mix_filters(results: Sequence[Array], count: int) -> tuple[Array, ...]:
     """What K = `count` filters of every stretch know together: the rule of `observer_function`, in NumPy.
 
     results : of the filters, (., R K) each, those of a stretch side by side. Returns states (n, R K), then estimate,
@@ -525,19 +558,19 @@ def _mixed(results: Sequence[Array], count: int) -> tuple[Array, ...]:
     weights = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     if not sound.all():  # a filter that diverged begins again from the likeliest
-        after = _bounded(after)
+        after = _bounded_array(after)
         best = likelihood == likelihood.max(axis=1, keepdims=True)
         after = np.where(sound, after, (after * best / best.sum(axis=1, keepdims=True)).sum(axis=2, keepdims=True))
-    means = (np.einsum("irk,rk->ri", _bounded(part), weights) for part in parts)
+    means = (np.einsum("irk,rk->ri", _bounded_array(part), weights) for part in parts)
     return (after.reshape(len(after), -1), *means, weights)
 
 
-def _bounded(values: Array) -> Array:
-    """The values within +-DIVERGED; what is not a number becomes a bound, as by `_finite`."""
+def _bounded_array(values: Array) -> Array:
+    """The values within +-DIVERGED; what is not a number becomes a bound, as by `_bounded_expression`."""
     return np.asarray(np.fmin(np.fmax(values, -DIVERGED), DIVERGED))
 
 
-def tau_extra(filters: Bank, columns: Mapping[str, Array], horizon: int, step: float) -> Array:
+def fading_force(filters: FilterBank, columns: Mapping[str, Array], horizon: int, step: float) -> Array:
     """Slow force (T, S, 3) [N, N m] over a horizon of T steps, fading from its estimate in `columns` (S,)."""
     now = np.stack([columns[f"observer.{name}"] for name in "XYN"], axis=1) @ filters.mass.T
     ages = (np.arange(horizon) + 0.5) * step
@@ -567,7 +600,7 @@ def moves_start(settings: Observer, path: PathSource) -> bool:
 
 
 def observed_start(
-    filters: Bank,
+    filters: FilterBank,
     columns: Mapping[str, Array],
     horizon: int,
     step: float,
@@ -582,7 +615,7 @@ def observed_start(
     """
     model, zero = filters.model, np.zeros(len(columns["u"]))
     begun: dict[str, Array] = {**columns}
-    begun |= {name: columns[f"observer.{name}"] for name in MEASURED}
+    begun |= {name: columns[f"observer.{name}"] for name in MEASURED_MOTION}
     if not moves_start(filters.settings, path):
         begun |= {name: columns.get(name, zero) for name in ("north", "east")}
     north, east, psi = columns["observer.current_north"], columns["observer.current_east"], begun["psi"]
@@ -594,10 +627,10 @@ def observed_start(
         ahead, across = V_w * np.cos(beta_w) - north, V_w * np.sin(beta_w) - east
         environment |= {"V_w": np.hypot(ahead, across), "beta_w": np.arctan2(across, ahead)}
     environment |= {name: zero for name in ("V_c", "beta_c") if name in environment}
-    return ObservedStart(begun, environment, tau_extra(filters, columns, horizon, step), np.stack([north, east]))
+    return ObservedStart(begun, environment, fading_force(filters, columns, horizon, step), np.stack([north, east]))
 
 
-def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
+def estimates_at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:
     """Columns of windows, with the estimates `observer.*` (S,) of the last row at or before each instant.
 
     `estimates` are of the rows of `dataset`. The heading counts full turns as that of the windows does.
@@ -610,7 +643,7 @@ def at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict
         rows, chosen = np.flatnonzero(names == run), windows.run == run
         index[chosen] = rows[np.searchsorted(t[rows], windows.t[chosen] + clock_slack(t[rows]), side="right") - 1]
     known = {name: values[index] for name, values in estimates.columns.items()}
-    known[AGE] = known[AGE] + windows.t - t[index]
+    known[AGE_COLUMN] = known[AGE_COLUMN] + windows.t - t[index]
     turns = np.round((windows.columns["psi"] - known["observer.psi"]) / (2 * np.pi))
     return {**windows.columns, **known, "observer.psi": known["observer.psi"] + 2 * np.pi * turns}
 
@@ -650,8 +683,8 @@ def tune_observer(
         return float(np.where(np.isfinite(each), each, DIVERGED).mean())
 
     def faded(given: Observer, label: str) -> tuple[float, Observer]:
-        alike = samples / bank(vessel, given).num_filters  # the fewer the filters, the smaller the call
-        columns = at_windows(dataset, observe(vessel, dataset, given, calls=alike), windows)
+        alike = samples / filter_bank(vessel, given).num_filters  # the fewer the filters, the smaller the call
+        columns = estimates_at_windows(dataset, run_observer(vessel, dataset, given, calls=alike), windows)
         options = [given.model_copy(update={"fade": fade}) for fade in dict.fromkeys((given.fade, *FADES))]
         losses = [loss(one, columns) for one in options]
         tried.update({f"{label}, fade {one.fade}": each for one, each in zip(options, losses, strict=True)})
@@ -660,7 +693,7 @@ def tune_observer(
 
     waves, change = ([(one,) for one in several] if len(several) > 1 else [] for several in (first.waves, first.change))
     levels: dict[str, Sequence[Any]] = {"waves": waves, "current": (0.0,), "change": change}
-    samples = (1 + sum(map(len, levels.values()))) * bank(vessel, first).num_filters
+    samples = (1 + sum(map(len, levels.values()))) * filter_bank(vessel, first).num_filters
     least, best = faded(first, "as given")
     for name, values in levels.items():
         begun = best

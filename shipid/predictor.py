@@ -35,7 +35,7 @@ from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, 
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.metrics import vector_lengths
-from shipid.observer import AGE, Observer
+from shipid.observer import AGE_COLUMN, Observer
 from shipid.physics.signals import SIGNALS, measurable_signals
 from shipid.simulation.log import state_column
 from shipid.units import percent_text
@@ -47,11 +47,11 @@ Array = np.ndarray
 FORMAT = 5
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
 BANDS = "bands."  # before the names of arrays of a band in a saved predictor
-MOST_STEPS = 100_000  # of a horizon and of a past
-NAMES = ("commands", "names", "modules")  # keys of lists of names in the headers of correctors and bands
+MOST_HORIZON_STEPS = 100_000  # of a horizon and of a past
+KEYS_OF_NAMES = ("commands", "names", "modules")  # keys of lists of names in the headers of correctors and bands
 
 
-class Banded(NamedTuple):
+class BandedPrediction(NamedTuple):
     """A prediction with its band.
 
     paths : (T, S, 2) [m] in the frame (11). region : around every step, see `shipid.hybrid.bands.Region`.
@@ -120,7 +120,7 @@ class Predictor:
         level: float,
         pointwise: bool = False,
         kind: str | None = None,
-    ) -> Banded: ...
+    ) -> BandedPrediction: ...
 
     def predict(
         self,
@@ -130,7 +130,7 @@ class Predictor:
         level: float | None = None,
         pointwise: bool = False,
         kind: str | None = None,
-    ) -> Array | Banded:
+    ) -> Array | BandedPrediction:
         """Return paths (T, S, 2) [m] in the frame (11); with a level, also the band around them.
 
         They are not numbers where a column that training or the vessel takes is none, at the instant, in the past that
@@ -175,7 +175,7 @@ class Predictor:
             predicted[:, lost] = np.nan
         if level is None:
             return predicted
-        return Banded(
+        return BandedPrediction(
             predicted,
             self.band(predicted, instants, level, pointwise=pointwise, kind=kind),
             self.outside({**instants.columns, **instants.estimates}),
@@ -194,7 +194,7 @@ class Predictor:
 
     def check_level(self, level: float, kind: str | None = None) -> Bands:
         """Return the bands; DataError, one sentence, where there are none of this level."""
-        return checked_bands(self.bands, self.no_band, level, kind)
+        return check_bands(self.bands, self.no_band, level, kind)
 
     def alone(self, instants: Instants) -> Array:
         """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for no physics."""
@@ -277,7 +277,7 @@ class Predictor:
                 (low, high), values = widen_range(*ends), as_float_array(name, columns[name], DataError)
                 outside |= ~((values >= low) & (values <= high))
         if self.run_up > 0:
-            age = as_float_array(AGE, columns.get(AGE, np.zeros(len(outside))), DataError)
+            age = as_float_array(AGE_COLUMN, columns.get(AGE_COLUMN, np.zeros(len(outside))), DataError)
             outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)
         return outside
 
@@ -330,8 +330,8 @@ class Predictor:
             json.dumps(header)
         except (TypeError, ValueError) as error:
             raise DataError(f"{wrong} ({error})") from None
-        if not _named(header):
-            raise DataError(f"the header {what}: {' and '.join(NAMES)} must be lists of texts")
+        if not _names_are_texts(header):
+            raise DataError(f"the header {what}: {' and '.join(KEYS_OF_NAMES)} must be lists of texts")
         if not isinstance(given, Mapping):
             raise DataError(f"the arrays {what} must be a table, not {type(given).__name__}")
         try:
@@ -399,7 +399,7 @@ class Predictor:
         fault = _fault_of(arrays)
         if fault:
             raise ResultError(f"damaged: {fault}: run the study again", file=file)
-        if not _named([header.get("corrector"), header.get("bands")]):
+        if not _names_are_texts([header.get("corrector"), header.get("bands")]):
             raise ResultError("damaged: run the study again", file=file)
         try:
             known, vessel = _Header.model_validate(header), header["vessel"]
@@ -422,8 +422,8 @@ class Predictor:
                 bands=bands,
                 run_up=known.run_up,
             )
-            if not 0 <= loaded.past <= MOST_STEPS:
-                raise ResultError(f"damaged: a past of {loaded.past} steps: 0 to {MOST_STEPS}")
+            if not 0 <= loaded.past <= MOST_HORIZON_STEPS:
+                raise ResultError(f"damaged: a past of {loaded.past} steps: 0 to {MOST_HORIZON_STEPS}")
             return loaded
         except ResultError as error:
             raise ResultError(error.message, file=file, path=error.path) from None
@@ -465,7 +465,7 @@ def _as_numbers(instants: Instants) -> Instants:
 class _Header(BaseModel):
     """Further fields of the header of a predictor (besides vessel, observer and method), with their types."""
 
-    horizon: Annotated[int, Field(ge=1, le=MOST_STEPS)]
+    horizon: Annotated[int, Field(ge=1, le=MOST_HORIZON_STEPS)]
     step: Annotated[float, Field(gt=0, le=1e4)]
     integrator: Integrator
     commands: Commands
@@ -476,15 +476,15 @@ class _Header(BaseModel):
     run_up: Annotated[float, Field(ge=0, le=1e9)] = 0.0
 
 
-def _named(header: Any) -> bool:
+def _names_are_texts(header: Any) -> bool:
     """Whether all lists of names in a part of the header of a predictor hold texts, at any depth."""
     if isinstance(header, list):
-        return all(map(_named, header))
+        return all(map(_names_are_texts, header))
     if not isinstance(header, dict):
         return True
-    lists = [header[key] for key in NAMES if key in header]
+    lists = [header[key] for key in KEYS_OF_NAMES if key in header]
     texts = all(isinstance(one, list) and all(isinstance(name, str) for name in one) for one in lists)
-    return texts and all(_named(value) for key, value in header.items() if key not in NAMES)
+    return texts and all(_names_are_texts(value) for key, value in header.items() if key not in KEYS_OF_NAMES)
 
 
 def _fault_of(arrays: Mapping[str, Array]) -> str:
@@ -553,7 +553,7 @@ def fit(
     task = Task(
         cases={name: Case(physics, paths)},
         windows=windows,
-        folds=_folds(method, windows, validation_runs, seed) if method.compensates else (),
+        folds=_split_folds(method, windows, validation_runs, seed) if method.compensates else (),
         commands=tuple(windows.planned),
         known=commands == "known",
         seed=seed,
@@ -565,7 +565,7 @@ def fit(
     limits = limits_of(windows, windows.planned)
     provenance: dict[str, Any] = {"runs": list(windows.spans), "seed": seed}
     if left_out is None and refits:
-        left_out = _refitted(method, physics, windows, refits, commands, seed)
+        left_out = _errors_of_refits(method, physics, windows, refits, commands, seed)
     bands, reason = bands_of(left_out, windows, limits, kinds)
     if bands is None:
         provenance["no_band"] = reason
@@ -588,7 +588,9 @@ def _check_fit(method: Method, kind: str, physics: Physics, windows: Windows) ->
         check_columns(physics.vessel, windows.columns, "the windows")
 
 
-def _refitted(method: Method, physics: Physics, windows: Windows, refits: int, commands: Commands, seed: int) -> Array:
+def _errors_of_refits(
+    method: Method, physics: Physics, windows: Windows, refits: int, commands: Commands, seed: int
+) -> Array:
     """Errors (T, S, 2) [m] of further fits, each on the runs that it leaves out; not numbers where there are none."""
     left_out = np.full_like(windows.future, np.nan)
     for training, judged in refit_folds(windows, refits, seed):
@@ -614,7 +616,7 @@ def _read_bands(header: Any, arrays: dict[str, Array]) -> Bands | None:
     return None if header is None else Bands.from_arrays(header, taken)
 
 
-def checked_bands(bands: Bands | None, reason: str, level: float, kind: str | None = None) -> Bands:
+def check_bands(bands: Bands | None, reason: str, level: float, kind: str | None = None) -> Bands:
     """Return the bands; DataError, one sentence, where there are none, for a reason, or none of this level."""
     if bands is None:
         raise DataError(f"{NO_BAND}{reason}")
@@ -660,7 +662,7 @@ def limits_of(windows: Windows, commands: Iterable[str]) -> dict[str, tuple[floa
     return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 
-def _folds(
+def _split_folds(
     method: Method, windows: Windows, validation_runs: Iterable[str] | None, seed: int
 ) -> list[tuple[Index, Index]]:
     """(Training, validation) indices of windows, split by run: as the method wants, or with the named runs."""

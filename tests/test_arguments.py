@@ -15,7 +15,7 @@ from shipid.arguments import as_float_array, as_names, check_number, check_posit
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
 from shipid.hybrid.alone import Unchanged
-from shipid.observer import bank, observe
+from shipid.observer import filter_bank, run_observer
 from shipid.vessel.dynamics import vessel_dynamics
 
 
@@ -181,9 +181,9 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: PREDICTOR.outside({"u": np.zeros(3), "v": np.zeros(2)}),
         r"v: must be \(S,\), a value for each",
     ),
-    "observe": (lambda: observe(SHIP, ANY), "dataset must be a Dataset, as of"),
-    "bank": (lambda: bank(SHIP, {"fade": 0.0}), "settings must be an Observer, such as"),  # type: ignore[arg-type]
-    "bank of a name": (lambda: bank("mariner"), "vessel must be a Vessel, as of"),  # type: ignore[arg-type]
+    "observe": (lambda: run_observer(SHIP, ANY), "dataset must be a Dataset, as of"),
+    "bank": (lambda: filter_bank(SHIP, {"fade": 0.0}), "settings must be an Observer, such as"),  # type: ignore[arg-type]
+    "bank of a name": (lambda: filter_bank("mariner"), "vessel must be a Vessel, as of"),  # type: ignore[arg-type]
     "position_error": (lambda: shipid.position_error(np.zeros(2), np.zeros(3)), "paths must both be"),
     "a wind": (lambda: roll(environment={"V_wind": np.zeros(1)}), "environment: .* has no 'V_wind'"),
     "keep": (lambda: roll(keep=3), "keep must be a name, or several names, not 3"),

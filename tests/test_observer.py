@@ -27,24 +27,24 @@ from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.observer import (
-    AGE,
-    COLUMNS,
-    LOW,
-    MEASURED,
-    NUMBERS,
-    STATES,
+    AGE_COLUMN,
+    ESTIMATE_COLUMNS,
+    FILTER_NUMBERS,
+    FILTER_STATES,
+    MEASURED_MOTION,
+    NUM_LOW_STATES,
     Estimates,
     Observer,
-    _growth,
-    _rates,
-    _waves,
-    at_windows,
-    bank,
-    begin,
+    _covariance_growth,
+    _low_rates,
+    _wave_transition,
+    estimates_at_windows,
+    fading_force,
+    filter_bank,
     filter_function,
-    observe,
+    first_filter_states,
     observer_function,
-    tau_extra,
+    run_observer,
     tune_observer,
 )
 from shipid.predictor import Predictor
@@ -70,9 +70,9 @@ def calm() -> World:
 def test_moving_water_gives_the_equations_of_the_current_block() -> None:
     vessel = load_vessel("gunnerus-28.9").with_values({"current.kind": "uniform"})
     model, rng = vessel_dynamics(vessel), np.random.default_rng(1)
-    low, orders = SX.sym("low", LOW), SX.sym("orders", len(model.commands))
+    low, orders = SX.sym("low", NUM_LOW_STATES), SX.sym("orders", len(model.commands))
     weather, values = SX.sym("weather", len(model.environment)), SX(list(vessel.parameters.values()))
-    ours = ca.Function("f", [low, orders, weather], [_rates(model, low, SX(0, 1), orders, weather, values)])
+    ours = ca.Function("f", [low, orders, weather], [_low_rates(model, low, SX(0, 1), orders, weather, values)])
     for _ in range(5):
         motion = rng.uniform([-9, -9, -3, 0, -1, -0.1], [9, 9, 3, 5, 1, 0.1])
         speed, towards = rng.uniform(0.1, 1.0), rng.uniform(0, 6)
@@ -89,13 +89,13 @@ def test_one_step_is_finite_and_leaves_a_covariance(bundled_vessel: Vessel) -> N
     model = vessel_dynamics(bundled_vessel)
     if model.num_dof != 3:
         with pytest.raises(DocumentError, match="observer takes 3"):
-            bank(bundled_vessel)
+            filter_bank(bundled_vessel)
         return
-    filters = bank(bundled_vessel)
-    count, n = filters.num_filters, len(STATES)
+    filters = filter_bank(bundled_vessel)
+    count, n = filters.num_filters, len(FILTER_STATES)
     orders = np.full(len(model.commands), 0.3)
     for measured in (np.zeros(6), np.full(6, np.nan), np.array([0, np.nan, 0.1, 1.0, 0.0, np.nan])):
-        states = begin(filters, measured, orders)
+        states = first_filter_states(filters, measured, orders)
         for _ in range(5):
             values = np.array(list(bundled_vessel.parameters.values()))
             weather = np.zeros(len(model.environment))
@@ -116,7 +116,7 @@ def test_it_never_looks_ahead() -> None:
     run = frame[frame["run"] == "M000"].iloc[:40].reset_index(drop=True)
     changed = run.copy()
     changed.loc[25:, ["u", "v", "r", "north", "port.alpha"]] += 0.3
-    one, other = (observe(vessel, Dataset(rows, calm().data.metadata)).columns for rows in (run, changed))
+    one, other = (run_observer(vessel, Dataset(rows, calm().data.metadata)).columns for rows in (run, changed))
     for name, values in one.items():
         np.testing.assert_array_equal(values[:25], other[name][:25], err_msg=name)
     assert np.abs(one["observer.u"][25:] - other["observer.u"][25:]).max() > 0.01
@@ -126,12 +126,12 @@ def test_an_order_and_wind_act_from_their_row_on() -> None:
     """What is known at a row comes from those in force before it; the new ones move the ship after it."""
     frame, vessel = calm().data.frame, load_vessel("gunnerus-28.9")
     run = frame[frame["run"] == "M000"].iloc[:30].reset_index(drop=True)
-    one = observe(vessel, Dataset(run, calm().data.metadata)).columns
+    one = run_observer(vessel, Dataset(run, calm().data.metadata)).columns
     for change in ({"port.alpha": 0.3}, {"V_w": 5.0}):
         changed = run.copy()
         for name, more in change.items():
             changed.loc[25:, name] += more
-        other = observe(vessel, Dataset(changed, calm().data.metadata)).columns
+        other = run_observer(vessel, Dataset(changed, calm().data.metadata)).columns
         moved = np.any([np.abs(one[name] - other[name]) > 1e-9 for name in one], axis=0)
         assert np.flatnonzero(moved)[0] == 26, change
 
@@ -151,17 +151,24 @@ def test_an_order_and_wind_act_from_their_row_on() -> None:
 def test_a_setting_scales_what_it_names_and_nothing_else(change: dict[str, float], moved: dict[str, float]) -> None:
     vessel, plain = load_vessel("gunnerus-28.9"), Observer()
     other = Observer(**{name: factor * getattr(plain, name) for name, factor in change.items()})
-    before, after = bank(vessel, plain), bank(vessel, other)
-    for names, one, two in ((NUMBERS, before.numbers, after.numbers), (STATES, before.first, after.first)):
+    before, after = filter_bank(vessel, plain), filter_bank(vessel, other)
+    for names, one, two in (
+        (FILTER_NUMBERS, before.numbers, after.numbers),
+        (FILTER_STATES, before.first, after.first),
+    ):
         np.testing.assert_allclose(two, one * [moved.get(name, 1.0) for name in names], rtol=1e-12)
 
 
 @pytest.mark.parametrize("dt", [0.1, 0.8])
 def test_waves_are_the_oscillator_and_stay_as_high_as_they_are(dt: float) -> None:
     """xi'' + 2 zeta omega xi' + omega^2 xi = noise; steady velocities have the spread of the numbers."""
-    number = dict(zip(NUMBERS, ca.vertsplit(ca.DM(bank(load_vessel("gunnerus-28.9")).numbers[-1])), strict=True))
+    number = dict(
+        zip(FILTER_NUMBERS, ca.vertsplit(ca.DM(filter_bank(load_vessel("gunnerus-28.9")).numbers[-1])), strict=True)
+    )
     omega, zeta = float(number["omega"]), float(number["zeta"])
-    transition, noise = (np.array(ca.evalf(part)) for part in _waves({k: SX(v) for k, v in number.items()}, SX(dt)))
+    transition, noise = (
+        np.array(ca.evalf(part)) for part in _wave_transition({k: SX(v) for k, v in number.items()}, SX(dt))
+    )
     rate = np.kron([[0, 1], [-(omega**2), -2 * zeta * omega]], np.eye(3))
     np.testing.assert_allclose(transition, expm(rate * dt), atol=1e-12)
     speeds = np.array([float(number[f"wave_{name}"]) for name in "uvr"])
@@ -172,11 +179,13 @@ def test_waves_are_the_oscillator_and_stay_as_high_as_they_are(dt: float) -> Non
 
 def test_two_steps_add_the_uncertainty_of_one_twice_as_long() -> None:
     """White accelerations in axes of the ship: Q(2 dt) = F Q(dt) F^T + Q(dt), F moving the place by the velocities."""
-    number = {name: SX(0.1 * (i + 1)) for i, name in enumerate(NUMBERS)}
+    number = {name: SX(0.1 * (i + 1)) for i, name in enumerate(FILTER_NUMBERS)}
     psi, dt, restless = 0.7, 0.4, SX([0.2, 0.1, 0.3])
-    once, twice = (np.array(ca.evalf(ca.densify(_growth(number, SX(psi), restless, SX(k * dt))))) for k in (1, 2))
+    once, twice = (
+        np.array(ca.evalf(ca.densify(_covariance_growth(number, SX(psi), restless, SX(k * dt))))) for k in (1, 2)
+    )
     c, s = np.cos(psi), np.sin(psi)
-    move = np.eye(LOW)
+    move = np.eye(NUM_LOW_STATES)
     move[:3, 3:6] = dt * np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     np.testing.assert_allclose(twice, move @ once @ move.T + once, atol=1e-12)
     powers = [float(number[f"q_{k}"]) ** 2 + float(number["jump"] * restless[i]) ** 2 for i, k in enumerate("uvr")]
@@ -190,7 +199,9 @@ def test_what_is_known_badly_counts_little() -> None:
     bad = (run.index >= 5) & (run.index < 15)
     known = run.assign(std_u=np.where(bad, 1e6, 0.0))
     moved = known.assign(u=known["u"] + 3.0 * bad)
-    one, other = (observe(vessel, Dataset(log, calm().data.metadata)).columns["observer.v"] for log in (known, moved))
+    one, other = (
+        run_observer(vessel, Dataset(log, calm().data.metadata)).columns["observer.v"] for log in (known, moved)
+    )
     np.testing.assert_allclose(other, one, atol=1e-4)
 
 
@@ -203,9 +214,9 @@ def test_rows_far_apart_make_no_force_of_an_order() -> None:
     begun = {name: np.zeros(1) for name in vessel_dynamics(vessel).state} | {"u": np.full(1, 6.0)}
     fine = {name: np.repeat(values, 20)[:, None] for name, values in orders.items()}
     path = rollout(vessel, begun, fine, {}, step=step / 20, num_steps=20 * rows, every=20, method="rk4")
-    log = pd.DataFrame({name: path[name][:rows, 0, 0] for name in MEASURED} | orders)
+    log = pd.DataFrame({name: path[name][:rows, 0, 0] for name in MEASURED_MOTION} | orders)
     log = log.assign(run="a", t=step * np.arange(rows), flags=0)
-    seen = observe(vessel, Dataset(log, {"clock": "run", "flags": []})).columns
+    seen = run_observer(vessel, Dataset(log, {"clock": "run", "flags": []})).columns
     settled = slice(40, None)
     assert seen["observer.test"][settled].max() < 0.1  # by one step from row to row: 1.4
     assert np.abs(seen["observer.u"] - log["u"])[settled].max() < 0.003  # 0.016 m/s
@@ -218,24 +229,24 @@ def test_rows_hours_apart_are_refused() -> None:
     with pytest.raises(
         DataError, match=r"^t: rows are up to 3.6e\+03 s apart: .* at most 1.03e\+03 s apart; is the unit"
     ):
-        observe(load_vessel("gunnerus-28.9"), hourly)
+        run_observer(load_vessel("gunnerus-28.9"), hourly)
 
 
 def test_runs_together_are_runs_alone() -> None:
     vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
     short = frame[(frame["run"] != "M001") | (frame["t"] < 30)]
     short = short[short["t"] < 50].reset_index(drop=True)
-    together = observe(vessel, Dataset(short, calm().data.metadata)).columns["observer.Y"]
+    together = run_observer(vessel, Dataset(short, calm().data.metadata)).columns["observer.Y"]
     for run in ("M000", "M001"):
         rows = short[short["run"] == run]
-        alone = observe(vessel, Dataset(rows.reset_index(drop=True), calm().data.metadata)).columns["observer.Y"]
+        alone = run_observer(vessel, Dataset(rows.reset_index(drop=True), calm().data.metadata)).columns["observer.Y"]
         np.testing.assert_allclose(together[rows.index], alone, rtol=1e-6, atol=1e-12)
 
 
 @cache
 def estimated(name: str, made: Callable[[], World]) -> Estimates:
     """What the observer knows with a vessel's physics: the same whether later orders are known or not."""
-    return observe(physics((name,))[name], made().data)
+    return run_observer(physics((name,))[name], made().data)
 
 
 WRONG = ["nominal", "moderate-3", "moderate-10", "high-4"]
@@ -260,9 +271,9 @@ def test_in_calm_water_it_costs_two_per_cent_at_most(name: str, known: bool) -> 
 
 def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     vessel = load_vessel("gunnerus-28.9")
-    filters = bank(vessel)
+    filters = filter_bank(vessel)
     columns = {f"observer.{name}": np.array([x]) for name, x in zip("XYN", (0.01, -0.02, 0.001), strict=True)}
-    tau = tau_extra(filters, columns, 30, 1.0)
+    tau = fading_force(filters, columns, 30, 1.0)
     assert tau.shape == (30, 1, 3)
     assert tau[20, 0, 0] / tau[0, 0, 0] == pytest.approx(np.exp(-20.0 / filters.fade))
     model = vessel_dynamics(vessel)
@@ -277,7 +288,7 @@ def test_moving_water_carries_the_path_and_the_wind_along() -> None:
     """Galilei: ship, wind and water faster by one velocity make a path that goes with it, under the same force."""
     vessel, rng, count, horizon, step = load_vessel("gunnerus-28.9"), np.random.default_rng(5), 4, 20, 0.5
     water = np.array([[0.5], [-0.8]])
-    columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED, *vessel_dynamics(vessel).commands)}
+    columns = {name: rng.uniform(0.3, 1.5, count) for name in (*MEASURED_MOTION, *vessel_dynamics(vessel).commands)}
     columns |= {"u": rng.uniform(2, 4, count), "psi": rng.uniform(-3, 3, count), "r": rng.uniform(-0.05, 0.05, count)}
     wind = rng.uniform(-6, 6, (2, count))
     force = {f"observer.{name}": rng.uniform(-1e-3, 1e-3, count) for name in "XYN"}
@@ -287,7 +298,7 @@ def test_moving_water_carries_the_path_and_the_wind_along() -> None:
         moved = columns | {"u": columns["u"] + c * flow[0] + s * flow[1], "v": columns["v"] + c * flow[1] - s * flow[0]}
         north, east = wind + flow
         moved |= {"V_w": np.hypot(north, east), "beta_w": np.arctan2(east, north)}
-        seen = {f"observer.{name}": moved[name] for name in MEASURED} | force
+        seen = {f"observer.{name}": moved[name] for name in MEASURED_MOTION} | force
         seen |= {f"observer.current_{name}": flow[i] + np.zeros(count) for i, name in enumerate(("north", "east"))}
         paths = Physics(vessel, horizon, step, observer=Observer()).paths(Instants(moved, estimates=seen))
         x, y = np.moveaxis(paths, -1, 0)
@@ -303,11 +314,12 @@ def test_a_path_starts_where_it_is_compared(path: Literal["position", "velocity"
     """With `velocity` a path starts where the ship is; with `position`, where the observer believes her to be."""
     vessel, rng, count = load_vessel("gunnerus-28.9"), np.random.default_rng(4), 3
     motion = {
-        name: rng.uniform(low, low + 0.05, count) for name, low in zip(MEASURED, (-9, 4, 1, 3, 0, 0), strict=True)
+        name: rng.uniform(low, low + 0.05, count)
+        for name, low in zip(MEASURED_MOTION, (-9, 4, 1, 3, 0, 0), strict=True)
     }
     columns = motion | {name: rng.uniform(0.2, 0.5, count) for name in vessel_dynamics(vessel).commands}
     columns |= {"V_w": np.full(count, 5.0), "beta_w": rng.uniform(0, 6, count)}
-    seen = {f"observer.{name}": motion.get(name, 0.0) + rng.normal(0, 1e-4, count) for name in COLUMNS}
+    seen = {f"observer.{name}": motion.get(name, 0.0) + rng.normal(0, 1e-4, count) for name in ESTIMATE_COLUMNS}
     seen["observer.north"] = seen["observer.north"] + 2.0
     farther = seen | {"observer.north": seen["observer.north"] + 3.0}
     physics = Physics(vessel, 20, 1.0, observer=Observer(), path=path)
@@ -335,7 +347,7 @@ def test_tuning_takes_what_errs_least_by_the_paths_of_the_physics(commands: Lite
     chosen, tried = tune_observer(vessel, log, windows, paths, given)
 
     def error(settings: Observer) -> float:
-        estimates = at_instants(log, windows, observe(vessel, log, settings))
+        estimates = at_instants(log, windows, run_observer(vessel, log, settings))
         return float(position_error(paths(settings, estimates), windows.future).mean())
 
     assert not chosen.choose
@@ -371,13 +383,13 @@ def test_a_compass_counts_from_zero_again() -> None:
     logs = [log.frame.assign(psi=log.frame["psi"] + turn, north=north, east=east)]
     logs.append(logs[0].assign(psi=np.mod(logs[0]["psi"] + np.pi, 2 * np.pi) - np.pi))
     assert np.abs(np.diff(logs[1]["psi"])).max() > 6
-    (whole, around), windows = (observe(vessel, Dataset(frame, log.metadata)) for frame in logs), []
+    (whole, around), windows = (run_observer(vessel, Dataset(frame, log.metadata)) for frame in logs), []
     for name, values in whole.columns.items():
         full = 2 * np.pi if name == "observer.psi" else 0.0
         np.testing.assert_allclose(around.columns[name] + full, values, atol=1e-8, err_msg=name)
     for frame, estimates in zip(logs, (whole, around), strict=True):
         data = Dataset(frame.assign(psi=frame["psi"] + 4 * np.pi), log.metadata)
-        windows.append(at_windows(data, estimates, some_windows(data)))
+        windows.append(estimates_at_windows(data, estimates, some_windows(data)))
         np.testing.assert_allclose(windows[-1]["observer.psi"], windows[-1]["psi"], atol=0.1)
 
 
@@ -401,13 +413,13 @@ def test_a_band_is_promised_once_the_observer_has_run_as_long_as_in_training() -
     log = Dataset(log.frame.assign(flags=broken.astype(int)), {**log.metadata, "flags": ["break"]})
     windows, bands = cut_windows(log, horizon=8, interval=0.7), made(0)[1]
     physics = Physics(vessel, 8, 1.0, "rk4", Observer(waves=(0.0,), change=(1.0,)))
-    columns = at_windows(log, observe(vessel, log, physics.observer), windows)
+    columns = estimates_at_windows(log, run_observer(vessel, log, physics.observer), windows)
     predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-50.0, 50.0)}, bands=bands, run_up=9.0)
     since = windows.t - np.where((windows.run == "a") & (windows.t >= 20), 20.0, 0.0)
     prediction = predictor.predict(windows.instants(estimates=columns), level=0.5)
     np.testing.assert_array_equal(prediction.outside, since < 9.0 - 1e-3)
     assert 10 < prediction.outside.sum() < len(windows) - 10
-    nobody = {name: values for name, values in columns.items() if name != AGE}
+    nobody = {name: values for name, values in columns.items() if name != AGE_COLUMN}
     assert predictor.predict(windows.instants(estimates=nobody), level=0.5).outside.all()
 
 
@@ -416,7 +428,7 @@ def test_a_ship_adrift_is_observed_too() -> None:
     off = {f"thruster.{name}.off": True for name in vessel.document["thruster"]}
     adrift = vessel.with_values(off)
     assert not vessel_dynamics(adrift).commands
-    estimates = observe(adrift, log, Observer(waves=(0.0,), change=(1.0,)))
+    estimates = run_observer(adrift, log, Observer(waves=(0.0,), change=(1.0,)))
     assert all(np.isfinite(values).all() for values in estimates.columns.values())
 
 
@@ -424,7 +436,7 @@ def test_a_vessel_without_a_length_is_refused() -> None:
     vessel = load_vessel("gunnerus-28.9")
     document = {key: value for key, value in vessel.document.items() if key != "particulars"}
     with pytest.raises(DocumentError, match=r"has no particulars\.L_pp"):
-        bank(replace(vessel, document=document))
+        filter_bank(replace(vessel, document=document))
 
 
 def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -432,26 +444,26 @@ def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.Mon
     vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
     run = frame[frame["run"] == "M000"].iloc[:25].reset_index(drop=True)
     settings = Observer(waves=(0.01,), change=(2e-4, 1e9), measured=("north", "east", "psi", "u", "r"))
-    filters = bank(vessel, settings)  # half of them diverge at once
+    filters = filter_bank(vessel, settings)  # half of them diverge at once
     log = Dataset(run, calm().data.metadata)
     ways = []
     for from_here in (np.inf, 0.0):
         monkeypatch.setattr(samples, "COMPILE_FROM", from_here)
-        ways.append(observe(vessel, log, filters.settings))
+        ways.append(run_observer(vessel, log, filters.settings))
     one = filter_function(filters.model)
     assert find_compiler() is None or samples._compile_sample_function(one, ("parameters",)) is not None
     assert (ways[0].weights[1:, 2:] == 0).all()  # those that diverged
     step, model = observer_function(filters.model, filters.num_filters), filters.model
     orders, weather = run[list(model.commands)].to_numpy(), run[list(model.environment)].to_numpy()
-    measured, values = run[list(MEASURED)].to_numpy(), list(vessel.parameters.values())
-    measured[:, MEASURED.index("v")] = np.nan
-    states = begin(filters, measured[0], orders[0])
+    measured, values = run[list(MEASURED_MOTION)].to_numpy(), list(vessel.parameters.values())
+    measured[:, MEASURED_MOTION.index("v")] = np.nan
+    states = first_filter_states(filters, measured[0], orders[0])
     for k in range(1, len(run)):
         numbers = filters.numbers.T
         given = orders[k - 1], weather[k - 1], values, measured[k], filters.noise, numbers, 1.0
         states, estimate, innovation, _, weights = map(np.array, step(states, *given))
         for one in ways:
-            columns = [one.columns[f"observer.{name}"][k] for name in COLUMNS]
+            columns = [one.columns[f"observer.{name}"][k] for name in ESTIMATE_COLUMNS]
             np.testing.assert_allclose(columns, estimate[:, 0], rtol=1e-6, atol=1e-9)
             np.testing.assert_allclose(one.weights[k], weights[:, 0], atol=1e-6)
             seen = np.isfinite(measured[k])
@@ -459,10 +471,10 @@ def test_along_a_log_it_is_the_function_that_goes_aboard(monkeypatch: pytest.Mon
 
 
 def test_the_spread_of_an_innovation_is_that_of_the_state_and_of_the_sensor() -> None:
-    filters = bank(load_vessel("gunnerus-28.9"))
+    filters = filter_bank(load_vessel("gunnerus-28.9"))
     model = filters.model
     start = np.array([0.0, 0.0, 0.3, 4.0, 0.1, 0.0])
-    states = begin(filters, start, np.zeros(len(model.commands)))[:, 0]
+    states = first_filter_states(filters, start, np.zeros(len(model.commands)))[:, 0]
     given = [np.zeros(len(model.commands)), np.zeros(len(model.environment)), list(filters.vessel.parameters.values())]
     step, numbers = filter_function(model), filters.numbers[0]
     spreads = [np.array(step(states, *given, start, noise, numbers, 1.0)[3]).ravel() for noise in (0.0, 2.0, 3.0)]
@@ -472,7 +484,7 @@ def test_the_spread_of_an_innovation_is_that_of_the_state_and_of_the_sensor() ->
 
 
 def test_a_filter_takes_as_few_steps_between_rows_as_its_longest_step_allows() -> None:
-    filters = bank(load_vessel("gunnerus-28.9"))
+    filters = filter_bank(load_vessel("gunnerus-28.9"))
     steps = filters.longest * np.array([0.3, 1.0, 2.0, 2.5, 0.1 + 0.2, 3 * 1.1 / 1.1])
     assert filters.parts(steps).tolist() == [1, 1, 2, 3, 1, 3]
 
@@ -486,7 +498,7 @@ def test_a_spike_of_a_sensor_passes(name: str, wrong: float) -> None:
     run = frame[frame["run"] == "M000"].iloc[:60].reset_index(drop=True)
     spiked = run.copy()
     spiked.loc[30, name] += wrong
-    with_it, without = (observe(vessel, Dataset(log, sea().data.metadata)).columns for log in (spiked, run))
+    with_it, without = (run_observer(vessel, Dataset(log, sea().data.metadata)).columns for log in (spiked, run))
     for column, scale in (
         ("north", 1.0),
         ("east", 1.0),
@@ -504,7 +516,7 @@ def test_a_spike_of_a_sensor_passes(name: str, wrong: float) -> None:
 
 def test_unknown_noise_is_refused() -> None:
     with pytest.raises(DocumentError, match="no measured column"):
-        bank(load_vessel("gunnerus-28.9"), Observer(noise={"speed": 0.1}))
+        filter_bank(load_vessel("gunnerus-28.9"), Observer(noise={"speed": 0.1}))
 
 
 def test_interpolated_rows_hold_the_last_known_value() -> None:
@@ -528,7 +540,7 @@ def test_causal_columns_leaves_the_others() -> None:
     for name in ("north", "psi", "r", "port.n"):
         assert causal.frame[name].equals(data.frame[name])
     assert causal.metadata["causal"] == ["u", "v"]
-    assert set(MEASURED) <= set(causal.frame)
+    assert set(MEASURED_MOTION) <= set(causal.frame)
 
 
 def test_the_example_of_the_documentation_runs(tmp_path: Path) -> None:

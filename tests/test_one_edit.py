@@ -22,7 +22,7 @@ from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.export.correctors import inputs_of
-from shipid.export.model import model
+from shipid.export.model import build_model
 from shipid.export.write import export_predictor
 from shipid.hybrid.features import choose_features, input_group
 from shipid.hybrid.mirror import mirror_matrix
@@ -299,7 +299,7 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
     assert "depth" in inputs_of(predictor.corrector).environment
     assert predictor.limits["depth"] == (log["depth"].min(), log["depth"].max())
     few = instants.select(slice(4))
-    expected, given = predictor.predict(few), model(predictor).inputs(few)
+    expected, given = predictor.predict(few), build_model(predictor).inputs(few)
     unknown = Instants({name: values for name, values in few.columns.items() if name != "depth"})
     with pytest.raises(DataError, match="depth: the method was trained with this input; the data must hold"):
         predictor.predict(unknown)

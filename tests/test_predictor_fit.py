@@ -28,7 +28,7 @@ from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.trials import trial_row
 from shipid.metrics import position_error
-from shipid.predictor import Predictor, _folds, fit
+from shipid.predictor import Predictor, _split_folds, fit
 from shipid.vessel.load import Vessel, load_vessel
 from tests.export.strange import bands_of, drawn
 
@@ -138,7 +138,7 @@ def test_folds_are_by_run() -> None:
     """Every run in turn, a fifth of the runs, or those that are named; training and validation share no run."""
 
     def validated(method: Method, windows: Windows = WINDOWS, runs: list[str] | None = None) -> list[set[str]]:
-        folds = _folds(method, windows, runs, seed=0)
+        folds = _split_folds(method, windows, runs, seed=0)
         for training, validation in folds:
             assert not set(windows.run[training]) & set(windows.run[validation])
             assert len(training) + len(validation) == len(windows)
@@ -152,7 +152,7 @@ def test_folds_are_by_run() -> None:
 
 def test_one_run_is_split_in_time() -> None:
     one = WINDOWS.select(WINDOWS.run == "M3")
-    for training, validation in _folds(SMALL, one, None, 0):
+    for training, validation in _split_folds(SMALL, one, None, 0):
         begin, end = one.begin[validation].min(), one.end[validation].max()
         assert ((one.end[training] < begin) | (one.begin[training] > end)).all()
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.frames import insert_gaps, shown_runs
-from shipid.observer import bank, observe
+from shipid.observer import filter_bank, run_observer
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.declared import Foundation, StudyMethod
@@ -178,11 +178,13 @@ def observer_frame(results: Results) -> pd.DataFrame:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
     part = results.dataset.select(shown_runs(results))
-    known = observe(vessel, known_by_then(results.plan.study, part), settings)
+    known = run_observer(vessel, known_by_then(results.plan.study, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
     table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *OBSERVER_COLUMNS]]
     table["observer.test"] = np.where(begins, np.nan, table["observer.test"])
-    table = table.assign(model=name, fade=bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step)
+    table = table.assign(
+        model=name, fade=filter_bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step
+    )
     return insert_gaps(table, ["run", "model", "fade", "ahead"])
 
 

@@ -25,7 +25,7 @@ def export_command(
     from shipid.document import bundled_documents
     from shipid.errors import DocumentError, suggest_name
     from shipid.export.casadi import listing_of
-    from shipid.export.write import EXAMPLE, export_predictor, export_vessel
+    from shipid.export.write import EXAMPLE_FILE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
     from shipid.vessel.load import load_vessel
 
@@ -44,8 +44,8 @@ def export_command(
         written = export_vessel(vessel, to, out, integrator=integrator, single=single, name=name)  # type: ignore[arg-type]
     for file in written:
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
-    if to == "c" and out / EXAMPLE not in written:
-        typer.echo(f"{out / EXAMPLE} is there already and is kept; without it, an example is written")
+    if to == "c" and out / EXAMPLE_FILE not in written:
+        typer.echo(f"{out / EXAMPLE_FILE} is there already and is kept; without it, an example is written")
 
 
 def aboard_command(

@@ -9,14 +9,14 @@ import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.export.correctors import nearest
-from shipid.export.equations import named_function, symbols_of
-from shipid.export.known import stacked
+from shipid.export.correctors import distance_to_nearest
+from shipid.export.equations import function_by_names, symbols_of
+from shipid.export.known import column_of_entries
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 
-CHOICE = ("level", "pointwise", "kind")
+BAND_CHOICE = ("level", "pointwise", "kind")
 """Inputs of a band: its level, whether each step is taken alone (0 or 1), the kind of manoeuvre (0: any)."""
-COLUMNS = ("along", "across", "ahead_x", "ahead_y")
+BAND_ROWS = ("along", "across", "ahead_x", "ahead_y")
 """Rows of a band: half axes [m], and the unit vector of the track in body axes; a column for each step."""
 
 
@@ -25,23 +25,23 @@ def radii_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
     whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])
     near = ca.fmax(0, 1 - ca.fabs(100 * level - ca.DM(100 * LEVELS)))
     steps = ca.mtimes(ca.DM(bands.steps.T), near)
-    return ca.if_else(pointwise != 0, steps, ca.repmat(_of_kind(whole, near, kind), len(bands.along), 1))
+    return ca.if_else(pointwise != 0, steps, ca.repmat(_radius_of_kind(whole, near, kind), len(bands.along), 1))
 
 
-def _of_kind(whole: np.ndarray, near: MX, kind: MX) -> MX:
+def _radius_of_kind(whole: np.ndarray, near: MX, kind: MX) -> MX:
     of = ca.fmax(0, 1 - ca.fabs(kind - ca.DM(range(len(whole)))))
     return ca.dot(of, ca.mtimes(ca.DM(whole), near))
 
 
 def band_rows(bands: Bands, now: Mapping[str, MX], path: MX, step: float, radius: MX) -> MX:
-    """Rows (4, T) of `COLUMNS` around a path (2, T) of steps [s]; radius (T,)."""
-    point = stacked(now, bands.names) / ca.DM(bands.spread)
-    grown = _growth(bands, path, now["r"], step, nearest(point, bands.centres / bands.spread))
+    """Rows (4, T) of `BAND_ROWS` around a path (2, T) of steps [s]; radius (T,)."""
+    point = column_of_entries(now, bands.names) / ca.DM(bands.spread)
+    grown = _band_growth(bands, path, now["r"], step, distance_to_nearest(point, bands.centres / bands.spread))
     size = [grown * ca.DM(scale) * radius for scale in (bands.along, bands.across)]
-    return ca.vertcat(*(half.T for half in size), _track(path))
+    return ca.vertcat(*(half.T for half in size), _track_directions(path))
 
 
-def _track(path: MX) -> MX:
+def _track_directions(path: MX) -> MX:
     """Unit vectors (2, T) along a path, as `shipid.hybrid.bands.track_directions`; ahead where it does not move."""
     first = ca.horzcat(MX(np.zeros((2, 1))), path[:, :-1])
     chords = ca.horzcat(path[:, 1:] - first[:, :-1], path[:, -1] - first[:, -1])
@@ -51,7 +51,7 @@ def _track(path: MX) -> MX:
     return ca.if_else(moves, chords / ca.if_else(moves, ca.repmat(length, 2, 1), 1), ahead)
 
 
-def _growth(bands: Bands, path: MX, r: MX, step: float, nearest_: MX) -> MX:
+def _band_growth(bands: Bands, path: MX, r: MX, step: float, nearest_: MX) -> MX:
     """How much wider the band is than that of an average prediction, as `Bands.growth`."""
     away, horizon = nearest_ / np.sqrt(bands.centres.shape[1]), path.shape[1]
     ends = [MX(np.zeros(2)), *(path[:, -(-horizon * part // 3) - 1] for part in (1, 2, 3))]
@@ -74,7 +74,7 @@ def _growth(bands: Bands, path: MX, r: MX, step: float, nearest_: MX) -> MX:
     return MX(ca.exp(harder) * ca.fmax(away / bands.far, 1))
 
 
-def is_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
+def is_band_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
     """Whether enough runs calibrated the level, or the kind, as `Bands.check`."""
     counts = ca.DM([bands.runs, *bands.kinds.values()])
     runs = ca.dot(counts, kind == ca.DM(range(len(bands.kinds) + 1)))
@@ -91,7 +91,7 @@ def factor_function(bands: Bands) -> ca.Function:
     most = float(LEVELS[-1])
 
     def radius(of: MX) -> MX:
-        return _of_kind(whole, ca.fmax(0, 1 - ca.fabs(100 * ca.fmin(of, most) - ca.DM(100 * LEVELS))), kind)
+        return _radius_of_kind(whole, ca.fmax(0, 1 - ca.fabs(100 * ca.fmin(of, most) - ca.DM(100 * LEVELS))), kind)
 
     now, usual = 1 - miss, radius(level)
     grown = radius(now) / ca.if_else(usual == 0, 1, usual) * ca.exp(ca.fmax(now - most, 0) / 0.05)
@@ -99,4 +99,4 @@ def factor_function(bands: Bands) -> ca.Function:
     known = ca.mmax(kind == ca.DM(range(len(whole))))
     known = ca.logic_and(known, ca.logic_and(level > 0, level < 1))
     result = ca.if_else(ca.logic_and(known, ca.fabs(miss) < np.inf), grown, np.nan)
-    return named_function("factor", inputs, {"factor": result})
+    return function_by_names("factor", inputs, {"factor": result})

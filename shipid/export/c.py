@@ -16,11 +16,11 @@ from shipid.errors import escape_unprintable
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
-NEARBY = [  # of the header in single precision
+SINGLE_PRECISION_NOTE = [  # of the header in single precision
     "Single precision: give north and east from a point nearby. In coordinates of a map, such as 7,000,000 m, the next",
     "number is 0.5 m away.",
 ]
-WORDS = frozenset(
+RESERVED_WORDS = frozenset(
     """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main real
@@ -46,7 +46,7 @@ A file of such a name would not compile."""
 
 
 @dataclass(frozen=True)
-class Files:
+class SourceFiles:
     """The files: name of a file -> its text; `name` begins every public name in C."""
 
     name: str
@@ -54,7 +54,7 @@ class Files:
 
 
 @dataclass(frozen=True)
-class Precision:
+class NumberPrecision:
     """How C writes numbers: in `double` or in `single` precision."""
 
     single: bool = False
@@ -79,7 +79,7 @@ class Precision:
 
 
 @dataclass(frozen=True)
-class Generated:
+class GeneratedC:
     """C that CasADi writes of some functions, each called `NAME_casadi_KEY`, and what a wrapper must know of it.
 
     text : of the file. declared : lines of C that declare the functions, on numbers of the type `real`.
@@ -102,34 +102,34 @@ class Generated:
         )
 
 
-def generated(functions: Mapping[str, ca.Function], name: str, precision: Precision) -> Generated:
+def generate_c(functions: Mapping[str, ca.Function], name: str, precision: NumberPrecision) -> GeneratedC:
     """CasADi's C of functions, key -> function; what is in it but its public functions has a name of its own."""
     generator = ca.CodeGenerator(
         f"{name}_casadi", {"casadi_real": precision.real, "with_header": False, "avoid_stack": True}
     )
     called = {key: f"{name}_casadi_{key}" for key in functions}
     for key, function in functions.items():
-        generator.add(renamed(function, called[key]))
+        generator.add(rename_function(function, called[key]))
     declared = "\n".join(
         f"int {one}(const real **arg, real **res, long long *iw, real *w, int mem);" for one in called.values()
     )
     text = generator.dump()
     keys = ("arg", "res", "iw", "w")
     most = (max(1, *(int(size) for size in re.findall(rf"\*sz_{key} = (\d+);", text))) for key in keys)
-    return Generated(_AS_C.format(text), _AS_C.format(declared), *most)
+    return GeneratedC(_AS_C.format(text), _AS_C.format(declared), *most)
 
 
 _AS_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
 
 
-def renamed(function: ca.Function, name: str) -> ca.Function:
+def rename_function(function: ca.Function, name: str) -> ca.Function:
     """The same function under another name."""
     inputs, options = function.mx_in(), {"is_diff_out": function.is_diff_out()}
     results = function.call(inputs, True, False)
     return ca.Function(name, inputs, results, function.name_in(), function.name_out(), options)
 
 
-def filled(text: str, name: str, values: Mapping[str, str]) -> str:
+def fill_template(text: str, name: str, values: Mapping[str, str]) -> str:
     """A text in which @ is the name that begins every public name, and $KEY a value."""
     return Template(text.replace("@", name)).substitute(values)
 
@@ -137,20 +137,24 @@ def filled(text: str, name: str, values: Mapping[str, str]) -> str:
 def c_name(text: str) -> str:
     """A name for C from any text: letters, digits and _, with a letter first."""
     name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower() or "model"
-    taken = name in WORDS or name.endswith("_t") or name.startswith("casadi")  # types of POSIX; names of CasADi
+    taken = (
+        name in RESERVED_WORDS or name.endswith("_t") or name.startswith("casadi")
+    )  # types of POSIX; names of CasADi
     return f"m_{name}" if taken or name[0].isdigit() else name
 
 
-def strings(values: Sequence[str]) -> str:
+def c_strings(values: Sequence[str]) -> str:
     """C strings in UTF-8, one a line; all but plain characters as octal numbers of three digits."""
-    return ",\n    ".join(f'"{"".join(map(_escaped, value.encode("utf-8", "replace")))}"' for value in values) or "0"
+    return (
+        ",\n    ".join(f'"{"".join(map(_escape_byte, value.encode("utf-8", "replace")))}"' for value in values) or "0"
+    )
 
 
-def _escaped(byte: int) -> str:
+def _escape_byte(byte: int) -> str:
     return chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f"\\{byte:03o}"
 
 
-def comment(lines: Sequence[str]) -> str:
+def c_comment(lines: Sequence[str]) -> str:
     """A C comment; what is not printable is written out: compilers refuse letters that turn the direction of a line."""
     kept = [escape_unprintable(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in kept), " */"])
@@ -185,13 +189,13 @@ def array_of(kind: str, name: str, values: Sequence[Any] | Array, body: str | No
 
 
 def tables_of(
-    prefix: str, groups: Mapping[str, Mapping[str, str]], numbers: Mapping[str, Array], precision: Precision
+    prefix: str, groups: Mapping[str, Mapping[str, str]], numbers: Mapping[str, Array], precision: NumberPrecision
 ) -> tuple[str, str]:
     """Declarations and definitions of tables: names and units of groups, entry -> unit, and arrays of numbers."""
     defined = []
     for group, units in groups.items():
         for what, texts in (("names", list(units)), ("units", list(units.values()))):
-            defined.append(array_of("char *const", f"{prefix}_{group}_{what}", texts, f"\n    {strings(texts)}"))
+            defined.append(array_of("char *const", f"{prefix}_{group}_{what}", texts, f"\n    {c_strings(texts)}"))
     for key, values in numbers.items():
         defined.append(array_of(f"{prefix}_real", f"{prefix}_{key}", values, precision.table(values)))
     declared = [f"extern {one.partition(' = ')[0]};" for one in defined]

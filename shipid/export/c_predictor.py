@@ -8,51 +8,53 @@ import casadi as ca
 import numpy as np
 
 from shipid.data.dataset import PAUSE_STEPS, SHORTEST_STEP_GROWTH
-from shipid.export.band import COLUMNS, factor_function
+from shipid.export.band import BAND_ROWS, factor_function
 from shipid.export.c import (
     ARE_FINITE,
-    NEARBY,
+    SINGLE_PRECISION_NOTE,
     SOURCE_HEAD,
-    Files,
-    Generated,
-    Precision,
+    GeneratedC,
+    NumberPrecision,
+    SourceFiles,
     array_of,
-    comment,
-    filled,
-    generated,
+    c_comment,
+    c_strings,
+    fill_template,
+    generate_c,
     places_above_zero,
     provenance_lines,
-    strings,
     tables_of,
 )
-from shipid.export.model import Model
-from shipid.export.recorder import KEPT, filters_of, recorder_functions
-from shipid.observer import MOST_PARTS, ROUNDING, Bank, sizes
+from shipid.export.model import ExportModel
+from shipid.export.recorder import KEPT_ENTRIES, filters_of, recorder_functions
+from shipid.observer import MOST_FILTER_STEPS, STEP_SLACK, FilterBank, filter_state_sizes
 from shipid.version import __version__
 
 PARTS_OF_STEP = 8  # of three rows within such a part of a step a recorder keeps the first and the last
-GAP = 3.0  # steps: after a longer pause, see `after_pauses`, the past of a recorder begins anew
+STEPS_OF_GAP = 3.0  # steps: after a longer pause, see `after_pauses`, the past of a recorder begins anew
 
 
-def predictor_files(model: Model, name: str, precision: Precision) -> Files:
+def predictor_files(model: ExportModel, name: str, precision: NumberPrecision) -> SourceFiles:
     """A predictor: physics, method, memory, observer, alarm and band as C."""
     functions = {"predict": model.function, **recorder_functions(model)}
     if model.predictor.bands is not None:
         functions["factor"] = factor_function(model.predictor.bands)
-    made = generated(functions, name, precision)
-    values = _values(model, name, precision, functions, made)
-    source = "".join([SOURCE_HEAD, _DEFINED, ARE_FINITE, _PATH, _RECORD, _PREDICT, _BAND])
+    made = generate_c(functions, name, precision)
+    values = _template_values(model, name, precision, functions, made)
+    source = "".join(
+        [SOURCE_HEAD, _DEFINITIONS, ARE_FINITE, _PATH_SOURCE, _RECORD_SOURCE, _PREDICT_SOURCE, _BAND_SOURCE]
+    )
     texts = {
-        f"{name}.h": f"{comment(_introduction(model, precision))}\n{filled(_HEADER, name, values)}",
-        f"{name}.c": comment([f"Predictor, written by shipid {__version__}; see {name}.h."])
-        + filled(source, name, values),
+        f"{name}.h": f"{c_comment(_header_comment(model, precision))}\n{fill_template(_PREDICTOR_HEADER, name, values)}",
+        f"{name}.c": c_comment([f"Predictor, written by shipid {__version__}; see {name}.h."])
+        + fill_template(source, name, values),
         f"{name}_casadi.c": made.text,
-        "main.c": filled(_EXAMPLE, name, values),
+        "main.c": fill_template(_EXAMPLE, name, values),
     }
-    return Files(name, texts)
+    return SourceFiles(name, texts)
 
 
-def header_sizes(model: Model) -> dict[str, int]:
+def header_sizes(model: ExportModel) -> dict[str, int]:
     """Constants of the header."""
     names, bands = model.layout, model.predictor.bands
     return {
@@ -65,12 +67,12 @@ def header_sizes(model: Model) -> dict[str, int]:
         "NUM_PLANNED": len(names.planned),
         "NUM_ESTIMATES": len(names.estimates),
         "NUM_PARAMETERS": len(names.parameters),
-        **({} if bands is None else {"BAND": len(COLUMNS), "NUM_KINDS": len(bands.kinds)}),
+        **({} if bands is None else {"BAND": len(BAND_ROWS), "NUM_KINDS": len(bands.kinds)}),
     }
 
 
-def _values(
-    model: Model, name: str, precision: Precision, functions: Mapping[str, ca.Function], made: Generated
+def _template_values(
+    model: ExportModel, name: str, precision: NumberPrecision, functions: Mapping[str, ca.Function], made: GeneratedC
 ) -> dict[str, str]:
     """What the texts of C are filled with."""
     names, filters, step = model.layout, filters_of(model), model.physics.step
@@ -82,10 +84,10 @@ def _values(
     bands, above, states = (
         model.predictor.bands,
         places_above_zero(names.parameters, model.vessel),
-        _num_states(filters),
+        _num_filter_states(filters),
     )
     if bands is not None:
-        kinds = array_of("char *const", f"{name}_kind_names", ("any", *bands.kinds), strings(["any", *bands.kinds]))
+        kinds = array_of("char *const", f"{name}_kind_names", ("any", *bands.kinds), c_strings(["any", *bands.kinds]))
         declared, defined = f"{declared}\nextern {kinds.partition(' = ')[0]};", f"{defined}\n{kinds}"
     past, plan = names.sizes["past"], names.sizes["planned"]
     has = {
@@ -95,7 +97,7 @@ def _values(
     orders = [names.now.index(key) for key in names.planned]
     source = names.planned or names.now
     lengths = {
-        "CAPACITY": 2 * PARTS_OF_STEP * names.num_past + 4, "WIDTH": len(names.now) + len(KEPT), "STATES": max(1, states),
+        "CAPACITY": 2 * PARTS_OF_STEP * names.num_past + 4, "WIDTH": len(names.now) + len(KEPT_ENTRIES), "STATES": max(1, states),
         "WORK": made.num_w, "FACTOR_WORK": functions["factor"].sz_w() + 1 if bands is not None else 1, "BUFFER": max(states, past + 2 * plan) + 1,
     }  # fmt: skip
     settled = model.predictor.run_up - 1e-3 * step
@@ -114,23 +116,23 @@ def _values(
         "NUM_STEPS": str(names.num_past),
         "RARE": f"{PAUSE_STEPS:g}",
         "FORGOTTEN": repr(SHORTEST_STEP_GROWTH),
-        "AFTER_PAUSES": _after_pauses(model, filters),
+        "AFTER_PAUSES": _pause_note(model, filters),
         "OFTEN": f"{step / PARTS_OF_STEP:g}",
         "NEAR": repr(step / PARTS_OF_STEP * (1 - 1e-6)),
         "SLACK": repr(1e-3 * step / PARTS_OF_STEP),
         "STEP": repr(step),
-        "GAP": repr(GAP * step),
-        "PAUSE": repr(GAP * step if filters is None else float(filters.pause)),
-        "TOO_LONG": "INFINITY" if filters is None else repr(MOST_PARTS * float(filters.longest)),
+        "GAP": repr(STEPS_OF_GAP * step),
+        "PAUSE": repr(STEPS_OF_GAP * step if filters is None else float(filters.pause)),
+        "TOO_LONG": "INFINITY" if filters is None else repr(MOST_FILTER_STEPS * float(filters.longest)),
         "LONGEST": "1" if filters is None else repr(float(filters.longest)),
-        "ROUNDING": repr(ROUNDING),
+        "ROUNDING": repr(STEP_SLACK),
         "SETTLED": repr(settled) if settled > 0 else "-INFINITY",
         "ABOVE": f"static {array_of('int', 'above_zero', above)}",
         "NUM_ABOVE": str(len(above)),
         "ORDERS": f"static {array_of('int', 'orders', orders)}",
         "ACTUATORS": f"static {array_of('int', 'actuators', [source.index(key) for key in names.reached])}",
         "ORDERED": "planned" if names.planned else "now",
-        "OF_BAND": filled(_OF_BAND, name, {}) if bands is not None else "",
+        "OF_BAND": fill_template(_BAND_DECLARATIONS, name, {}) if bands is not None else "",
         "ROW": ", ".join(names.now),
         "MIDDLES": precision.table(np.array(middles)),
         "ROWS": str(names.num_past + 1),
@@ -139,11 +141,11 @@ def _values(
     }
 
 
-def _num_states(filters: Bank | None) -> int:
-    return 0 if filters is None else sum(sizes(filters.model)) * filters.num_filters
+def _num_filter_states(filters: FilterBank | None) -> int:
+    return 0 if filters is None else sum(filter_state_sizes(filters.model)) * filters.num_filters
 
 
-def _introduction(model: Model, precision: Precision) -> list[str]:
+def _header_comment(model: ExportModel, precision: NumberPrecision) -> list[str]:
     """Lines of the first comment of the header."""
     physics, predictor = model.physics, model.predictor
     what = "no physics" if physics.vessel is None else physics.vessel.name
@@ -160,8 +162,8 @@ def _introduction(model: Model, precision: Precision) -> list[str]:
         "",
         "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
         "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
-        *(NEARBY if precision.single else []),
-        *_promise(model),
+        *(SINGLE_PRECISION_NOTE if precision.single else []),
+        *_band_note(model),
         *([f"Alarm for the first {predictor.run_up:g} s: the observer settles."] if predictor.run_up else []),
         f"Limits of the alarm: {'; '.join(limits) or 'none: every instant counts as outside'}.",
         "",
@@ -173,7 +175,7 @@ def _introduction(model: Model, precision: Precision) -> list[str]:
     ]
 
 
-def _promise(model: Model) -> list[str]:
+def _band_note(model: ExportModel) -> list[str]:
     """Lines of the header on the band."""
     bands = model.predictor.bands
     if bands is None:
@@ -185,18 +187,18 @@ def _promise(model: Model) -> list[str]:
     ]
 
 
-def _after_pauses(model: Model, filters: Bank | None) -> str:
+def _pause_note(model: ExportModel, filters: FilterBank | None) -> str:
     """What begins anew after pauses, in words."""
-    gap = GAP * model.physics.step
+    gap = STEPS_OF_GAP * model.physics.step
     if filters is None:
         return f"After one of more than {gap:g} s the past begins anew."
     words = f"After one of more than {min(gap, filters.pause):.4g} s the past begins anew"
     if filters.pause > gap:
         words += f", of more than {filters.pause:.4g} s observer, actuators and angles, too"
-    return f"{words}. After {MOST_PARTS * filters.longest:.4g} s all does, pause or not."
+    return f"{words}. After {MOST_FILTER_STEPS * filters.longest:.4g} s all does, pause or not."
 
 
-_HEADER = """#ifndef $GUARD
+_PREDICTOR_HEADER = """#ifndef $GUARD
 #define $GUARD
 
 #ifdef __cplusplus
@@ -261,7 +263,7 @@ $OF_BAND
 #endif
 """
 
-_OF_BAND = """
+_BAND_DECLARATIONS = """
 /* Path and band from the newest row: @_HORIZON rows of half axes along the predicted track and across it [m], and the
  * unit vector x, y of the track in body axes. level: share of whole paths that it holds, above 0 to 0.99;
  * pointwise: 1 for the share of positions at each step alone. kind: of the manoeuvre under way, an entry of
@@ -284,14 +286,14 @@ double @_adapted(double miss, double level, double rate, int missed);
 double @_factor(double miss, double level, int kind);
 """
 
-_DEFINED = """
+_DEFINITIONS = """
 $FUNCTIONS
 
 $DEFINED
 
 """
 
-_PATH = """
+_PATH_SOURCE = """
 /* Path and, for a level, pointwise and kind in `choice`, its band. */
 static int evaluate(const real *now, const real *reached, const real *past, const real *planned, const real *estimates,
     const real *parameters, const real *choice, real *path, real *band, real *work)
@@ -345,7 +347,7 @@ int @_path(const @_real *now, const @_real *reached, const @_real *past, const @
 }
 """
 
-_RECORD = """
+_RECORD_SOURCE = """
 void @_init(@ *self)
 {
     memset(self, 0, sizeof *self);
@@ -422,7 +424,7 @@ int @_record(@ *self, double t, const @_real *row)
 }
 """
 
-_PREDICT = """
+_PREDICT_SOURCE = """
 #if $HAS_PAST
 /* Rows of the past by interpolation, orders by the last row before; 0 where there are too few rows. */
 static int past_rows(@ *self, int newest, real *past)
@@ -499,7 +501,7 @@ int @_predict(@ *self, const @_real *planned, @_real *path)
 }
 """
 
-_BAND = """
+_BAND_SOURCE = """
 #if $HAS_BAND
 static const real *choose(real *choice, double level, int pointwise, int kind)
 {

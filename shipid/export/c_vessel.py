@@ -13,18 +13,18 @@ from shipid.engine.integrate import Method
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.export.c import (
     ARE_FINITE,
-    NEARBY,
+    SINGLE_PRECISION_NOTE,
     SOURCE_HEAD,
-    Files,
-    Precision,
+    NumberPrecision,
+    SourceFiles,
     array_of,
-    comment,
-    filled,
-    generated,
+    c_comment,
+    fill_template,
+    generate_c,
     places_above_zero,
     tables_of,
 )
-from shipid.export.equations import Equations, named_function, symbols_of
+from shipid.export.equations import Equations, function_by_names, symbols_of
 from shipid.physics.grammar import AXES
 from shipid.physics.signals import ACTUAL, SIGNALS, signal_of, signal_row
 from shipid.simulation.log import state_column
@@ -65,7 +65,7 @@ class VesselParts:
         if group == "loads":
             return "N" if name in "XYZ" else "N m"
         row = signal_row(state_column(name))
-        return _kept_unit(name) if row is None else row.unit
+        return _unit_of_hidden_state(name) if row is None else row.unit
 
     @cached_property
     def functions(self) -> dict[str, ca.Function]:
@@ -78,16 +78,16 @@ class VesselParts:
         rates = equations.rates(carry[:count], carry[count:], commands, environment, parameters, loads)
         begun = ca.vertcat(carry[:count], equations.begun(commands, parameters))
         return {
-            "step": named_function("step", {**inputs, "dt": dt}, {"after": after}),
-            "rates": named_function("rates", inputs, {"rates": rates}),
-            "begin": named_function("begin", inputs, {"begun": begun}),
+            "step": function_by_names("step", {**inputs, "dt": dt}, {"after": after}),
+            "rates": function_by_names("rates", inputs, {"rates": rates}),
+            "begin": function_by_names("begin", inputs, {"begun": begun}),
         }
 
 
-def vessel_files(vessel: Vessel, name: str, method: Method, precision: Precision) -> Files:
+def vessel_files(vessel: Vessel, name: str, method: Method, precision: NumberPrecision) -> SourceFiles:
     """A vessel alone: its rates and its step, for simulation in C."""
     parts = VesselParts(vessel, method)
-    made = generated(parts.functions, name, precision)
+    made = generate_c(parts.functions, name, precision)
     defaults = {"defaults": np.array(list(vessel.parameters.values()))}
     declared, defined = tables_of(name, parts.units(), defaults, precision)
     sizes = {f"NUM_{group.upper()}": len(names) for group, names in parts.groups().items()}
@@ -108,7 +108,7 @@ def vessel_files(vessel: Vessel, name: str, method: Method, precision: Precision
         "RULE": "explicit Euler" if method == "euler" else "classical Runge-Kutta (RK4)",
     }
 
-    head = comment(
+    head = c_comment(
         [
             f"{vessel.name}: equations of motion in C99, written by shipid {__version__}.",
             f"Vessel document digest {vessel.digest}.",
@@ -118,21 +118,21 @@ def vessel_files(vessel: Vessel, name: str, method: Method, precision: Precision
             "lag behind their orders. Names and units of every entry, in order, are in the tables below. Directions of",
             "wind and current are towards.",
             "Not in this file: waves that a simulated truth draws, a screening of inputs, a helmsman.",
-            *(NEARBY if precision.single else []),
+            *(SINGLE_PRECISION_NOTE if precision.single else []),
             "No memory is allocated and nothing is kept between calls.",
         ]
     )
-    origin = comment([f"{vessel.name}, written by shipid {__version__}; see {name}.h."])
+    origin = c_comment([f"{vessel.name}, written by shipid {__version__}; see {name}.h."])
     texts = {
-        f"{name}.h": f"{head}\n{filled(_HEADER, name, replaced)}",
-        f"{name}.c": f"{origin}\n{filled(SOURCE_HEAD + _SOURCE, name, replaced)}",
+        f"{name}.h": f"{head}\n{fill_template(_VESSEL_HEADER, name, replaced)}",
+        f"{name}.c": f"{origin}\n{fill_template(SOURCE_HEAD + _VESSEL_SOURCE, name, replaced)}",
         f"{name}_casadi.c": made.text,
-        "main.c": filled(_example(parts, precision), name, {}),
+        "main.c": fill_template(_example(parts, precision), name, {}),
     }
-    return Files(name, texts)
+    return SourceFiles(name, texts)
 
 
-_HEADER = """#ifndef $GUARD
+_VESSEL_HEADER = """#ifndef $GUARD
 #define $GUARD
 
 #ifdef __cplusplus
@@ -173,7 +173,7 @@ int @_step(@_real *carry, const @_real *commands, const @_real *environment,
 #endif
 """
 
-_SOURCE = (
+_VESSEL_SOURCE = (
     """
 $FUNCTIONS
 
@@ -238,7 +238,7 @@ int @_step(@_real *carry, const @_real *commands, const @_real *environment,
 )
 
 
-def _example(parts: VesselParts, precision: Precision) -> str:
+def _example(parts: VesselParts, precision: NumberPrecision) -> str:
     """An example: a minute with the helm over."""
     groups, orders = parts.groups(), []
     for command in groups["commands"]:
@@ -268,7 +268,7 @@ int main(void)
 """
 
 
-def _kept_unit(name: str) -> str:
+def _unit_of_hidden_state(name: str) -> str:
     """Unit of a state that a term keeps: the time of waves, or what the velocity that drives a mode adds up to."""
     state = signal_of(name)
     return "s" if state == "t" else SIGNALS[state[0]].unit.removesuffix("/s")

@@ -10,10 +10,10 @@ from typing import Any
 import casadi as ca
 
 from shipid.engine.integrate import Method
-from shipid.export.band import CHOICE, COLUMNS
-from shipid.export.c import renamed
+from shipid.export.band import BAND_CHOICE, BAND_ROWS
+from shipid.export.c import rename_function
 from shipid.export.c_vessel import VesselParts
-from shipid.export.model import Model
+from shipid.export.model import ExportModel
 from shipid.files import json_text, write_set
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -22,16 +22,16 @@ from shipid.vessel.load import Vessel
 def vessel_function(vessel: Vessel, name: str, method: Method) -> tuple[ca.Function, dict[str, Any]]:
     """(carry, commands, environment, loads, parameters, dt) -> carry after dt, and the names of the entries."""
     parts = VesselParts(vessel, method)
-    described = {key: _entries(units) for key, units in parts.units().items()}
-    return renamed(parts.functions["step"], name), {
+    described = {key: _names_and_units(units) for key, units in parts.units().items()}
+    return rename_function(parts.functions["step"], name), {
         "what": f"one step of {vessel.name} by {method}",
-        "inputs": {**described, "dt": _entries({"dt": "s"})},
+        "inputs": {**described, "dt": _names_and_units({"dt": "s"})},
         "outputs": {"after": described["carry"]},
         "defaults": {"parameters": list(vessel.parameters.values())},
     }
 
 
-def predictor_function(model: Model, name: str) -> tuple[ca.Function, dict[str, Any]]:
+def predictor_function(model: ExportModel, name: str) -> tuple[ca.Function, dict[str, Any]]:
     """The function of `Model.function`, and the names of the entries."""
     names, bands = model.layout, model.predictor.bands
     inputs = {key: {entry: model.unit(entry) for entry in getattr(names, key)} for key in names.sizes}
@@ -44,16 +44,16 @@ def predictor_function(model: Model, name: str) -> tuple[ca.Function, dict[str, 
         "provenance": dict(model.predictor.provenance),
     }
     if bands is not None:
-        inputs |= {key: {key: "-"} for key in CHOICE}
-        outputs |= {"band": dict(zip(COLUMNS, ("m", "m", "-", "-"), strict=True)), "promised": {"promised": "-"}}
+        inputs |= {key: {key: "-"} for key in BAND_CHOICE}
+        outputs |= {"band": dict(zip(BAND_ROWS, ("m", "m", "-", "-"), strict=True)), "promised": {"promised": "-"}}
         described["runs"] = bands.runs
         described["kinds"] = {kind: [number, count] for number, (kind, count) in enumerate(bands.kinds.items(), 1)}
-    described |= {"inputs": {key: _entries(units) for key, units in inputs.items()}}
-    described |= {"outputs": {key: _entries(units) for key, units in outputs.items()}}
-    return renamed(model.function, name), described
+    described |= {"inputs": {key: _names_and_units(units) for key, units in inputs.items()}}
+    described |= {"outputs": {key: _names_and_units(units) for key, units in outputs.items()}}
+    return rename_function(model.function, name), described
 
 
-def _entries(units: Mapping[str, str]) -> list[dict[str, str]]:
+def _names_and_units(units: Mapping[str, str]) -> list[dict[str, str]]:
     return [{"name": name, "unit": unit} for name, unit in units.items()]
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from casadi import MX
 
 from shipid.errors import ShipidError
-from shipid.export.equations import Equations, by_name, named_function, symbols_of
-from shipid.export.known import Known, feature_table, stacked, turned, within
+from shipid.export.equations import Equations, function_by_names, split_by_name, symbols_of
+from shipid.export.known import PredictorInputs, all_within, column_of_entries, feature_expressions, turn_vectors
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Normaliser
@@ -30,11 +30,11 @@ from shipid.hybrid.units import Units
 from shipid.physics.signals import direct_inputs, measurable_signals
 
 Array = np.ndarray
-Expressions = Mapping[str, MX]
+ExpressionsByName = Mapping[str, MX]
 
 
 @dataclass(frozen=True)
-class Taken:
+class CorrectorInputs:
     """Inputs of a corrector: names of commands, names of its inputs (without those of the past)."""
 
     commands: tuple[str, ...]
@@ -47,17 +47,17 @@ class Taken:
         return (*wind, *direct_inputs(self.names))
 
 
-def layer(x: MX, weight: Array, bias: Array) -> MX:
+def layer_outputs(x: MX, weight: Array, bias: Array) -> MX:
     """Outputs x @ weight + bias (o,) of a layer, weight (i, o), bias (o,)."""
     return ca.mtimes(ca.DM(weight.T), x) + ca.DM(bias)
 
 
-def z_score(table: Expressions, normaliser: Normaliser) -> MX:
+def normalised_inputs(table: ExpressionsByName, normaliser: Normaliser) -> MX:
     """(value - mean) / std of the named inputs."""
     return (stacked_inputs(table, normaliser.names) - ca.DM(normaliser.mean)) / ca.DM(normaliser.std)
 
 
-def stacked_inputs(table: Expressions, names: Sequence[str]) -> MX:
+def stacked_inputs(table: ExpressionsByName, names: Sequence[str]) -> MX:
     """Inputs of a method in a column; KeyError where the table lacks one."""
     return ca.vertcat(*(table[name] for name in names))
 
@@ -70,12 +70,12 @@ def mean_of(values: Sequence[MX]) -> MX:
     return total / len(values)
 
 
-def shaped(weights: MX, basis: Array) -> MX:
+def path_of_shapes(weights: MX, basis: Array) -> MX:
     """Path (2, T) that outputs x_1 ... x_r, y_1 ... y_r weigh shapes (T, r) to."""
     return ca.mtimes(ca.DM(basis), ca.reshape(weights, basis.shape[1], 2)).T
 
 
-def compensated(known: Known, corrector: Compensator) -> MX:
+def compensated_path(known: PredictorInputs, corrector: Compensator) -> MX:
     """Path of the physics plus the mean of networks."""
     moments: Sequence[int] = ()
     if isinstance(corrector.inputs, TrajectoryInputs):
@@ -84,22 +84,22 @@ def compensated(known: Known, corrector: Compensator) -> MX:
     table = known.table(corrector.inputs, moments)
     paths = []
     for network in corrector.networks:
-        value, (*hidden, last) = z_score(table, network.normaliser), network.layers
+        value, (*hidden, last) = normalised_inputs(table, network.normaliser), network.layers
         for weight, bias in hidden:
-            value = ca.tanh(layer(value, weight, bias))
-        paths.append(shaped(layer(value, *last), network.basis))
+            value = ca.tanh(layer_outputs(value, weight, bias))
+        paths.append(path_of_shapes(layer_outputs(value, *last), network.basis))
     return known.path + mean_of(paths)
 
 
-def alone(known: Known, corrector: Unchanged) -> MX:  # noqa: ARG001
+def physics_path(known: PredictorInputs, corrector: Unchanged) -> MX:  # noqa: ARG001
     """Path of the physics; a learned force is among its terms already."""
     return known.path
 
 
-def forest(known: Known, corrector: ForestCorrector) -> MX:
+def forest_path(known: PredictorInputs, corrector: ForestCorrector) -> MX:
     """Path of the physics plus the mean of trees."""
     seen = stacked_inputs(known.table(corrector.inputs), corrector.names)
-    return known.path + shaped(mean_of_trees(corrector.trees, seen), corrector.basis)
+    return known.path + path_of_shapes(mean_of_trees(corrector.trees, seen), corrector.basis)
 
 
 def mean_of_trees(trees: Trees, seen: MX) -> MX:
@@ -144,30 +144,30 @@ def greatest_left(threshold: Array) -> Array:
     return np.asarray(np.where(middle.astype(np.float32) == low, middle, np.nextafter(middle, -np.inf)))
 
 
-def recurrent(known: Known, corrector: RecurrentCorrector) -> MX:
+def recurrent_path(known: PredictorInputs, corrector: RecurrentCorrector) -> MX:
     """Path of the physics plus the mean of gated recurrent networks."""
     table, paths = known.table(corrector.inputs), []
     for network in corrector.networks:
         reader = network.reader
         rows = [*known.past[known.names.before(reader.steps) :], known.now]
-        signals = [z_score(feature_table(row, corrector.inputs.commands), reader.past) for row in rows]
-        now, read = z_score(table, reader.now), gated(network)
+        signals = [normalised_inputs(feature_expressions(row, corrector.inputs.commands), reader.past) for row in rows]
+        now, read = normalised_inputs(table, reader.now), gated_network_function(network)
         output = read(ca.horzcat(*signals), now)
         if reader.mirrors is not None:
             along, at = (ca.sparsify(ca.DM(one.T)) for one in reader.mirrors)
             other = read(ca.mtimes(along, ca.horzcat(*signals)), ca.mtimes(at, now))
             half = ca.DM(np.repeat([1.0, -1.0], output.numel() // 2))
             output = (output + half * other) / 2
-        paths.append(shaped(output, network.basis))
+        paths.append(path_of_shapes(output, network.basis))
     return known.path + mean_of(paths)
 
 
-def gated(network: GatedNetwork) -> ca.Function:
+def gated_network_function(network: GatedNetwork) -> ca.Function:
     """(Rows of the past and the instant (d, P + 1), inputs at the instant) -> outputs of a gated recurrent network."""
     parts = network.layers
     units, width = parts["W_h"].shape[1], parts["W_i"].shape[1]
     hidden, row = MX.sym("hidden", units), MX.sym("row", width)
-    a, b = layer(row, parts["W_i"].T, parts["b_i"]), layer(hidden, parts["W_h"].T, parts["b_h"])
+    a, b = layer_outputs(row, parts["W_i"].T, parts["b_i"]), layer_outputs(hidden, parts["W_h"].T, parts["b_h"])
     (reset, update, fresh), (reset_h, update_h, fresh_h) = (ca.vertsplit(part, units) for part in (a, b))
     gate = (1 + ca.tanh((update + update_h) / 2)) / 2
     fresh = ca.tanh(fresh + (1 + ca.tanh((reset + reset_h) / 2)) / 2 * fresh_h)
@@ -176,43 +176,43 @@ def gated(network: GatedNetwork) -> ca.Function:
     after = MX(np.zeros(units))
     for column in ca.horzsplit(rows):
         after = cell(after, column)
-    full = ca.tanh(layer(ca.vertcat(after, now), parts["W_1"].T, parts["c_1"]))
-    return ca.Function("gated", [rows, now], [layer(full, parts["W_2"].T, parts["c_2"])])
+    full = ca.tanh(layer_outputs(ca.vertcat(after, now), parts["W_1"].T, parts["c_1"]))
+    return ca.Function("gated", [rows, now], [layer_outputs(full, parts["W_2"].T, parts["c_2"])])
 
 
 # What follows goes step by step: the carry is u, v, r, psi, x, y and what the method keeps.
 
 
 @dataclass(frozen=True)
-class Start:
+class StepStart:
     """What holds at the start of a step: motion, orders and weather by name, and vectors."""
 
-    row: Expressions
+    row: ExpressionsByName
     reached: MX
     parameters: MX
 
 
-Added = Callable[[Start, MX, MX], tuple[MX, MX]]
+AddedAcceleration = Callable[[StepStart, MX, MX], tuple[MX, MX]]
 """(Start of a step, velocities after it by the physics alone, what is kept) -> missing acceleration (3,), and kept."""
 
 
-def stepped(known: Known, added: Added, kept: MX | None = None) -> MX:
+def stepped_path(known: PredictorInputs, added: AddedAcceleration, kept: MX | None = None) -> MX:
     """Path of the physics with an acceleration added at each step, as `shipid.hybrid.stepping.stepped_paths`."""
     names, kept = known.names, MX(0, 1) if kept is None else kept
-    start, weather = stacked(known.now, (*MOTIONS, "psi")), measurable_signals(names.now)
+    start, weather = column_of_entries(known.now, (*MOTIONS, "psi")), measurable_signals(names.now)
     step = corrected_step(known, kept.numel(), added)
     carry, path = ca.vertcat(start, MX(np.zeros(2)), kept), []
     commands = known.commands(names.commands)
     orders = ca.horzsplit(commands) * (names.horizon // commands.shape[1])
     reached = reached_at_starts(known, known.inputs["reached"], None)
-    fixed = stacked(known.now, weather), known.now["psi"], known.inputs["parameters"]
+    fixed = column_of_entries(known.now, weather), known.now["psi"], known.inputs["parameters"]
     for k in range(names.horizon):
         carry = step(carry, orders[k], reached[k], *fixed)
         path.append(carry[4:6])
     return ca.horzcat(*path)
 
 
-def reached_at_starts(known: Known, first: MX, records: MX | None) -> list[MX]:
+def reached_at_starts(known: PredictorInputs, first: MX, records: MX | None) -> list[MX]:
     """States of the actuators at the start of each step; records : of the physics, default those of the horizon."""
     if known.physics.vessel is None or not known.equations.model.memory:
         return [MX(0, 1)] * known.names.horizon
@@ -220,7 +220,7 @@ def reached_at_starts(known: Known, first: MX, records: MX | None) -> list[MX]:
     return [first, *ca.horzsplit(records[len(known.equations.states) :, :])[:-1]]
 
 
-def corrected_step(known: Known, num_kept: int, added: Added) -> ca.Function:
+def corrected_step(known: PredictorInputs, num_kept: int, added: AddedAcceleration) -> ca.Function:
     """(carry, commands, reached, weather, psi at the instant, parameters) -> carry."""
     names, h = known.names, known.physics.step
     weather = measurable_signals(names.now)
@@ -229,159 +229,167 @@ def corrected_step(known: Known, num_kept: int, added: Added) -> ca.Function:
     symbols = symbols_of(sizes)
     carry, first = symbols["carry"], symbols["psi0"]
     nu, psi, place = carry[:3], carry[3], carry[4:6]
-    row = by_name((*MOTIONS, "psi"), carry[:4])
-    row |= by_name(names.commands, symbols["commands"]) | by_name(weather, symbols["weather"])
-    start, after, way = Start(row, symbols["reached"], symbols["parameters"]), nu, None
+    row = split_by_name((*MOTIONS, "psi"), carry[:4])
+    row |= split_by_name(names.commands, symbols["commands"]) | split_by_name(weather, symbols["weather"])
+    start, after, way = StepStart(row, symbols["reached"], symbols["parameters"]), nu, None
     if known.physics.vessel is not None:
-        after, way = free(known, known.equations, start, start.parameters)
+        after, way = free_step(known, known.equations, start, start.parameters)
     more, kept = added(start, after, carry[6:])
     then = after + h * more
-    then = ca.if_else(within(then, VELOCITY_LIMIT), then, np.nan)
+    then = ca.if_else(all_within(then, VELOCITY_LIMIT), then, np.nan)
     if way is not None and known.physics.integrator != "euler":
         moved = way + h**2 / 2 * more + 0 * then
-        turned_by, shift = moved[2], turned(moved[:2], psi - first)
+        turned_by, shift = moved[2], turn_vectors(moved[:2], psi - first)
     else:
         turned_by = h / 2 * (nu[2] + then[2])
-        shift = h / 2 * (turned(nu[:2], psi - first) + turned(then[:2], psi + turned_by - first))
+        shift = h / 2 * (turn_vectors(nu[:2], psi - first) + turn_vectors(then[:2], psi + turned_by - first))
     after_all = ca.vertcat(then, psi + turned_by, place + shift, kept)
-    return named_function("corrected_step", symbols, {"after": after_all})
+    return function_by_names("corrected_step", symbols, {"after": after_all})
 
 
-def free(known: Known, equations: Equations, start: Start, parameters: MX) -> tuple[MX, MX]:
+def free_step(known: PredictorInputs, equations: Equations, start: StepStart, parameters: MX) -> tuple[MX, MX]:
     """Velocities (3,) after one step of the physics, and its way along, across and in heading (3,)."""
     model, names = equations.model, known.names
     memory = start.reached[[names.reached.index(name) for name in model.memory]] if model.memory else MX(0, 1)
-    carry = ca.vertcat(stacked(start.row, equations.states), memory)
-    commands, environment = stacked(start.row, model.commands), stacked(start.row, model.environment)
+    carry = ca.vertcat(column_of_entries(start.row, equations.states), memory)
+    commands, environment = (
+        column_of_entries(start.row, model.commands),
+        column_of_entries(start.row, model.environment),
+    )
     step = equations.step(known.physics.integrator, known.physics.step)
     after = step(carry, commands, environment, np.zeros(model.num_dof), parameters)
-    end, psi = by_name(equations.states, after[: len(equations.states)]), start.row["psi"]
-    place = turned(stacked(end, ("north", "east")), -psi)
+    end, psi = split_by_name(equations.states, after[: len(equations.states)]), start.row["psi"]
+    place = turn_vectors(column_of_entries(end, ("north", "east")), -psi)
     return equations.horizontal(after), ca.vertcat(place, end["psi"] - psi)
 
 
-def unit_outputs(table: Expressions, units: Units, even: Array, odd: Array) -> MX:
+def unit_outputs(table: ExpressionsByName, units: Units, even: Array, odd: Array) -> MX:
     """Outputs of `Units.parts`: even ones with a constant by weights (M + 1, p), odd ones by (M or M + 1, q)."""
-    size, z = len(units.offset) ** 0.5, z_score(table, units.normaliser)
-    plain = ca.tanh(layer(z, units.weight, units.offset)) / size if size else MX(0, 1)
+    size, z = len(units.offset) ** 0.5, normalised_inputs(table, units.normaliser)
+    plain = ca.tanh(layer_outputs(z, units.weight, units.offset)) / size if size else MX(0, 1)
     one = MX(np.ones(1))
     first = second = ca.vertcat(one, plain)
     if units.reflection is not None:
-        image = ca.tanh(layer(z, units.reflection @ units.weight, units.offset)) / size if size else MX(0, 1)
+        image = ca.tanh(layer_outputs(z, units.reflection @ units.weight, units.offset)) / size if size else MX(0, 1)
         first, second = ca.vertcat(one, (plain + image) / 2), (plain - image) / 2
     return ca.vertcat(ca.mtimes(ca.DM(even.T), first), ca.mtimes(ca.DM(odd.T), second))
 
 
-def one_step(known: Known, corrector: OneStepCorrector) -> MX:
+def one_step_path(known: PredictorInputs, corrector: OneStepCorrector) -> MX:
     """Networks that give the missing acceleration at every step."""
 
-    def added(start: Start, _: MX, kept: MX) -> tuple[MX, MX]:
-        table = feature_table(start.row, corrector.commands)
+    def added(start: StepStart, _: MX, kept: MX) -> tuple[MX, MX]:
+        table = feature_expressions(start.row, corrector.commands)
         return mean_of([unit_outputs(table, head.units, head.surge, head.sway_yaw) for head in corrector.heads]), kept
 
-    return stepped(known, added)
+    return stepped_path(known, added)
 
 
-def nearest(point: MX, centres: Array) -> MX:
+def distance_to_nearest(point: MX, centres: Array) -> MX:
     """Distance of a point (d,) to the nearest of some centres (C, d); a slope of 0 at a centre."""
     apart = ca.DM(centres.T) - ca.repmat(point, 1, len(centres))
     least = ca.mmin(ca.sum1(apart**2))
     return ca.if_else(least == 0, 0, ca.sqrt(ca.if_else(least == 0, 1, least)))
 
 
-def modules(known: Known, corrector: ModulesCorrector) -> MX:
+def modules_path(known: PredictorInputs, corrector: ModulesCorrector) -> MX:
     """Factors of single modules, faded out far from the training data."""
     reduced = [Equations(one.vessel) for one in physics_without_modules(known.physics) if one.vessel is not None]
     every, h = known.names.parameters, known.physics.step
 
-    def added(start: Start, whole: MX, kept: MX) -> tuple[MX, MX]:
+    def added(start: StepStart, whole: MX, kept: MX) -> tuple[MX, MX]:
         afters = [whole]
         for equations in reduced:
             places = [every.index(name) for name in equations.model.parameters]
-            afters.append(free(known, equations, start, start.parameters[places])[0])
-        table, units = feature_table(start.row, corrector.commands), corrector.units
+            afters.append(free_step(known, equations, start, start.parameters[places])[0])
+        table, units = feature_expressions(start.row, corrector.commands), corrector.units
         num_odd = len(units.offset) + (units.reflection is None)
         raw = unit_outputs(table, units, corrector.weights.T, np.zeros((num_odd, 0)))
-        away = nearest(z_score(table, units.normaliser), corrector.alarm.centres)
+        away = distance_to_nearest(normalised_inputs(table, units.normaliser), corrector.alarm.centres)
         weight = ca.fmin(ca.fmax(1 - (away - corrector.alarm.radius) / corrector.fade, 0), 1)
-        weight = ca.if_else(within(away), weight, 0)
+        weight = ca.if_else(all_within(away), weight, 0)
         extra = weight * ca.fmin(ca.fmax(raw, -corrector.limit), corrector.limit)
         shares = ca.horzcat(*(before - after for before, after in itertools.pairwise(afters)))
         return ca.mtimes(shares, extra) / h, kept
 
-    return stepped(known, added)
+    return stepped_path(known, added)
 
 
-def hankel(known: Known, corrector: HankelCorrector) -> MX:
+def hankel_path(known: PredictorInputs, corrector: HankelCorrector) -> MX:
     """A linear law of delays, rolled over the horizon."""
     law, physical = corrector.law, known.physics.vessel is not None
     kept_names = [*MOTIONS, *law.commands, *(MISSED_NAMES if physical else ())]
-    rows = [stacked(row, (*MOTIONS, *law.commands)) for row in known.past[known.names.before(law.delays) :]]
+    rows = [column_of_entries(row, (*MOTIONS, *law.commands)) for row in known.past[known.names.before(law.delays) :]]
     if physical:
-        rows = [ca.vertcat(*pair) for pair in zip(rows, missed_before(known, law.delays), strict=True)]
+        rows = [ca.vertcat(*pair) for pair in zip(rows, missed_accelerations(known, law.delays), strict=True)]
 
-    def added(start: Start, _: MX, before: MX) -> tuple[MX, MX]:
-        table = feature_table(start.row, law.commands)
+    def added(start: StepStart, _: MX, before: MX) -> tuple[MX, MX]:
+        table = feature_expressions(start.row, law.commands)
         for ago, row in enumerate(reversed(ca.vertsplit(before, len(kept_names))), start=1):
-            for name, value in by_name(kept_names, row).items():
+            for name, value in split_by_name(kept_names, row).items():
                 component, dot, signal = name.rpartition(".")
                 table[f"{component}{dot}past-{ago}.{signal}"] = value
-        residual = layer(z_score(table, law.normaliser), law.weights[:-1], law.weights[-1])
-        newest = stacked(start.row, (*MOTIONS, *law.commands))
+        residual = layer_outputs(normalised_inputs(table, law.normaliser), law.weights[:-1], law.weights[-1])
+        newest = column_of_entries(start.row, (*MOTIONS, *law.commands))
         return residual, ca.vertcat(before[len(kept_names) :], newest, residual if physical else MX(0, 1))
 
-    return stepped(known, added, ca.vertcat(*rows))
+    return stepped_path(known, added, ca.vertcat(*rows))
 
 
-def missed_before(known: Known, delays: int) -> list[MX]:
+def missed_accelerations(known: PredictorInputs, delays: int) -> list[MX]:
     """Accelerations (3,) that single steps of the physics missed over the last steps of the past."""
     rows, model = known.past[known.names.before(delays) :], known.equations.model
     reached = [MX(0, 1)] * delays
     if model.memory:
-        reached = reached_at_starts(known, stacked(rows[0], tuple(model.memory)), known.past_records(delays))
+        reached = reached_at_starts(known, column_of_entries(rows[0], tuple(model.memory)), known.past_records(delays))
     missed = []
     for row, at, later in zip(rows, reached, [*rows[1:], known.now], strict=True):
         held = {name: rows[0][name] for name in measurable_signals(known.names.now)}
         taken_ = {name: row[name] for name in (*MOTIONS, "psi", *known.names.commands)}
-        alone_, _ = free(known, known.equations, Start(held | taken_, at, known.inputs["parameters"]),
+        alone_, _ = free_step(known, known.equations, StepStart(held | taken_, at, known.inputs["parameters"]),
                          known.inputs["parameters"])  # fmt: skip
-        missed.append((stacked(later, MOTIONS) - alone_) / known.physics.step)
+        missed.append((column_of_entries(later, MOTIONS) - alone_) / known.physics.step)
     return missed
 
 
 class Counterpart(NamedTuple):
     """A corrector in CasADi: its path (2, T) and what it takes."""
 
-    path: Callable[[Known, Any], MX]
-    takes: Callable[[Any], Taken]
+    path: Callable[[PredictorInputs, Any], MX]
+    takes: Callable[[Any], CorrectorInputs]
 
 
-def _recurrent_taken(corrector: RecurrentCorrector) -> Taken:
+def _inputs_of_recurrent(corrector: RecurrentCorrector) -> CorrectorInputs:
     readers = [network.reader for network in corrector.networks]
-    return Taken(corrector.inputs.commands, tuple(n for one in readers for n in (*one.past.names, *one.now.names)))
+    return CorrectorInputs(
+        corrector.inputs.commands, tuple(n for one in readers for n in (*one.past.names, *one.now.names))
+    )
 
 
-def _compensated_taken(corrector: Compensator) -> Taken:
-    return Taken(corrector.inputs.commands, tuple(n for one in corrector.networks for n in one.normaliser.names))
+def _inputs_of_compensator(corrector: Compensator) -> CorrectorInputs:
+    return CorrectorInputs(
+        corrector.inputs.commands, tuple(n for one in corrector.networks for n in one.normaliser.names)
+    )
 
 
 CORRECTORS: dict[type[Any], Counterpart] = {
-    Unchanged: Counterpart(alone, lambda _: Taken((), ())),
-    ForceCorrector: Counterpart(alone, lambda _: Taken((), ())),
-    Compensator: Counterpart(compensated, _compensated_taken),
-    TrajectoryCompensator: Counterpart(compensated, _compensated_taken),
-    ForestCorrector: Counterpart(forest, lambda one: Taken(one.inputs.commands, one.names)),
-    RecurrentCorrector: Counterpart(recurrent, _recurrent_taken),
+    Unchanged: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
+    ForceCorrector: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
+    Compensator: Counterpart(compensated_path, _inputs_of_compensator),
+    TrajectoryCompensator: Counterpart(compensated_path, _inputs_of_compensator),
+    ForestCorrector: Counterpart(forest_path, lambda one: CorrectorInputs(one.inputs.commands, one.names)),
+    RecurrentCorrector: Counterpart(recurrent_path, _inputs_of_recurrent),
     OneStepCorrector: Counterpart(
-        one_step, lambda one: Taken(one.commands, tuple(n for head in one.heads for n in head.units.normaliser.names))
+        one_step_path,
+        lambda one: CorrectorInputs(one.commands, tuple(n for head in one.heads for n in head.units.normaliser.names)),
     ),
-    ModulesCorrector: Counterpart(modules, lambda one: Taken(one.commands, one.units.normaliser.names)),
-    HankelCorrector: Counterpart(hankel, lambda one: Taken(one.law.commands, one.law.normaliser.names)),
+    ModulesCorrector: Counterpart(modules_path, lambda one: CorrectorInputs(one.commands, one.units.normaliser.names)),
+    HankelCorrector: Counterpart(hankel_path, lambda one: CorrectorInputs(one.law.commands, one.law.normaliser.names)),
 }
 """Class of a corrector -> its counterpart."""
 
 
-def inputs_of(corrector: Any) -> Taken:
+def inputs_of(corrector: Any) -> CorrectorInputs:
     """Inputs of a corrector; ShipidError for a corrector that cannot be exported."""
     if type(corrector) not in CORRECTORS:
         kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]

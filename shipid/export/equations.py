@@ -17,7 +17,7 @@ from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
 
-def by_name(names: Sequence[str], vector: Any) -> dict[str, Any]:
+def split_by_name(names: Sequence[str], vector: Any) -> dict[str, Any]:
     """Entries of a vector, or rows of a matrix, by name."""
     return dict(zip(names, ca.vertsplit(vector), strict=True)) if names else {}
 
@@ -27,7 +27,7 @@ def symbols_of(sizes: Mapping[str, int]) -> dict[str, MX]:
     return {name: MX.sym(name, size) for name, size in sizes.items()}
 
 
-def named_function(name: str, inputs: Mapping[str, Any], outputs: Mapping[str, Any], **options: Any) -> ca.Function:
+def function_by_names(name: str, inputs: Mapping[str, Any], outputs: Mapping[str, Any], **options: Any) -> ca.Function:
     """A function of inputs and outputs by name; outputs are dense."""
     dense = [ca.densify(value) for value in outputs.values()]
     return ca.Function(name, [*inputs.values()], dense, [*inputs], [*outputs], options)
@@ -67,7 +67,7 @@ class Equations:
         inputs, tau = self._symbols(), SX.sym("tau_extra", self.model.num_dof)
         calm = replace(self.model, sums=tuple(term for term in self.model.sums if term.arrays is not None))
         given = dict(zip((*INPUTS, "tau_extra"), (*inputs, tau), strict=True))
-        return named_function("rates", given, {"rates": SX(summed_rates(calm, inputs, tau, {}))}, cse=True)
+        return function_by_names("rates", given, {"rates": SX(summed_rates(calm, inputs, tau, {}))}, cse=True)
 
     @cached_property
     def advance(self) -> ca.Function:
@@ -76,7 +76,7 @@ class Equations:
         dt = SX.sym("dt")
         after = self.model.advance(0 * state, memory, commands, 0 * environment, parameters, dt)
         inputs = {"memory": memory, "commands": commands, "parameters": parameters, "dt": dt}
-        return named_function("advance", inputs, {"after": SX(after)}, cse=True)
+        return function_by_names("advance", inputs, {"after": SX(after)}, cse=True)
 
     def step(self, method: Method, step: float | None = None) -> ca.Function:
         """(carry, commands, environment, tau_extra, parameters) -> carry after `step` [s], or after an input `dt`."""
@@ -96,7 +96,7 @@ class Equations:
         after = integrate_step(
             rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method
         )
-        return named_function("step", inputs, {"after": ca.vertcat(*after)})
+        return function_by_names("step", inputs, {"after": ca.vertcat(*after)})
 
     def begun(self, commands: MX, parameters: MX) -> MX:
         """Memories that have reached their orders, as far as their stops let them."""
@@ -107,15 +107,17 @@ class Equations:
         """State with velocities along the ship's axes from one with horizontal u, v, r, as a log has them."""
         if set(self.model.state).isdisjoint(LEANING):
             return state
-        now = by_name(self.states, state)
+        now = split_by_name(self.states, state)
         return MX(ca.vertcat(*(now | body_velocities(now, ca)).values()))
 
     def horizontal(self, carries: MX) -> MX:
         """u, v, r in the horizontal plane of one carry, or of a column for each step."""
-        return MX(ca.vertcat(*horizontal_velocities(by_name((*self.states, *self.model.memory), carries), ca).values()))
+        return MX(
+            ca.vertcat(*horizontal_velocities(split_by_name((*self.states, *self.model.memory), carries), ca).values())
+        )
 
 
-def rolled_out(step: ca.Function, carry: MX, inputs: Sequence[MX], parameters: MX, count: int) -> MX:
+def rollout_records(step: ca.Function, carry: MX, inputs: Sequence[MX], parameters: MX, count: int) -> MX:
     """Carries (num_carry, T) after 1 ... T steps.
 
     inputs : commands, environment and tau_extra, each with a column for every step, or one for all.

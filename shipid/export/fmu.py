@@ -21,11 +21,11 @@ from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
 from shipid.engine.native import find_compiler
 from shipid.errors import ShipidError
-from shipid.export.c import Files, Precision
+from shipid.export.c import NumberPrecision, SourceFiles
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.fmu_c import Variable, predictor_wrapper, vessel_wrapper
-from shipid.export.model import Model
+from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.physics.signals import ACTUAL, SIGNALS, neutral_value
 from shipid.version import __version__
@@ -34,24 +34,24 @@ from shipid.vessel.load import Vessel
 
 BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
 """System and processor -> folder of the binary in an FMU, and how its name ends."""
-_BAND = {
+_BAND_OUTPUTS = {
     "along": ("m", "half axis along the predicted track"),
     "across": ("m", "half axis across the predicted track"),
     "ahead_x": ("-", "unit vector of the track, ahead"),
     "ahead_y": ("-", "unit vector of the track, to starboard"),
 }
-LEAST = sys.float_info.min  # FMI 2.0 has no limit that is not allowed itself
+LEAST_ABOVE_ZERO = sys.float_info.min  # FMI 2.0 has no limit that is not allowed itself
 LARGEST_STEP = 0.1  # s: inside a communication step, of a ship of 30 m and more; times the root of the length below
 
 
 @dataclass(frozen=True)
-class Packed:
+class FmuParts:
     """The parts of an FMU: its variables in the order of value references, its C, and its name."""
 
     identifier: str
     title: str
     variables: tuple[Variable, ...]
-    files: Files
+    files: SourceFiles
     wrapper: str
     step: float | None
 
@@ -61,29 +61,29 @@ def quoteattr(text: str) -> str:
     return saxutils.quoteattr(re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\ufffd", text))
 
 
-def described(name: str) -> str:
+def words_of_signal(name: str) -> str:
     """Words for a signal: `port.alpha` is `azimuth, port`."""
     component, _, signal = name.rpartition(".")
     word = SIGNALS[signal].word if signal in SIGNALS else signal
     return f"{word}, {component}" if component else word
 
 
-def _inputs(rows: Mapping[str, tuple[str, str, float]]) -> list[Variable]:
+def _input_variables(rows: Mapping[str, tuple[str, str, float]]) -> list[Variable]:
     """Inputs of an FMU: name -> unit, words, start."""
     return [Variable(name, "input", "continuous", *row) for name, row in rows.items()]
 
 
-def _outputs(rows: Mapping[str, tuple[str, str]]) -> list[Variable]:
+def _output_variables(rows: Mapping[str, tuple[str, str]]) -> list[Variable]:
     """Outputs that are calculated: name -> unit, words."""
     return [Variable(name, "output", "continuous", *row, None) for name, row in rows.items()]
 
 
-def _settings(rows: Mapping[str, tuple[str, float]]) -> list[Variable]:
+def _setting_variables(rows: Mapping[str, tuple[str, float]]) -> list[Variable]:
     """Parameters without a unit: name -> words, start."""
     return [Variable(name, "parameter", "tunable", "-", *row) for name, row in rows.items()]
 
 
-def _numbers(vessel: Vessel | None) -> list[Variable]:
+def _vessel_variables(vessel: Vessel | None) -> list[Variable]:
     """Parameters: the numbers of a vessel document."""
     if vessel is None:
         return []
@@ -94,7 +94,7 @@ def _numbers(vessel: Vessel | None) -> list[Variable]:
     ]
 
 
-def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
+def vessel_unit(vessel: Vessel, name: str, method: Method) -> FmuParts:
     """The FMU of a vessel: commands, weather and loads in, motion out."""
     units = VesselParts(vessel, method).units()
     largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
@@ -102,31 +102,33 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> Packed:
     variables = []
     for key, unit in units["carry"].items():
         order, lags = key.removeprefix(ACTUAL), key.startswith(ACTUAL)
-        text = f"reached: {described(order)}{begins}" if lags else described(order)
+        text = f"reached: {words_of_signal(order)}{begins}" if lags else words_of_signal(order)
         variables.append(Variable(key, "output", "continuous", unit, text, 0.0, lags))
-    variables += _inputs(
-        {key: (unit, f"order: {described(key)}", neutral_value(key)) for key, unit in units["commands"].items()}
-        | {key: (unit, described(key), 0.0) for key, unit in units["environment"].items()}
+    variables += _input_variables(
+        {key: (unit, f"order: {words_of_signal(key)}", neutral_value(key)) for key, unit in units["commands"].items()}
+        | {key: (unit, words_of_signal(key), 0.0) for key, unit in units["environment"].items()}
         | {f"load.{key}": (unit, f"added {key}, such as waves or a tug", 0.0) for key, unit in units["loads"].items()}
     )
     solver = Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest)
-    variables += [*_numbers(vessel), solver]
+    variables += [*_vessel_variables(vessel), solver]
     sizes, num_reached = {group: len(names) for group, names in units.items()}, len(vessel_dynamics(vessel).memory)
-    return Packed(
-        name, vessel.name, tuple(variables), vessel_files(vessel, name, method, Precision()),
+    return FmuParts(
+        name, vessel.name, tuple(variables), vessel_files(vessel, name, method, NumberPrecision()),
         vessel_wrapper(name, sizes, sizes["carry"] - num_reached, variables), None,
     )  # fmt: skip
 
 
-def predictor_unit(model: Model, name: str) -> Packed:
+def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     """The FMU of a predictor: motion, weather and commands in, path, band and alarm out."""
     names, step, bands = model.layout, model.physics.step, model.predictor.bands
     steps = range(names.horizon)
     ends = {key: sum(model.limits.get(key, (0.0, 0.0))) / 2 for key in names.now}
-    rows = {key: (model.unit(key), described(key), ends[key] if np.isfinite(ends[key]) else 0.0) for key in names.now}
+    rows = {
+        key: (model.unit(key), words_of_signal(key), ends[key] if np.isfinite(ends[key]) else 0.0) for key in names.now
+    }
     planned = {
         f"planned[{k + 1}].{key}": (
-            model.unit(key), f"order in force in step {k + 1} of the horizon: {described(key)}", 0.0
+            model.unit(key), f"order in force in step {k + 1} of the horizon: {words_of_signal(key)}", 0.0
         )
         for k in steps
         for key in names.planned
@@ -138,7 +140,7 @@ def predictor_unit(model: Model, name: str) -> Packed:
     }
     shown |= {
         f"{key}[{k + 1}]": (unit, f"band after {step * (k + 1):g} s: {word}")
-        for key, (unit, word) in (_BAND.items() if bands is not None else ())
+        for key, (unit, word) in (_BAND_OUTPUTS.items() if bands is not None else ())
         for k in steps
     }
     shown["instant"] = "s", "time of the row that the path starts from"
@@ -151,16 +153,21 @@ def predictor_unit(model: Model, name: str) -> Packed:
         settings["level"] = "share of whole paths that the band holds, above 0 to 0.99", usual
         settings["pointwise"] = "1: the share is that of positions at each step alone", 0.0
         settings["kind"] = f"of the manoeuvre under way: {kinds}", 0.0
-    variables = [*_inputs(rows | planned), *_outputs(shown), *_numbers(model.vessel), *_settings(settings)]
+    variables = [
+        *_input_variables(rows | planned),
+        *_output_variables(shown),
+        *_vessel_variables(model.vessel),
+        *_setting_variables(settings),
+    ]
     what = "no physics" if model.vessel is None else model.vessel.name
-    return Packed(
-        name, f"{what}, {model.predictor.method}", tuple(variables), predictor_files(model, name, Precision()),
+    return FmuParts(
+        name, f"{what}, {model.predictor.method}", tuple(variables), predictor_files(model, name, NumberPrecision()),
         predictor_wrapper(name, names.horizon, len(names.parameters), variables),
         step,
     )  # fmt: skip
 
 
-def write_fmu(unit: Packed, file: Path) -> list[str]:
+def write_fmu(unit: FmuParts, file: Path) -> list[str]:
     """Write the FMU; the platforms of the binaries in it. ShipidError where the compiler fails."""
     name = unit.identifier
     sources = {key: text for key, text in unit.files.texts.items() if key != "main.c"}
@@ -169,28 +176,28 @@ def write_fmu(unit: Packed, file: Path) -> list[str]:
         "documentation/index.html": _documentation(unit)
     }
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(texts.values()))}}}"
-    texts["modelDescription.xml"] = description(unit, guid)
+    texts["modelDescription.xml"] = model_description(unit, guid)
     texts[f"sources/{name}.c"] = sources[f"{name}.c"].replace("@GUID@", guid)
     place = BINARIES.get((platform.system(), platform.machine())) if find_compiler() is not None else None
     with replace_whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         for key, text in texts.items():
-            archive.writestr(_entry(key), text)
+            archive.writestr(_archive_entry(key), text)
         if place is not None:
             for key in sources:
                 (temporary.parent / key).write_text(texts[f"sources/{key}"], encoding="utf-8")
-            built = _compiled(temporary.parent, name)
-            archive.writestr(_entry(f"binaries/{place[0]}/{name}{place[1]}", 0o755), built.read_bytes())
+            built = _compile_binary(temporary.parent, name)
+            archive.writestr(_archive_entry(f"binaries/{place[0]}/{name}{place[1]}", 0o755), built.read_bytes())
     return [] if place is None else [place[0]]
 
 
-def _entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
+def _archive_entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
     """A file of the archive, of 1980 whatever the clock says: one without a battery begins in 1970, which no zip takes."""
     entry = zipfile.ZipInfo(name)
     entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, mode << 16
     return entry
 
 
-def _compiled(folder: Path, name: str) -> Path:
+def _compile_binary(folder: Path, name: str) -> Path:
     command = find_compiler()
     assert command is not None
     options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s"]
@@ -202,7 +209,7 @@ def _compiled(folder: Path, name: str) -> Path:
     return built
 
 
-def description(unit: Packed, guid: str) -> str:
+def model_description(unit: FmuParts, guid: str) -> str:
     """Text of modelDescription.xml (FMI 2.0): the variables with their units, and the sources."""
     units = sorted({variable.unit for variable in unit.variables} - {"-", ""})
     rows = []
@@ -211,7 +218,7 @@ def description(unit: Packed, guid: str) -> str:
         head += f' causality="{variable.causality}" variability="{variable.variability}"'
         head += f' initial="{variable.initial}"' if variable.initial else ""
         real = "" if variable.unit in ("-", "") else f" unit={quoteattr(variable.unit)}"
-        real += f' min="{LEAST!r}"' if variable.above_zero else ""
+        real += f' min="{LEAST_ABOVE_ZERO!r}"' if variable.above_zero else ""
         real += "" if variable.start is None else f' start="{float(variable.start)!r}"'
         rows.append(
             f"{head} description={quoteattr(variable.description)}>\n      <Real{real}/>\n    </ScalarVariable>"
@@ -267,7 +274,7 @@ def description(unit: Packed, guid: str) -> str:
 """
 
 
-def _documentation(unit: Packed) -> str:
+def _documentation(unit: FmuParts) -> str:
     from html import escape
 
     rows = "".join(

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipid.export.band import CHOICE, COLUMNS
-from shipid.export.c import Precision
+from shipid.export.band import BAND_CHOICE, BAND_ROWS
+from shipid.export.c import NumberPrecision
 
-MOST_STEPS = 1_000_000  # of the solver in a communication step: some seconds
+MOST_SOLVER_STEPS = 1_000_000  # of the solver in a communication step: some seconds
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ typedef struct {{
     double values[NUM_REALS];
     int status;
 }} Model;
-{_fmi(name, variables)}
+{_variable_tables(name, variables)}
 static void Model_init(Model *self)
 {{
     memset(self, 0, sizeof *self);
@@ -83,7 +83,7 @@ static const char *Model_unfit(const Model *self, double h)
 {{
     const double largest = self->values[{total - 1}];
     if (!(largest > 0)) return "solver.step must be above 0";
-    if (!(h / largest <= {MOST_STEPS})) return "the communication step needs more than {MOST_STEPS} steps of solver.step";
+    if (!(h / largest <= {MOST_SOLVER_STEPS})) return "the communication step needs more than {MOST_SOLVER_STEPS} steps of solver.step";
     return 0;
 }}
 
@@ -129,7 +129,7 @@ typedef struct {{
     int status;
     {name} kept, trial; /* the second for the path at the start: too large for the stack of a thread */
 }} Model;
-{_fmi(name, variables)}
+{_variable_tables(name, variables)}
 static void Model_init(Model *self)
 {{
     int i;
@@ -140,7 +140,7 @@ static void Model_init(Model *self)
     {name}_init(&self->kept);
 }}
 
-{_path_at(name, horizon, num_parameters, {variable.name: place for place, variable in enumerate(variables)})}
+{_path_source(name, horizon, num_parameters, {variable.name: place for place, variable in enumerate(variables)})}
 /* The path at the start: from a copy, since the first step keeps this row. */
 static const char *Model_begin(Model *self, const unsigned char *set, double t)
 {{
@@ -170,20 +170,20 @@ static int Model_boolean(const Model *self, unsigned reference)
 {_FMI_BODY}"""
 
 
-def _path_at(name: str, horizon: int, num_parameters: int, at: Mapping[str, int]) -> str:
+def _path_source(name: str, horizon: int, num_parameters: int, at: Mapping[str, int]) -> str:
     """C that records the row of the variables and predicts from it; `at`: place of each variable by name."""
     first_planned = next((place for key, place in at.items() if key.startswith("planned[")), 0)
     plan = f"self->values[{at['held']}] != 0 ? 0 : self->values + {first_planned}" if "held" in at else "0"
     choice, shown = "0", ""
-    if CHOICE[0] in at:
-        choice = f"self->values + {at[CHOICE[0]]}"
+    if BAND_CHOICE[0] in at:
+        choice = f"self->values + {at[BAND_CHOICE[0]]}"
         shown = "\n".join(
-            f"        self->values[{at[f'{key}[1]']} + k] = band[{len(COLUMNS)} * k + {place}];"
-            for place, key in enumerate(COLUMNS)
+            f"        self->values[{at[f'{key}[1]']} + k] = band[{len(BAND_ROWS)} * k + {place}];"
+            for place, key in enumerate(BAND_ROWS)
         )
     return f"""static const char *path_at(Model *self, {name} *kept, double t)
 {{
-    double path[2 * {horizon}], band[{len(COLUMNS)} * {horizon}];
+    double path[2 * {horizon}], band[{len(BAND_ROWS)} * {horizon}];
     int k;
     memcpy(kept->parameters, self->values + {at["instant"] + 1}, {num_parameters} * sizeof(double));
     k = {name}_record(kept, t, self->values); /* refused: status and alarm stay those of the path that is there */
@@ -200,19 +200,19 @@ def _path_at(name: str, horizon: int, num_parameters: int, at: Mapping[str, int]
 """
 
 
-def _kind(variable: Variable) -> str:
+def _kind_of_variable(variable: Variable) -> str:
     exact = variable.causality == "output" and variable.start is not None
     return f"'{'e' if exact else 'a' if variable.above_zero else variable.causality[0]}'"
 
 
-def _fmi(name: str, variables: Sequence[Variable]) -> str:
+def _variable_tables(name: str, variables: Sequence[Variable]) -> str:
     """Start values and kinds of the variables."""
-    values = Precision().table(np.array([0.0 if v.start is None else v.start for v in variables]))
+    values = NumberPrecision().table(np.array([0.0 if v.start is None else v.start for v in variables]))
     return f"""
 static const char guid[] = "@GUID@";
 static const char identifier[] = "{name}";
 static const double start_values[NUM_REALS] = {{{values}}};
-static const char kinds[] = {{{", ".join(_kind(v) for v in variables)}}}; /* input, output, exact at the start, parameter, parameter above 0 */
+static const char kinds[] = {{{", ".join(_kind_of_variable(v) for v in variables)}}}; /* input, output, exact at the start, parameter, parameter above 0 */
 """
 
 

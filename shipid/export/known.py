@@ -12,19 +12,19 @@ import numpy as np
 from casadi import MX
 
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.equations import Equations, by_name, rolled_out, symbols_of
+from shipid.export.equations import Equations, rollout_records, split_by_name, symbols_of
 from shipid.hybrid.features import MOTIONS, PLAN_PARTS, Inputs, count_steps
 from shipid.hybrid.physics import Physics
-from shipid.observer import COLUMNS, bank, moves_start
+from shipid.observer import ESTIMATE_COLUMNS, filter_bank, moves_start
 from shipid.physics.signals import direct_inputs
 
-Expressions = Mapping[str, MX]
-TRACE = 1e-12  # m/s: of a wind that is exactly 0, so that its direction has a derivative
-PLACE = ("north", "east")
+NamedExpressions = Mapping[str, MX]
+TRACE_OF_WIND = 1e-12  # m/s: of a wind that is exactly 0, so that its direction has a derivative
+POSITION_ENTRIES = ("north", "east")
 
 
 @dataclass(frozen=True)
-class Layout:
+class InputLayout:
     """Names of the entries of each input of a predictor, in order.
 
     now : measured at the instant. reached : actuators that lag behind their orders. past : entries of each of
@@ -61,7 +61,7 @@ class Layout:
         }
 
 
-def layout(
+def input_layout(
     physics: Physics,
     commands: Sequence[str],
     num_past: int,
@@ -69,7 +69,7 @@ def layout(
     known: bool,
     environment: Sequence[str],
     limited: Sequence[str] = (),
-) -> Layout:
+) -> InputLayout:
     """Inputs that a predictor takes.
 
     physics : with all terms, also those of a method. commands : that a method takes. environment : channels that
@@ -79,53 +79,53 @@ def layout(
     memory, taken, weather = tuple[str, ...](), tuple[str, ...](), tuple[str, ...]()
     if physics.vessel is not None:
         model = Equations(physics.vessel).model
-        states = [name for name in model.state if name not in (*PLACE, "psi", *MOTIONS)]
+        states = [name for name in model.state if name not in (*POSITION_ENTRIES, "psi", *MOTIONS)]
         memory, taken, weather = tuple(model.memory), model.commands, model.environment
     every = tuple(dict.fromkeys((*taken, *commands)))
     others = dict.fromkeys((*weather, *environment, *limited))
     channels = [name for name in others if name not in (*MOTIONS, *every)]
-    now = (*PLACE, "psi", *MOTIONS, *states, *every, *channels)
-    return Layout(
+    now = (*POSITION_ENTRIES, "psi", *MOTIONS, *states, *every, *channels)
+    return InputLayout(
         now=now,
         reached=memory,
-        past=(*now[len(PLACE) :], "x", "y") if num_past else (),
+        past=(*now[len(POSITION_ENTRIES) :], "x", "y") if num_past else (),
         num_past=num_past,
         planned=every if known else (),
         horizon=physics.horizon,
-        estimates=tuple(f"observer.{name}" for name in COLUMNS) if physics.observer is not None else (),
+        estimates=tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS) if physics.observer is not None else (),
         parameters=() if physics.vessel is None else tuple(physics.vessel.parameters),
         commands=every,
     )
 
 
-def stacked(table: Expressions, names: Sequence[str]) -> MX:
+def column_of_entries(table: NamedExpressions, names: Sequence[str]) -> MX:
     """Entries of a table in a column, in the order of the names; what it does not hold is 0."""
     return ca.vertcat(MX(0, 1), *(table.get(name, MX(0)) for name in names))
 
 
-def within(values: MX, limit: float = sys.float_info.max) -> MX:
+def all_within(values: MX, limit: float = sys.float_info.max) -> MX:
     """Whether all values are from -limit to limit: false where one is NaN, by default also where one is infinite."""
     return ca.sum1(ca.vec(ca.fabs(values) <= limit)) > values.numel() - 0.5
 
 
-def turned(vectors: MX, angle: MX) -> MX:
+def turn_vectors(vectors: MX, angle: MX) -> MX:
     """Vectors (2, n) of axes that have turned by an angle, in the axes before."""
     c, s = ca.cos(angle), ca.sin(angle)
     return ca.vertcat(c * vectors[0, :] - s * vectors[1, :], s * vectors[0, :] + c * vectors[1, :])
 
 
-class Known:
+class PredictorInputs:
     """Symbols of the inputs of a predictor, and the motion of its physics.
 
     physics : as in the predictor, its vessel with the terms of a method. inputs : name -> symbol of `Layout.sizes`.
     """
 
-    def __init__(self, physics: Physics, names: Layout) -> None:
+    def __init__(self, physics: Physics, names: InputLayout) -> None:
         self.physics, self.names = physics, names
         self.inputs = symbols_of(names.sizes)
-        self.now = by_name(names.now, self.inputs["now"])
+        self.now = split_by_name(names.now, self.inputs["now"])
         rows = ca.reshape(self.inputs["past"], len(names.past), names.num_past)
-        self.past = [by_name(names.past, row) for row in ca.horzsplit(rows)] if names.past else []
+        self.past = [split_by_name(names.past, row) for row in ca.horzsplit(rows)] if names.past else []
 
     @cached_property
     def equations(self) -> Equations:
@@ -142,25 +142,25 @@ class Known:
         """Commands (n, T) over the horizon, or (n, 1) where they are held."""
         every, horizon = self.names.planned, self.names.horizon
         if not every:
-            return stacked(self.now, names)
+            return column_of_entries(self.now, names)
         return ca.reshape(self.inputs["planned"], len(every), horizon)[[every.index(name) for name in names], :]
 
-    def _begun(self, row: Expressions) -> MX:
+    def _begun(self, row: NamedExpressions) -> MX:
         """State of the vessel at a measured row, at the origin; hidden states of terms are 0."""
-        known = {name: value for name, value in row.items() if name not in PLACE}
-        return self.equations.aboard(stacked(known, self.equations.states))
+        known = {name: value for name, value in row.items() if name not in POSITION_ENTRIES}
+        return self.equations.aboard(column_of_entries(known, self.equations.states))
 
     def _rolled_out(self, begun: MX, environment: MX, tau: MX) -> MX:
         inputs = [self.commands(self.equations.model.commands), environment, tau]
         carry = ca.vertcat(begun, self.inputs["reached"])
-        return rolled_out(self.step, carry, inputs, self.inputs["parameters"], self.names.horizon)
+        return rollout_records(self.step, carry, inputs, self.inputs["parameters"], self.names.horizon)
 
     @cached_property
     def measured_records(self) -> MX:
         """Carries (n, T) of the physics after each step from the measured state, without an observer."""
         model = self.equations.model
         return self._rolled_out(
-            self._begun(self.now), stacked(self.now, model.environment), MX(np.zeros(model.num_dof))
+            self._begun(self.now), column_of_entries(self.now, model.environment), MX(np.zeros(model.num_dof))
         )
 
     @cached_property
@@ -170,32 +170,32 @@ class Known:
 
     @cached_property
     def seen(self) -> dict[str, MX]:
-        """Estimates of the observer by their names in `shipid.observer.COLUMNS`."""
-        return by_name(COLUMNS, self.inputs["estimates"])
+        """Estimates of the observer by their names in `shipid.observer.ESTIMATE_COLUMNS`."""
+        return split_by_name(ESTIMATE_COLUMNS, self.inputs["estimates"])
 
     def _observed(self) -> tuple[MX, MX, MX]:
         """State, environment and slow force over the horizon, as `shipid.observer.observed_start`."""
         physics, model, now, seen = self.physics, self.equations.model, self.now, self.seen
         assert physics.vessel is not None
-        filters = bank(physics.vessel, physics.observer)
+        filters = filter_bank(physics.vessel, physics.observer)
         north, east, psi = seen["current_north"], seen["current_east"], seen["psi"]
         state = {"psi": psi, "r": seen["r"]}
         if moves_start(filters.settings, physics.path):
-            state |= {name: seen[name] - now[name] for name in PLACE}
+            state |= {name: seen[name] - now[name] for name in POSITION_ENTRIES}
         state["u"] = seen["u"] - north * ca.cos(psi) - east * ca.sin(psi)
         state["v"] = seen["v"] + north * ca.sin(psi) - east * ca.cos(psi)
         weather = dict(now)
         if "V_w" in model.environment:
             ahead = now["V_w"] * ca.cos(now["beta_w"]) - north
             across = now["V_w"] * ca.sin(now["beta_w"]) - east
-            ahead += ca.if_else(ahead**2 + across**2 == 0, TRACE, 0)
+            ahead += ca.if_else(ahead**2 + across**2 == 0, TRACE_OF_WIND, 0)
             weather |= {"V_w": ca.sqrt(ahead**2 + across**2), "beta_w": ca.atan2(across, ahead)}
         weather |= {name: MX(0) for name in ("V_c", "beta_c")}
         ages = (np.arange(physics.horizon) + 0.5) * physics.step
         faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(physics.horizon)
-        force = ca.DM(filters.mass) @ stacked(seen, "XYN")
+        force = ca.DM(filters.mass) @ column_of_entries(seen, "XYN")
         tau = force @ ca.DM(faded).T
-        return stacked(state, self.equations.states), stacked(weather, model.environment), tau
+        return column_of_entries(state, self.equations.states), column_of_entries(weather, model.environment), tau
 
     @cached_property
     def path(self) -> MX:
@@ -205,50 +205,50 @@ class Known:
         way = self.records[:2, :]
         if self.physics.observer is not None:
             ages = ca.DM(self.physics.step * np.arange(1, self.names.horizon + 1))
-            way += stacked(self.seen, ("current_north", "current_east")) @ ages.T
-        return ca.if_else(self._slow(self.records), turned(way, -self.now["psi"]), np.nan)
+            way += column_of_entries(self.seen, ("current_north", "current_east")) @ ages.T
+        return ca.if_else(self._slow(self.records), turn_vectors(way, -self.now["psi"]), np.nan)
 
     def _slow(self, records: MX) -> MX:
         """Whether no velocity of some carries is above that of any ship: in Python the rollout diverged."""
         num_dof = self.equations.model.num_dof
-        return within(records[num_dof : 2 * num_dof, :], SPEED_LIMIT)
+        return all_within(records[num_dof : 2 * num_dof, :], SPEED_LIMIT)
 
     def past_records(self, steps: int) -> MX:
         """Carries (n, steps) over the last steps, from the measured state before them, actuators at their orders."""
         model, rows = self.equations.model, self.past[self.names.before(steps) :]
-        carry = ca.vertcat(self._begun(rows[0]), stacked(rows[0], tuple(model.memory)))
-        commands = ca.horzcat(*(stacked(row, model.commands) for row in rows))
-        inputs = [commands, stacked(rows[0], model.environment), MX(np.zeros(model.num_dof))]
-        return rolled_out(self.step, carry, inputs, self.inputs["parameters"], steps)
+        carry = ca.vertcat(self._begun(rows[0]), column_of_entries(rows[0], tuple(model.memory)))
+        commands = ca.horzcat(*(column_of_entries(row, model.commands) for row in rows))
+        inputs = [commands, column_of_entries(rows[0], model.environment), MX(np.zeros(model.num_dof))]
+        return rollout_records(self.step, carry, inputs, self.inputs["parameters"], steps)
 
     def _past_error(self, seconds: float) -> MX:
         """x, y, u, v, r of `shipid.hybrid.features.past_error`."""
         steps = count_steps(seconds, self.physics.step)
         records, then = self.past_records(steps), self.past[self.names.before(steps)]
         last, change = records[:, -1], self.now["psi"] - then["psi"]
-        here = turned(-stacked(then, "xy"), change)  # the present position in the frame of the start
-        missed = turned(here - turned(last[:2], -then["psi"]), -change)
-        errors = ca.vertcat(missed, stacked(self.now, MOTIONS) - self.equations.horizontal(last))
-        return ca.if_else(ca.logic_and(within(errors), self._slow(records)), errors, 0)
+        here = turn_vectors(-column_of_entries(then, "xy"), change)  # the present position in the frame of the start
+        missed = turn_vectors(here - turn_vectors(last[:2], -then["psi"]), -change)
+        errors = ca.vertcat(missed, column_of_entries(self.now, MOTIONS) - self.equations.horizontal(last))
+        return ca.if_else(ca.logic_and(all_within(errors), self._slow(records)), errors, 0)
 
     def table(self, inputs: Inputs, moments: Sequence[int] = ()) -> dict[str, MX]:
         """Every input that a method may take, see `shipid.hybrid.features.Inputs.table`.
 
         moments : steps of the horizon at which the physics is seen (calibrator).
         """
-        table = feature_table(self.now, inputs.commands) | self._plans(inputs) | self._history(inputs)
+        table = feature_expressions(self.now, inputs.commands) | self._plans(inputs) | self._history(inputs)
         if self.physics.vessel is None:
             return table
         if inputs.memory.observer and self.physics.observer is not None:
             table |= self._estimates()
         axes = ("x", "y", *MOTIONS)
         for seconds in inputs.memory.error:
-            table |= by_name([f"error-{seconds:g}.{name}" for name in axes], self._past_error(seconds))
+            table |= split_by_name([f"error-{seconds:g}.{name}" for name in axes], self._past_error(seconds))
         if moments:
             every = ca.vertcat(self.path, self.equations.horizontal(self.records))
-            every = ca.if_else(within(every), every, 0)
+            every = ca.if_else(all_within(every), every, 0)
             for k in moments:
-                table |= by_name([f"physics-{k * self.physics.step:g}.{name}" for name in axes], every[:, k - 1])
+                table |= split_by_name([f"physics-{k * self.physics.step:g}.{name}" for name in axes], every[:, k - 1])
         return table
 
     def _plans(self, inputs: Inputs) -> dict[str, MX]:
@@ -256,7 +256,7 @@ class Known:
         if not self.names.planned:
             return {}
         table, horizon = {}, self.names.horizon
-        for name, orders in by_name(inputs.commands, self.commands(inputs.commands)).items():
+        for name, orders in split_by_name(inputs.commands, self.commands(inputs.commands)).items():
             component, _, signal = name.rpartition(".")
             for number, part in enumerate(np.array_split(np.arange(horizon), min(PLAN_PARTS, horizon)), start=1):
                 mean = ca.sum2(orders[:, part[0] : part[-1] + 1]) / len(part)
@@ -279,12 +279,12 @@ class Known:
         """Inputs of `shipid.hybrid.features.observer_inputs`."""
         now, seen = self.now, self.seen
         table = {f"observer-force.{motion}": seen[name] for motion, name in zip(MOTIONS, "XYN", strict=True)}
-        current = turned(stacked(seen, ("current_north", "current_east")), -now["psi"])
-        table |= by_name(("observer-current.u", "observer-current.v"), current)
+        current = turn_vectors(column_of_entries(seen, ("current_north", "current_east")), -now["psi"])
+        table |= split_by_name(("observer-current.u", "observer-current.v"), current)
         return table | {f"observer-wave.{name}": now[name] - seen[name] for name in MOTIONS}
 
 
-def feature_table(now: Expressions, commands: Sequence[str]) -> dict[str, MX]:
+def feature_expressions(now: NamedExpressions, commands: Sequence[str]) -> dict[str, MX]:
     """u, v, r, commands, relative wind and other environment, as `shipid.hybrid.features.feature_table`."""
     table = {name: now[name] for name in (*MOTIONS, *commands)}
     if "V_w" in now and "beta_w" in now:

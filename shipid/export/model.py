@@ -13,10 +13,10 @@ from casadi import MX
 
 from shipid.data.windows import Instants
 from shipid.errors import ShipidError
-from shipid.export.band import CHOICE, band_rows, is_promised, radii_at
+from shipid.export.band import BAND_CHOICE, band_rows, is_band_promised, radii_at
 from shipid.export.correctors import CORRECTORS, inputs_of
-from shipid.export.equations import named_function, symbols_of
-from shipid.export.known import Known, Layout, layout
+from shipid.export.equations import function_by_names, symbols_of
+from shipid.export.known import InputLayout, PredictorInputs, input_layout
 from shipid.hybrid.bands import Bands
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.method import Corrector, widen_range
@@ -26,7 +26,7 @@ from shipid.simulation.log import state_column
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
-ESTIMATES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
+UNITS_OF_FORCES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
 """Slow force of the observer over the mass -> unit; its other estimates are velocities."""
 MOST_NUMBERS = 300_000
 """Numbers in the arrays of an exported predictor, at most: 8 MB of source, 2.4 MB compiled in double precision."""
@@ -60,7 +60,7 @@ class Exportable(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class ExportModel:
     """A predictor that is ready to be written.
 
     physics : with the terms of the method. layout : names of the inputs.
@@ -68,7 +68,7 @@ class Model:
 
     predictor: Exportable
     physics: Physics
-    layout: Layout
+    layout: InputLayout
 
     @property
     def vessel(self) -> Vessel | None:
@@ -80,13 +80,17 @@ class Model:
         """The inputs of `Layout.sizes` and a choice of a band -> path, outside, band, promised.
 
         path : (2, T) x and y [m] in body axes at the instant. outside : 1 for the alarm. band : (4, T), see
-        `shipid.export.band.COLUMNS`; where `promised` is 0 it is not a number. The choice of a band and the last two
+        `shipid.export.band.BAND_ROWS`; where `promised` is 0 it is not a number. The choice of a band and the last two
         outputs are there where the predictor has bands; a band has no derivative.
 
         ShipidError for a method whose parts do not fit together, or are too large.
         """
         self._check_size()
-        known, corrector, bands = Known(self.physics, self.layout), self.predictor.corrector, self.predictor.bands
+        known, corrector, bands = (
+            PredictorInputs(self.physics, self.layout),
+            self.predictor.corrector,
+            self.predictor.bands,
+        )
         try:
             path = CORRECTORS[type(corrector)].path(known, corrector)
         except (LookupError, ValueError, TypeError, AttributeError, RuntimeError, AssertionError) as error:
@@ -95,12 +99,12 @@ class Model:
             ) from error
         inputs, outputs = dict(known.inputs), {"path": path, "outside": self._outside(known.now)}
         if bands is not None:
-            choice = symbols_of(dict.fromkeys(CHOICE, 1))
-            promised = is_promised(bands, **choice)
+            choice = symbols_of(dict.fromkeys(BAND_CHOICE, 1))
+            promised = is_band_promised(bands, **choice)
             rows = band_rows(bands, known.now, path, self.physics.step, radii_at(bands, **choice))
             inputs |= choice
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
-        return named_function("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
+        return function_by_names("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
 
     def _check_size(self) -> None:
         bands = self.predictor.bands
@@ -135,7 +139,7 @@ class Model:
         if self.vessel is not None and name in self.vessel.units:
             return self.vessel.units[name]
         row = signal_row(state_column(name))
-        return ESTIMATES.get(signal_of(name), "m/s") if row is None else row.unit
+        return UNITS_OF_FORCES.get(signal_of(name), "m/s") if row is None else row.unit
 
     def inputs(self, instants: Instants) -> dict[str, Array]:
         """The inputs of the function for S instants, name -> (S, entries); what a log does not hold is 0."""
@@ -163,13 +167,13 @@ class Model:
         return {**stacked, "parameters": np.tile(self.parameters, (count, 1))}
 
 
-def model(predictor: Exportable) -> Model:
+def build_model(predictor: Exportable) -> ExportModel:
     """A predictor as a model; ShipidError for a method that has no counterpart."""
     corrector, physics = predictor.corrector, predictor.physics
     taken = inputs_of(corrector)
     if isinstance(corrector, ForceCorrector):
         physics = corrector.with_force(physics)
-    names = layout(
+    names = input_layout(
         physics,
         taken.commands or tuple(name for name in predictor.limits if "." in name),
         predictor.past,
@@ -177,4 +181,4 @@ def model(predictor: Exportable) -> Model:
         environment=taken.environment,
         limited=(*predictor.limits, *(() if predictor.bands is None else predictor.bands.names)),
     )
-    return Model(predictor, physics, names)
+    return ExportModel(predictor, physics, names)

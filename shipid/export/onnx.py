@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import ShipidError
-from shipid.export.model import Model
+from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.one_step import OneStepCorrector
@@ -58,7 +58,7 @@ class _Nodes:
         return self.node("Div", total, self.constant(float(len(values)))) if len(values) > 1 else total
 
 
-def write_onnx(model: Model, name: str, file: Path, *, single: bool) -> Path:
+def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool) -> Path:
     """Write the networks; ShipidError for a method without networks, or where onnx is not installed.
 
     Inputs (S, d) are those of the method, in the order that the metadata `inputs` says. The output of a compensator is
@@ -71,9 +71,9 @@ def write_onnx(model: Model, name: str, file: Path, *, single: bool) -> Path:
     corrector = model.predictor.corrector
     nodes = _Nodes(helper, numpy_helper, np.float32 if single else np.float64)
     if isinstance(corrector, Compensator):
-        names, output, shape = _compensation(nodes, corrector, model.layout.horizon)
+        names, output, shape = _compensation_nodes(nodes, corrector, model.layout.horizon)
     elif isinstance(corrector, OneStepCorrector):
-        names, output, shape = _acceleration(nodes, corrector)
+        names, output, shape = _acceleration_nodes(nodes, corrector)
     else:
         raise ShipidError(
             f"the method {model.predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "
@@ -102,7 +102,7 @@ def write_onnx(model: Model, name: str, file: Path, *, single: bool) -> Path:
     return file
 
 
-def _compensation(nodes: _Nodes, corrector: Compensator, horizon: int) -> tuple[list[str], str, list[int]]:
+def _compensation_nodes(nodes: _Nodes, corrector: Compensator, horizon: int) -> tuple[list[str], str, list[int]]:
     names = list(dict.fromkeys(name for network in corrector.networks for name in network.normaliser.names))
     paths = []
     for network in corrector.networks:
@@ -118,12 +118,12 @@ def _compensation(nodes: _Nodes, corrector: Compensator, horizon: int) -> tuple[
     return names, nodes.node("Reshape", nodes.mean(paths), shape), [horizon, 2]
 
 
-def _acceleration(nodes: _Nodes, corrector: OneStepCorrector) -> tuple[list[str], str, list[int]]:
+def _acceleration_nodes(nodes: _Nodes, corrector: OneStepCorrector) -> tuple[list[str], str, list[int]]:
     names = list(dict.fromkeys(name for head in corrector.heads for name in head.units.normaliser.names))
     terms = []
     for head in corrector.heads:
         units = head.units
-        even, odd = _parts(nodes, units, nodes.chosen("inputs", names, units.normaliser.names))
+        even, odd = _even_odd_units(nodes, units, nodes.chosen("inputs", names, units.normaliser.names))
         # weights carry all factors: runtimes fuse one beside a product, and keep it in single precision
         size = len(units.offset) ** 0.5 * (1 if units.reflection is None else 2)
         first = 1 if units.reflection is None else 0
@@ -134,7 +134,7 @@ def _acceleration(nodes: _Nodes, corrector: OneStepCorrector) -> tuple[list[str]
     return names, nodes.mean(terms), [3]
 
 
-def _parts(nodes: _Nodes, units: Units, x: str) -> tuple[str, str]:
+def _even_odd_units(nodes: _Nodes, units: Units, x: str) -> tuple[str, str]:
     """Even and odd hidden units, without their factors."""
     z = nodes.z_score(x, units.normaliser.mean, units.normaliser.std)
     plain = nodes.layer(z, units.weight, units.offset, True)

@@ -13,23 +13,23 @@ from typing import get_args
 from shipid.arguments import as_path, check_choice, check_class
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, escape_unprintable, suggest_name
-from shipid.export.c import Files, Precision, c_name
+from shipid.export.c import NumberPrecision, SourceFiles, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
 from shipid.export.casadi import predictor_function, vessel_function, write_function
-from shipid.export.fmu import Packed, predictor_unit, vessel_unit, write_fmu
-from shipid.export.model import Exportable, Model, model
+from shipid.export.fmu import FmuParts, predictor_unit, vessel_unit, write_fmu
+from shipid.export.model import Exportable, ExportModel, build_model
 from shipid.export.onnx import write_onnx
 from shipid.files import write_set
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
 
-EXAMPLE = "main.c"
+EXAMPLE_FILE = "main.c"
 
 
 @dataclass(frozen=True)
-class Target:
+class ExportTarget:
     """A form in which a predictor or a vessel is written for others; both functions return the files they wrote.
 
     predictor : (model, name, file, single). vessel : (vessel, name, integrator, file, single); None where a vessel has
@@ -37,7 +37,7 @@ class Target:
     single precision.
     """
 
-    predictor: Callable[[Model, str, Path, bool], list[Path]]
+    predictor: Callable[[ExportModel, str, Path, bool], list[Path]]
     vessel: Callable[[Vessel, str, Method, Path, bool], list[Path]] | None = None
     ending: str = ""
     single: bool = False
@@ -62,8 +62,8 @@ def export_predictor(
     """
     if not hasattr(predictor, "corrector"):
         raise DocumentError(f"give a Predictor, as of `fit` or `Predictor.load`, not {type(predictor).__name__}")
-    target, file, title = _checked(to, out, single, name)
-    return target.predictor(model(predictor), title, file, single)
+    target, file, title = _check_target(to, out, single, name)
+    return target.predictor(build_model(predictor), title, file, single)
 
 
 def export_vessel(
@@ -81,22 +81,24 @@ def export_vessel(
 
     Raises ShipidError as there, and for an unknown integrator.
     """
-    target, file, title = _checked(to, out, single, name)
+    target, file, title = _check_target(to, out, single, name)
     check_choice("integrator", integrator, get_args(Method))
     if target.vessel is None:
-        *others, last = (other for other, one in TARGETS.items() if one.vessel is not None)
+        *others, last = (other for other, one in EXPORT_TARGETS.items() if one.vessel is not None)
         remedy = f"export it to {', '.join(others)} or {last}"
         raise DocumentError(f"a vessel has no networks, and {to} takes nothing else: {remedy}", path="--to")
     return target.vessel(vessel, title, integrator, file, single)
 
 
-def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | None) -> tuple[Target, Path, str]:
+def _check_target(
+    to: str, out: str | os.PathLike[str], single: bool, name: str | None
+) -> tuple[ExportTarget, Path, str]:
     """The target, the file or folder, and the name that begins every public name."""
     if name is not None:
         check_class("name", name, str, "such as 'gunnerus'", DocumentError)
-    target, file = TARGETS.get(str(to)), as_path("out", out)
+    target, file = EXPORT_TARGETS.get(str(to)), as_path("out", out)
     if target is None:
-        raise DocumentError(f"no such target: {suggest_name(str(to), TARGETS)}", path="--to")
+        raise DocumentError(f"no such target: {suggest_name(str(to), EXPORT_TARGETS)}", path="--to")
     if single and not target.single:
         raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
     if not target.ending and file.exists() and not file.is_dir():
@@ -108,13 +110,13 @@ def _checked(to: str, out: str | os.PathLike[str], single: bool, name: str | Non
     return target, file, c_name(name or file.stem)
 
 
-def _folder(files: Files, folder: Path) -> list[Path]:
+def _write_sources(files: SourceFiles, folder: Path) -> list[Path]:
     """Write the files; an example that is there is kept, because it may have become the user's program."""
     texts = {folder / name: text for name, text in files.texts.items()}
-    return write_set({file: text for file, text in texts.items() if file.name != EXAMPLE or not file.exists()})
+    return write_set({file: text for file, text in texts.items() if file.name != EXAMPLE_FILE or not file.exists()})
 
 
-def _fmu(unit: Packed, file: Path) -> list[Path]:
+def _write_unit(unit: FmuParts, file: Path) -> list[Path]:
     try:
         platforms = write_fmu(unit, file)
     except ShipidError as error:
@@ -129,23 +131,25 @@ def _fmu(unit: Packed, file: Path) -> list[Path]:
     return [file]
 
 
-TARGETS: dict[str, Target] = {
-    "c": Target(
-        lambda kept, title, file, single: _folder(predictor_files(kept, title, Precision(single)), file),
-        lambda ship, title, rule, file, single: _folder(vessel_files(ship, title, rule, Precision(single)), file),
+EXPORT_TARGETS: dict[str, ExportTarget] = {
+    "c": ExportTarget(
+        lambda kept, title, file, single: _write_sources(predictor_files(kept, title, NumberPrecision(single)), file),
+        lambda ship, title, rule, file, single: _write_sources(
+            vessel_files(ship, title, rule, NumberPrecision(single)), file
+        ),
         single=True,
     ),
-    "fmu": Target(
-        lambda kept, title, file, _: _fmu(predictor_unit(kept, title), file),
-        lambda ship, title, rule, file, _: _fmu(vessel_unit(ship, title, rule), file),
+    "fmu": ExportTarget(
+        lambda kept, title, file, _: _write_unit(predictor_unit(kept, title), file),
+        lambda ship, title, rule, file, _: _write_unit(vessel_unit(ship, title, rule), file),
         ".fmu",
     ),
-    "casadi": Target(
+    "casadi": ExportTarget(
         lambda kept, title, file, _: write_function(*predictor_function(kept, title), file),
         lambda ship, title, rule, file, _: write_function(*vessel_function(ship, title, rule), file),
         ".casadi",
     ),
-    "onnx": Target(
+    "onnx": ExportTarget(
         lambda kept, title, file, single: [write_onnx(kept, title, file, single=single)], None, ".onnx", single=True
     ),
 }

@@ -22,7 +22,7 @@ from shipid.engine.gradient import rollout_gradient, squared_distance_loss
 from shipid.engine.integrate import Method as Integrator
 from shipid.engine.rollout import Distances, Trajectories, rollout, rollout_distances
 from shipid.errors import DataError, ShipidError
-from shipid.observer import COLUMNS, Observer, bank, observed_start
+from shipid.observer import ESTIMATE_COLUMNS, Observer, filter_bank, observed_start
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
@@ -30,7 +30,7 @@ from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
-ESTIMATED = tuple(f"observer.{name}" for name in COLUMNS)
+ESTIMATED = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS)
 REPEATED_FROM = 5_000  # steps of one rollout: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
@@ -239,7 +239,7 @@ class Physics:
             if missing is not None:
                 raise DataError("the physics has an observer, and the instants lack this estimate", path=missing)
             observed = {**columns, **instants.estimates}
-            begun = observed_start(bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
+            begun = observed_start(filter_bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
         start = {name: columns.get(name, zero) for name in model.state}
         if not start.keys().isdisjoint(LEANING):

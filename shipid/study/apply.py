@@ -25,7 +25,7 @@ from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adapt
 from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.observer import observe
+from shipid.observer import run_observer
 from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
@@ -175,7 +175,7 @@ def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, s
         along = states_along(predictor.vessel, dataset.commands, seen.frame)
         hidden = along and {name: values[some] for name, values in along.items()}
         if physics.observer is not None:
-            observed = observe(predictor.vessel, seen, physics.observer).columns
+            observed = run_observer(predictor.vessel, seen, physics.observer).columns
             estimates = {name: values[some] for name, values in observed.items()}
     past = past_of_instants(seen.frame, t, predictor.past, physics.step, physics.path)
     return Instants(columns, past, planned, hidden, estimates)

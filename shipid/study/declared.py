@@ -12,7 +12,7 @@ from shipid.errors import DocumentError, suggest_name
 from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, free_factors
-from shipid.observer import Observer, bank
+from shipid.observer import Observer, filter_bank
 from shipid.study.schema import ROLES, Study, separate_family
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, draw_members, resolve_families
@@ -152,7 +152,7 @@ def _observer(study: Study, family: Family, index: int, vessel: Vessel, file: Pa
         Observer, default | (family.observer or {}), file, f"family.{index}.observer"
     )
     try:
-        bank(vessel, settings)
+        filter_bank(vessel, settings)
     except DocumentError as error:
         raise DocumentError(error.message, file=file, path=f"family.{index}.observer") from None
     return settings

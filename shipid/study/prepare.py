@@ -38,7 +38,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
 from shipid.metrics import ErrorSummary, position_error, summarise_errors
-from shipid.observer import Estimates, Observer, at_windows, observe, tune_observer
+from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
@@ -381,20 +381,20 @@ def path_source(study: Study) -> PathSource:
 
 
 def estimates_of(study: Study, foundation: Foundation, dataset: Dataset, test: Windows, calls: int = 1) -> Estimates:
-    """Estimates of the observer of a foundation at every row of the runs; `calls` as for `observe`.
+    """Estimates of the observer of a foundation at every row of the runs; `calls` as for `run_observer`.
 
     Where runs share a clock, an observer along another run sees no moment of the test windows.
     """
     assert foundation.vessel is not None
     known = known_by_then(study, dataset)
-    whole = observe(foundation.vessel, known, foundation.observer, calls=calls)
+    whole = run_observer(foundation.vessel, known, foundation.observer, calls=calls)
     kept = rows_outside_test(dataset, test)
     rest = np.flatnonzero(kept & ~dataset.frame["run"].isin(list(test.spans)).to_numpy())
     if kept.all() or not len(rest):
         return whole
     others = rows_apart_from_test(known, test)
     mine = ~others.frame["run"].isin(list(test.spans)).to_numpy()
-    part = observe(foundation.vessel, others, foundation.observer, calls=calls).select(mine)
+    part = run_observer(foundation.vessel, others, foundation.observer, calls=calls).select(mine)
     for name, values in part.columns.items():
         whole.columns[name][rest] = values
     for name in ("innovation", "spread", "weights"):
@@ -441,7 +441,7 @@ def at_instants(dataset: Dataset, windows: Windows, estimates: Estimates | None)
     """Estimates of an observer at the instants of windows, `observer.u`, ... -> (S,); none without an observer."""
     if estimates is None:
         return {}
-    columns = at_windows(dataset, estimates, windows)
+    columns = estimates_at_windows(dataset, estimates, windows)
     return {name: columns[name] for name in estimates.columns}
 
 

@@ -19,7 +19,7 @@ from shipid.errors import DataError, ResultError
 from shipid.files import read_arrays, read_json
 from shipid.hybrid.bands import Bands
 from shipid.metrics import error_by_axis, error_of_windows, position_error
-from shipid.predictor import checked_bands, read_bands
+from shipid.predictor import check_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
 from shipid.study.kinds import kinds_of_runs
@@ -197,7 +197,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         if band is not None:
             bands[cell] = band
         try:
-            checked_bands(band, reason, plan.study.bands.level)
+            check_bands(band, reason, plan.study.bands.level)
         except DataError as error:
             no_band[cell] = error.message
     return Results(

@@ -14,7 +14,7 @@ from shipid.document import Document
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DocumentError, suggest_name
 from shipid.physics.signals import SIGNALS, rows_of_role
-from shipid.predictor import MOST_STEPS
+from shipid.predictor import MOST_HORIZON_STEPS
 from shipid.simulation.truth import Truth
 from shipid.vessel.perturb import Family
 
@@ -85,8 +85,8 @@ class Prediction(Strict):
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Prediction:
-        if not 2 <= whole_steps(self.ahead, self.step) <= MOST_STEPS:
-            most = f"{MOST_STEPS:,}"
+        if not 2 <= whole_steps(self.ahead, self.step) <= MOST_HORIZON_STEPS:
+            most = f"{MOST_HORIZON_STEPS:,}"
             raise ValueError(f"ahead = {self.ahead:g} s must be 2 to {most} steps of {self.step:g} s")
         return self
 

@@ -16,7 +16,7 @@ from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
-from shipid.observer import MEASURED, Estimates, Observer, at_windows, observe
+from shipid.observer import MEASURED_MOTION, Estimates, Observer, estimates_at_windows, run_observer
 from shipid.simulation.excitation import aprbs_series
 from shipid.simulation.log import log_columns
 from shipid.simulation.sea import Sea, draw_components, wave_loads
@@ -80,7 +80,7 @@ def world(vessel: str, seed: int, *, runs: int, duration: float, waves: bool, cu
     log = log_columns(path, path.names)
     rows = len(log["u"])
     held = np.minimum(np.arange(rows) * every, count - 1)
-    columns = {name: log[name] for name in MEASURED} | {name: values[held] for name, values in commands.items()}
+    columns = {name: log[name] for name in MEASURED_MOTION} | {name: values[held] for name, values in commands.items()}
     columns |= {name: np.tile(environment[name], (rows, 1)) for name in ("V_w", "beta_w") if name in environment}
     names = [f"M{run:03d}" for run in range(runs)]
     frame = pd.DataFrame({"run": np.repeat(names, rows), "t": np.tile(ROW * np.arange(rows), runs)})
@@ -105,7 +105,7 @@ def smoothed(data: Dataset) -> Dataset:
     frame, weight = data.frame.copy(), np.hanning(SMOOTH + 2)[1:-1]
     half, weight = SMOOTH // 2, weight / weight.sum()
     for rows in data.frame.groupby("run", sort=False).indices.values():
-        for name in MEASURED:
+        for name in MEASURED_MOTION:
             x = frame[name].to_numpy()[rows]
             padded = np.concatenate([2 * x[0] - x[half:0:-1], x, 2 * x[-1] - x[-2 : -half - 2 : -1]])
             frame.loc[frame.index[rows], name] = np.convolve(padded, weight, "valid")
@@ -137,13 +137,13 @@ def errors(
 
     zero = np.zeros(len(windows))
     unseen = {f"observer.{name}": zero for name in (*"XYN", "current_north", "current_east")}
-    plain = {**windows.columns, **unseen, **{f"observer.{name}": windows.columns[name] for name in MEASURED}}
+    plain = {**windows.columns, **unseen, **{f"observer.{name}": windows.columns[name] for name in MEASURED_MOTION}}
     alone = mean(plain)
-    columns = at_windows(made.data, estimates or observe(vessel, made.data, settings), windows)
+    columns = estimates_at_windows(made.data, estimates or run_observer(vessel, made.data, settings), windows)
     seen = mean(columns)
     low = cut_windows(smoothed(made.data), horizon=HORIZON, interval=5.0).select(late).columns
     current = np.array([made.current[str(run)] for run in windows.run]).T
-    ideal = {**windows.columns, **{f"observer.{name}": low[name] for name in MEASURED}}
+    ideal = {**windows.columns, **{f"observer.{name}": low[name] for name in MEASURED_MOTION}}
     ideal |= {f"observer.{name}": np.zeros(len(windows)) for name in "XYN"}
     ideal |= {"observer.current_north": current[0], "observer.current_east": current[1]}
     floor = mean(ideal)
@@ -167,7 +167,7 @@ def run() -> dict[str, float]:
                 text = f"{label}, {name}, {'known' if known else 'held'}"
                 figures |= {f"{text}: {key} [m]": round(value, 2) for key, value in rms.items()}
         begun = time.perf_counter()
-        observe(vessels["nominal"], made.data)
+        run_observer(vessels["nominal"], made.data)
         figures[f"{label}: update [ms]"] = round(1e3 * (time.perf_counter() - begun) / len(made.data.frame), 2)
     return figures
 

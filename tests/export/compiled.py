@@ -13,9 +13,9 @@ import pandas as pd
 import pytest
 
 from shipid.data.windows import Instants
-from shipid.export.c import Files, Precision
+from shipid.export.c import NumberPrecision, SourceFiles
 from shipid.export.c_predictor import predictor_files
-from shipid.export.model import Exportable, Model, model
+from shipid.export.model import Exportable, ExportModel, build_model
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-parameter")
@@ -30,7 +30,7 @@ def compiler() -> str:
     return program
 
 
-def write(files: Files, folder: Path) -> Path:
+def write(files: SourceFiles, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -52,11 +52,11 @@ def compile_(command: list[str], folder: Path, *arguments: str) -> None:
 _BUILT: dict[tuple[object, ...], Path] = {}  # text and options -> the library of the first test that compiled them
 
 
-def sources(files: Files) -> list[str]:
+def sources(files: SourceFiles) -> list[str]:
     return [name for name in files.texts if name.endswith(".c") and name != "main.c"]
 
 
-def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
+def library(files: SourceFiles, folder: Path, *options: str) -> ctypes.CDLL:
     """The source as a shared library; the same source is compiled once."""
     write(files, folder)
     key = (files.name, *sorted(files.texts.items()), *options)
@@ -66,7 +66,7 @@ def library(files: Files, folder: Path, *options: str) -> ctypes.CDLL:
     return ctypes.CDLL(str(_BUILT[key]))
 
 
-def run_example(files: Files, folder: Path, *options: str) -> str:
+def run_example(files: SourceFiles, folder: Path, *options: str) -> str:
     """Output of the example."""
     write(files, folder)
     compile_([compiler()], folder, *(options or ("-O0",)), "-o", "example", "main.c", *sources(files))
@@ -78,8 +78,8 @@ def run_example(files: Files, folder: Path, *options: str) -> str:
 class Recorder:
     """An exported predictor that is given rows."""
 
-    def __init__(self, predictor: Exportable, folder: Path, precision: Precision | None = None) -> None:
-        self.model, precision = model(predictor), precision or Precision()
+    def __init__(self, predictor: Exportable, folder: Path, precision: NumberPrecision | None = None) -> None:
+        self.model, precision = build_model(predictor), precision or NumberPrecision()
         self.files, self.real = predictor_files(self.model, "odd", precision), np.dtype(precision.real)
         write(self.files, folder)
         (folder / "size.c").write_text(
@@ -122,7 +122,7 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
 
 
 def paths(
-    loaded: ctypes.CDLL, name: str, exported: Model, instants: Instants, kind: type = np.float64
+    loaded: ctypes.CDLL, name: str, exported: ExportModel, instants: Instants, kind: type = np.float64
 ) -> tuple[np.ndarray, np.ndarray]:
     """Paths (T, S, 2) and results (S,) of the pure function."""
     given = {key: np.ascontiguousarray(values, dtype=kind) for key, values in exported.inputs(instants).items()}
@@ -137,7 +137,7 @@ def paths(
 
 
 def bands(
-    loaded: ctypes.CDLL, name: str, exported: Model, instants: Instants, *asked: float
+    loaded: ctypes.CDLL, name: str, exported: ExportModel, instants: Instants, *asked: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Paths (T, S, 2) and rows (T, S, 4) of their bands for level, pointwise, kind, and results (S,)."""
     given = {key: np.ascontiguousarray(values, dtype=float) for key, values in exported.inputs(instants).items()}

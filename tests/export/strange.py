@@ -21,7 +21,7 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
 from shipid.hybrid.ridge import smooth_basis
 from shipid.hybrid.units import Units
-from shipid.observer import COLUMNS, Observer
+from shipid.observer import ESTIMATE_COLUMNS, Observer
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -139,7 +139,7 @@ def _instants(rng, physics, commands, count, steps, slow, known):
     if physics.observer is not None:
         columns |= {"north": rng.uniform(-5, 5, count), "east": rng.uniform(-5, 5, count)}
         spread = {"X": 0.02, "Y": 0.02, "N": 0.002, "current_north": 0.2, "current_east": 0.2}
-        for name in COLUMNS:
+        for name in ESTIMATE_COLUMNS:
             near = rng.normal(0, slow * spread.get(name, 0.02), count)
             estimates[f"observer.{name}"] = columns.get(name, np.zeros(count)) + near
     return Instants(columns, past, planned, hidden, estimates)

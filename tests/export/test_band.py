@@ -11,10 +11,10 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.export.band import CHOICE, band_rows, radii_at
-from shipid.export.c import Precision
+from shipid.export.band import BAND_CHOICE, band_rows, radii_at
+from shipid.export.c import NumberPrecision
 from shipid.export.c_predictor import predictor_files
-from shipid.export.model import model
+from shipid.export.model import build_model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
 from shipid.hybrid.physics import Physics
@@ -44,8 +44,8 @@ def expected(predictor, instants, path, level, pointwise, kind):
 
 def agrees(predictor, instants, folder):
     """Half axes and directions of C are those of Python for every level; how many bands there were."""
-    exported, count = model(predictor), 0
-    loaded = library(predictor_files(exported, "odd", Precision()), folder)
+    exported, count = build_model(predictor), 0
+    loaded = library(predictor_files(exported, "odd", NumberPrecision()), folder)
     outside = np.where(predictor.outside(instants.columns), OUTSIDE, 0)
     for asked in ASKED:
         path, computed, results = bands(loaded, "odd", exported, instants, *asked)
@@ -90,11 +90,11 @@ def test_a_graph_of_the_band_is_the_arithmetic_of_python(seed):
     path[:, 0] = 0
     path[horizon // 2 :, 1] = path[horizon // 2, 1]
     path[1::2, 2] = 0
-    now = model(predictor).layout.now
+    now = build_model(predictor).layout.now
     columns = {name: values * np.where(np.arange(12) % 4 == 3, 30.0, 1.0) for name, values in instants.columns.items()}
     given = np.stack([columns.get(name, np.zeros(12)) for name in now], axis=1)
     place = {name: ca.MX.sym(name) for name in now}
-    shape, choice = ca.MX.sym("path", 2, horizon), [ca.MX.sym(name) for name in CHOICE]
+    shape, choice = ca.MX.sym("path", 2, horizon), [ca.MX.sym(name) for name in BAND_CHOICE]
     rows = band_rows(bands_, place, shape, 2.0, radii_at(bands_, *choice))
     function = ca.Function("band", [ca.vertcat(*place.values()), shape, *choice], [rows])
     for level, pointwise in ((0.005, False), (0.4, True), (0.905, False), (0.99, True)):
@@ -108,8 +108,8 @@ def test_a_graph_of_the_band_is_the_arithmetic_of_python(seed):
 def test_faults_give_a_result_and_no_band(tmp_path):
     strange = drawn("alone", 6, count=4, vessel="mariner")
     predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), limits={"u": (-1e9, 1e9)})
-    exported = model(predictor)
-    loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
+    exported = build_model(predictor)
+    loaded = library(predictor_files(exported, "odd", NumberPrecision()), tmp_path)
 
     def result(level=0.9, pointwise=0, kind=0, **changed):
         instants = replace(strange.instants, columns={**strange.instants.columns, **changed})
@@ -132,7 +132,7 @@ def test_a_band_adapts_as_in_python(tmp_path):
     rng = np.random.default_rng(0)
     strange = drawn("alone", 6, vessel="mariner")
     table = strange.predictor.bands
-    loaded = library(predictor_files(model(strange.predictor), "odd", Precision()), tmp_path)
+    loaded = library(predictor_files(build_model(strange.predictor), "odd", NumberPrecision()), tmp_path)
     for name, kinds in (("odd_adapted", "dddi"), ("odd_factor", "ddi")):
         function = getattr(loaded, name)
         function.argtypes = [ctypes.c_double if kind == "d" else ctypes.c_int for kind in kinds]
@@ -153,7 +153,7 @@ def test_casadi_gives_path_and_band(tmp_path):
     strange = drawn("path-drawn", 5, count=4, vessel="mariner")
     predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10))
     file, _ = predictor.export("casadi", tmp_path / "ship.casadi")
-    function, given = ca.Function.load(str(file)), model(predictor).inputs(strange.instants)
+    function, given = ca.Function.load(str(file)), build_model(predictor).inputs(strange.instants)
     for level, pointwise in ((0.9, False), (0.6, True)):
         right = predictor.predict(strange.instants, level=level, pointwise=pointwise)
         for i in range(4):
@@ -180,7 +180,7 @@ def test_casadi_gives_path_and_band(tmp_path):
 
 def test_no_bands_leave_no_trace():
     predictor = Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", Unchanged({}), {}, {"no_band": "too few"})
-    files = predictor_files(model(predictor), "m", Precision())
+    files = predictor_files(build_model(predictor), "m", NumberPrecision())
     assert "No band: too few." in files.texts["m.h"]
     assert "m_predict_band" not in files.texts["m.h"]
 

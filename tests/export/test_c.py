@@ -18,15 +18,15 @@ from shipid.data.dataset import Dataset, sample_columns
 from shipid.data.windows import Instants, past_of_instants
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
-from shipid.export.c import Files, Precision, c_name, comment, strings
+from shipid.export.c import NumberPrecision, SourceFiles, c_comment, c_name, c_strings
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.equations import Equations
-from shipid.export.model import model
+from shipid.export.model import build_model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import Memory
 from shipid.hybrid.physics import Physics
-from shipid.observer import AGE, LONGEST, MOST_PARTS, Observer, bank, observe
+from shipid.observer import AGE_COLUMN, LONGEST_FILTER_STEP, MOST_FILTER_STEPS, Observer, filter_bank, run_observer
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -64,8 +64,8 @@ def with_faults(instants, taken, rng):
 
 def agrees(strange, folder):
     """Paths, alarms and refusals are those of Python at instants with faults."""
-    exported = model(strange.predictor)
-    loaded = library(predictor_files(exported, "odd", Precision()), folder)
+    exported = build_model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", NumberPrecision()), folder)
     taken = [name for name in exported.layout.now if name in strange.instants.columns]
     instants, faulty, fast = with_faults(strange.instants, taken, np.random.default_rng(0))
     computed, results = paths(loaded, "odd", exported, instants)
@@ -96,8 +96,8 @@ def test_every_method_is_that_of_python_on_strange_ships(kind, seed, tmp_path):
 
 def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
     strange = drawn("path-drawn", 3, vessel="mariner")
-    exported = model(strange.predictor)
-    loaded = library(predictor_files(exported, "odd", Precision()), tmp_path)
+    exported = build_model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", NumberPrecision()), tmp_path)
     given = {key: np.ascontiguousarray(values[0]) for key, values in exported.inputs(strange.instants).items()}
     path, work = np.zeros((exported.layout.horizon, 2)), np.zeros(1_000_000)
 
@@ -121,13 +121,13 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
 def test_sanitizers_are_silent(kind, tmp_path):
     plain = (drawn(kind, seed) for seed in range(2, 20))
     strange = next(one for one in plain if one.predictor.physics.observer is None)
-    run_example(predictor_files(model(strange.predictor), "odd", Precision()), tmp_path, *SANITIZERS)
+    run_example(predictor_files(build_model(strange.predictor), "odd", NumberPrecision()), tmp_path, *SANITIZERS)
 
 
 @pytest.mark.slow
 def test_no_address_is_wrong_with_an_observer(tmp_path):
     predictor = Predictor(Physics(variety()["actuators"], 10, 1.0, "rk4", Observer()), "alone", Unchanged({}), {})
-    run_example(predictor_files(model(predictor), "odd", Precision()), tmp_path, "-fsanitize=address")
+    run_example(predictor_files(build_model(predictor), "odd", NumberPrecision()), tmp_path, "-fsanitize=address")
 
 
 @pytest.mark.slow
@@ -135,7 +135,7 @@ def test_a_prediction_is_fast_small_and_allocates_nothing(tmp_path):
     """Below 1 ms; object and working memory below 3 MB, for networks of some thousand weights and an observer."""
     physics = Physics(load_vessel("gunnerus-28.9"), 30, 1.0, observer=Observer())
     dataset = log_of(physics.vessel, 60, np.random.default_rng(1), 1.0)
-    estimates = observe(physics.vessel, dataset, physics.observer).columns
+    estimates = run_observer(physics.vessel, dataset, physics.observer).columns
     t = dataset.frame["t"].to_numpy()
     past = past_of_instants(dataset.frame, t, 10, 1.0, "position")
     predictor = remembering(physics, Memory(error=(10.0,), observer=True),
@@ -183,15 +183,17 @@ def reached_in(vessel, frame):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("velocity", "longest"), [(False, LONGEST), (True, LONGEST), (False, 0.1)])
+@pytest.mark.parametrize(
+    ("velocity", "longest"), [(False, LONGEST_FILTER_STEP), (True, LONGEST_FILTER_STEP), (False, 0.1)]
+)
 def test_a_recorder_knows_what_python_takes_from_a_log(velocity, longest, tmp_path, monkeypatch):
     """Past, actuators and estimates of the observer, row by row, at uneven times; also by parts of them."""
-    monkeypatch.setattr(observer, "LONGEST", longest)
+    monkeypatch.setattr(observer, "LONGEST_FILTER_STEP", longest)
     vessel = variety()["actuators"]
     dataset = log_of(vessel, 25, np.random.default_rng(1), 0.5)
     physics = Physics(vessel, 8, 1.0, "euler", Observer(), "velocity" if velocity else "position")
     rows, t = dataset.frame, dataset.frame["t"].to_numpy()
-    estimates = observe(vessel, dataset, physics.observer)
+    estimates = run_observer(vessel, dataset, physics.observer)
     late = np.flatnonzero(t > t[0] + 4.0)
     hidden = {name: values[late] for name, values in reached_in(vessel, rows).items()}
     past = past_of_instants(rows, t[late], 4, 1.0, physics.path)
@@ -269,7 +271,7 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
     corrector = drawn("learned-force", 1, vessel="gunnerus-28.9").predictor.corrector
     physics = Physics(vessel, 5, 1.0, "euler", ONE_FILTER)
     predictor = Predictor(physics, "learned-force", corrector, {"u": (-9.0, 9.0)})
-    columns, estimates = columns_of(dataset.frame), observe(vessel, dataset, physics.observer).columns
+    columns, estimates = columns_of(dataset.frame), run_observer(vessel, dataset, physics.observer).columns
     found, _ = Recorder(predictor, tmp_path).follow(dataset.frame)
     np.testing.assert_allclose(found, predictor.predict(Instants(columns, estimates=estimates)), rtol=0, atol=1e-10)
 
@@ -278,7 +280,7 @@ def test_a_recorder_observes_without_the_force_that_was_learned(tmp_path):
 def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_path):
     """Row by row over drawn logs with pauses, those after which the past alone begins anew aboard among them."""
     vessel = variety()["actuators"]
-    pause, anew = bank(vessel, ONE_FILTER).pause, 0
+    pause, anew = filter_bank(vessel, ONE_FILTER).pause, 0
     physics = Physics(vessel, 5, step, "rk4", ONE_FILTER)
     predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-99.0, 99.0)}, run_up=3.0)
     recorder = Recorder(predictor, tmp_path)
@@ -295,9 +297,9 @@ def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_pa
         parts = np.split(np.arange(len(t)), np.flatnonzero(begins))
         along = [reached_in(vessel, frame.iloc[part]) for part in parts]
         hidden = {name: np.concatenate([each[name] for each in along]) for name in along[0]}
-        estimates = observe(vessel, Dataset(frame, {"clock": "run"}), ONE_FILTER).columns
+        estimates = run_observer(vessel, Dataset(frame, {"clock": "run"}), ONE_FILTER).columns
         begun = np.repeat([t[part[0]] for part in parts], list(map(len, parts)))
-        np.testing.assert_allclose(estimates[AGE], t - begun, atol=1e-9)
+        np.testing.assert_allclose(estimates[AGE_COLUMN], t - begun, atol=1e-9)
         found, results = recorder.follow(frame)
         expected = predictor.predict(Instants(columns_of(frame), hidden=hidden, estimates=estimates))
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
@@ -311,7 +313,10 @@ def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(singl
     vessel = variety()["gunnerus-28.9"]
     physics = Physics(vessel, 5, 1.0, "rk4", ONE_FILTER)
     predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-99.0, 99.0)}, run_up=3.0)
-    recorder, limit = Recorder(predictor, tmp_path, Precision(single)), MOST_PARTS * bank(vessel, ONE_FILTER).longest
+    recorder, limit = (
+        Recorder(predictor, tmp_path, NumberPrecision(single)),
+        MOST_FILTER_STEPS * filter_bank(vessel, ONE_FILTER).longest,
+    )
     assert f"After {limit:.4g} s all does, pause or not." in recorder.files.texts["odd.h"]
     for apart, result in ((0.99 * limit, 0), (1.01 * limit, OUTSIDE), (1e9, OUTSIDE)):
         recorder.begin()
@@ -327,8 +332,8 @@ def test_the_past_begins_anew_before_the_observer_does(tmp_path):
     frame = log_of(vessel, 20, np.random.default_rng(1), 1.0).frame
     frame.loc[10:, "t"] += 6.0
     t, physics = frame["t"].to_numpy(), Physics(vessel, 5, 1.0, "rk4", ONE_FILTER)
-    estimates = observe(vessel, Dataset(frame, {"clock": "run"}), ONE_FILTER).columns
-    assert (np.diff(estimates[AGE]) > 0).all()
+    estimates = run_observer(vessel, Dataset(frame, {"clock": "run"}), ONE_FILTER).columns
+    assert (np.diff(estimates[AGE_COLUMN]) > 0).all()
     instants = Instants(sample_columns(frame, t), past_of_instants(frame, t, 3, 1.0, "position"), None, None, estimates)
     predictor = remembering(physics, Memory(history=(1.0, 3.0), observer=True), instants)
     found, results = Recorder(predictor, tmp_path).follow(frame)
@@ -344,7 +349,7 @@ def test_a_long_way_costs_single_precision_no_digits(tmp_path):
     t = log["t"].to_numpy()[12:]
     instants = Instants(sample_columns(log, t), past_of_instants(log, t, 10, 1.0, "velocity"))
     predictor = remembering(physics, Memory(history=(1.0, 10.0), error=(10.0,)), instants)
-    recorder = Recorder(predictor, tmp_path, Precision(single=True))
+    recorder = Recorder(predictor, tmp_path, NumberPrecision(single=True))
 
     def path_after(fast):
         """Path where so many rows of 2 km/s came before those of 7 m/s."""
@@ -360,8 +365,8 @@ def test_a_long_way_costs_single_precision_no_digits(tmp_path):
 @pytest.mark.slow
 def test_single_precision_is_near(tmp_path):
     strange = drawn("path-drawn", 5, vessel="mariner")
-    exported = model(strange.predictor)
-    loaded = library(predictor_files(exported, "odd", Precision(single=True)), tmp_path)
+    exported = build_model(strange.predictor)
+    loaded = library(predictor_files(exported, "odd", NumberPrecision(single=True)), tmp_path)
     computed, _ = paths(loaded, "odd", exported, strange.instants, np.float32)
     expected = strange.predictor.predict(strange.instants)
     assert np.abs(computed - expected).max() < 1e-4 * np.abs(expected).max()
@@ -369,7 +374,7 @@ def test_single_precision_is_near(tmp_path):
 
 def test_fast_math_is_refused_at_compilation(tmp_path):
     """It takes out isfinite: a row of NaN was kept, with result 0."""
-    write(vessel_files(load_vessel("mariner"), "odd", "rk4", Precision()), tmp_path)
+    write(vessel_files(load_vessel("mariner"), "odd", "rk4", NumberPrecision()), tmp_path)
     command = [compiler(), "-std=c99", "-O2", "-ffast-math", "-c", "odd.c"]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert result.returncode != 0
@@ -381,10 +386,10 @@ def test_fast_math_is_refused_at_compilation(tmp_path):
 def test_no_compiler_warns_of_a_conversion(program, single, tmp_path):
     if shutil.which(program) is None:
         pytest.skip(f"no {program}")
-    precision = Precision(single)
+    precision = NumberPrecision(single)
     for files in (
         vessel_files(drawn_ship(100, 4), "odd", "rk4", precision),
-        predictor_files(model(drawn("recurrent", 100).predictor), "odd", precision),
+        predictor_files(build_model(drawn("recurrent", 100).predictor), "odd", precision),
     ):
         options = ("-O0", "-Wsign-conversion", "-o", "example", "main.c")
         compile_([program], write(files, tmp_path), *options, *sources(files))
@@ -394,7 +399,7 @@ def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
     vessel = variety()["mariner"]
     adrift = vessel.with_values({f"thruster.{name}.off": True for name in vessel.document["thruster"]})
     predictor = Predictor(Physics(adrift, 3, 1.0, observer=Observer()), "alone", Unchanged({}))
-    library(predictor_files(model(predictor), "odd", Precision()), tmp_path)
+    library(predictor_files(build_model(predictor), "odd", NumberPrecision()), tmp_path)
 
 
 @pytest.mark.parametrize("name", ["actuators"])
@@ -406,7 +411,7 @@ def test_a_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
 @pytest.mark.parametrize("name", list(variety()))
 def test_every_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
     _steps(variety()[name], tmp_path, draw_inputs)
-    run_example(vessel_files(variety()[name], "ship", "rk4", Precision()), tmp_path / "example", *SANITIZERS)
+    run_example(vessel_files(variety()[name], "ship", "rk4", NumberPrecision()), tmp_path / "example", *SANITIZERS)
 
 
 def _steps(vessel, folder, draw_inputs):
@@ -414,7 +419,7 @@ def _steps(vessel, folder, draw_inputs):
     equations, slow, steps = Equations(vessel), pace(vessel), 60
     drawn_ = draw_inputs(vessel, 3)
     loads = 1e-3 * float(vessel.document["inertia"]["m"]) * np.ones(equations.model.num_dof)
-    loaded = library(vessel_files(vessel, "ship", "rk4", Precision()), folder)
+    loaded = library(vessel_files(vessel, "ship", "rk4", NumberPrecision()), folder)
     loaded.ship_step.argtypes = [*[ctypes.c_void_p] * 5, ctypes.c_double]
     expected = rollout(
         vessel, drawn_["start"], drawn_["commands"], drawn_["environment"], step=0.1 * slow, num_steps=steps,
@@ -448,7 +453,7 @@ def test_headers_say_what_is_not_in_them():
             predictor = Predictor(
                 Physics(load_vessel("mariner"), 6, 5.0, observer=settings), "alone", Unchanged({}), {}
             )
-            header = predictor_files(model(predictor), "m", Precision(single)).texts["m.h"]
+            header = predictor_files(build_model(predictor), "m", NumberPrecision(single)).texts["m.h"]
             assert ("from a point nearby" in header) == single
             assert ("std_u, std_v, std_r of a log" in header) == (settings is not None)
 
@@ -469,9 +474,9 @@ def test_names_are_those_of_c():
 
 def test_examples_run_and_end_with_the_result_of_a_row_that_is_refused(tmp_path):
     predictor = Predictor(Physics(load_vessel("mariner"), 6, 5.0), "alone", Unchanged({}), {"u": (0.0, 8.0)})
-    files = predictor_files(model(predictor), "m", Precision())
+    files = predictor_files(build_model(predictor), "m", NumberPrecision())
     assert "30 s: " in run_example(files, tmp_path / "a")
-    assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", Precision()), tmp_path / "b")
+    assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", NumberPrecision()), tmp_path / "b")
     broken = files.texts["main.c"].replace("m_real row[m_NUM_ROW] = {0", "m_real row[m_NUM_ROW] = {0.0 / 0.0", 1)
     write(replace(files, texts={**files.texts, "main.c": broken}), tmp_path)
     compile_([compiler()], tmp_path, "-O0", "-o", "example", "main.c", *sources(files))
@@ -480,12 +485,12 @@ def test_examples_run_and_end_with_the_result_of_a_row_that_is_refused(tmp_path)
 
 
 def test_a_comment_holds_what_is_printable_and_nothing_that_ends_it():
-    assert comment(["M \u202e */ x\x07"]) == "/*\n * M \\u202e * / x\\x07\n */"
+    assert c_comment(["M \u202e */ x\x07"]) == "/*\n * M \\u202e * / x\\x07\n */"
 
 
 def test_any_text_is_a_string_of_c(tmp_path):
     texts = ['zig "zag"', "ö ü", "🚢 turn", "a\nb\tc\x07", "what??/ \\ back", "é1", "%d", ""]
-    source = f"const char *const texts[] = {{\n    {strings(texts)}}};\n"
-    loaded = library(Files("texts", {"texts.c": source}), tmp_path, "-O0", "-trigraphs")
+    source = f"const char *const texts[] = {{\n    {c_strings(texts)}}};\n"
+    loaded = library(SourceFiles("texts", {"texts.c": source}), tmp_path, "-O0", "-trigraphs")
     stored = (ctypes.c_char_p * len(texts)).in_dll(loaded, "texts")
     assert [text.decode() for text in stored] == texts

@@ -14,11 +14,11 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.engine.rollout import rollout
-from shipid.export.model import model
+from shipid.export.model import build_model
 from shipid.export.write import export_predictor, export_vessel
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
-from shipid.observer import COLUMNS, Observer
+from shipid.observer import ESTIMATE_COLUMNS, Observer
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -30,12 +30,12 @@ def test_a_predictor_is_one_function(kind, tmp_path):
     strange = drawn(kind, 5, count=4, vessel="mariner")
     file, names, *_ = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
     function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
-    given = model(strange.predictor).inputs(strange.instants)
+    given = build_model(strange.predictor).inputs(strange.instants)
     expected = strange.predictor.predict(strange.instants)
     for i in range(4):
         path = np.array(function(**{key: values[i] for key, values in given.items()})["path"])
         np.testing.assert_allclose(path.T, expected[:, i], rtol=0, atol=1e-11)
-    assert [entry["name"] for entry in listed["inputs"]["now"]] == list(model(strange.predictor).layout.now)
+    assert [entry["name"] for entry in listed["inputs"]["now"]] == list(build_model(strange.predictor).layout.now)
 
 
 @pytest.mark.parametrize("settings", [Observer(), Observer(measured=("psi", "u", "v", "r"), current=0.0)])
@@ -48,14 +48,14 @@ def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
         for name in ("north", "east", "psi", "u", "v", "r", *vessel_dynamics(vessel).commands)
     }
     columns |= {"u": np.full(3, 7.0)}
-    estimates = {f"observer.{name}": columns.get(name, 0.0) + rng.normal(0, 1e-4, 3) for name in COLUMNS}
+    estimates = {f"observer.{name}": columns.get(name, 0.0) + rng.normal(0, 1e-4, 3) for name in ESTIMATE_COLUMNS}
     estimates["observer.north"] = estimates["observer.north"] + 300.0
     predictor = Predictor(
         Physics(vessel, 4, 5.0, observer=settings, path=path), "alone", Unchanged({}), {"u": (0.0, 9.0)}
     )
     instants = Instants(columns, estimates=estimates)
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
-    given, expected = model(predictor).inputs(instants), predictor.predict(instants)
+    given, expected = build_model(predictor).inputs(instants), predictor.predict(instants)
     for i in range(3):
         seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
         np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=0, atol=1e-9)
@@ -70,7 +70,7 @@ def test_a_path_that_diverged_is_none(step, tmp_path):
     columns |= {"propeller.n": np.array([1.3, 0.0]), "rudder.delta": np.array([0.5, 0.0])}
     predictor = Predictor(Physics(vessel, 6, step), "alone", Unchanged({}), {"u": (0.0, 9.0)})
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
-    given, expected = model(predictor).inputs(Instants(columns)), predictor.predict(Instants(columns))
+    given, expected = build_model(predictor).inputs(Instants(columns)), predictor.predict(Instants(columns))
     for i in range(2):
         seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
         np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=1e-9)
@@ -85,9 +85,9 @@ def test_an_observer_without_wind_and_current_has_derivatives(tmp_path):
         "known",
     )  # fmt: skip
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
-    function, names = ca.Function.load(str(file)), model(predictor).layout
+    function, names = ca.Function.load(str(file)), build_model(predictor).layout
     given = {key: np.zeros(size) for key, size in names.sizes.items()}
-    given |= {"parameters": model(predictor).parameters}
+    given |= {"parameters": build_model(predictor).parameters}
     given["now"][names.now.index("u")] = given["estimates"][names.estimates.index("observer.u")] = 4.0
     orders = ca.MX.sym("orders", names.sizes["planned"])
     path = function(**{**given, "planned": orders})["path"]
@@ -109,7 +109,7 @@ def test_an_observer_without_wind_and_current_has_derivatives(tmp_path):
 def test_a_point_of_the_training_has_derivatives():
     """Before, those of `modules` by the state at it, which has no distance to the nearest one, were no numbers."""
     strange = drawn("modules", 301, count=1)
-    exported = model(strange.predictor)
+    exported = build_model(strange.predictor)
     given = {key: values[0] for key, values in exported.inputs(strange.instants).items()}
     now = ca.MX.sym("now", exported.layout.sizes["now"])
     path = exported.function(**{**given, "now": now})["path"]

@@ -25,8 +25,8 @@ from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.export import fmu
 from shipid.export.c import c_name
-from shipid.export.fmu import description, predictor_unit, vessel_unit, write_fmu
-from shipid.export.model import model
+from shipid.export.fmu import model_description, predictor_unit, vessel_unit, write_fmu
+from shipid.export.model import build_model
 from shipid.export.write import export_vessel
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import MOTIONS, Memory
@@ -58,7 +58,7 @@ def predictor():
 def aboard(predictor, tmp_path_factory):
     compiler()
     file = tmp_path_factory.mktemp("fmu") / "path.fmu"
-    assert write_fmu(predictor_unit(model(predictor), "path"), file)
+    assert write_fmu(predictor_unit(build_model(predictor), "path"), file)
     return file
 
 
@@ -82,7 +82,7 @@ def test_any_name_of_a_ship_is_one_of_xml():
     """Before, no tool could read an FMU of a ship whose name has a control character."""
     vessel = load_vessel("mariner")
     odd = check_document({**vessel.document, "name": 'a\x07b\n<"ø🚢&'}, "odd.toml")
-    root = ET.fromstring(description(vessel_unit(odd, "ship", "rk4"), "{1}").encode())
+    root = ET.fromstring(model_description(vessel_unit(odd, "ship", "rk4"), "{1}").encode())
     assert root.get("modelName") == 'a\ufffdb\n<"ø🚢&'
 
 
@@ -352,7 +352,9 @@ int main(void)
 
 def test_a_row_that_is_refused_leaves_the_alarm_of_the_path_that_is_there(predictor, aboard, tmp_path):
     """Before, the alarm of a path outside of the training was gone after a row whose time did not go on."""
-    places = {variable.name: place for place, variable in enumerate(predictor_unit(model(predictor), "path").variables)}
+    places = {
+        variable.name: place for place, variable in enumerate(predictor_unit(build_model(predictor), "path").variables)
+    }
     assert places["u"] == 3
     run_c(aboard, REFUSED_ROW.replace("NUM_REALS_BEFORE", str(places["instant"])), tmp_path)
 
@@ -442,7 +444,7 @@ def test_a_long_past_is_not_on_the_stack(tmp_path, monkeypatch):
     network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
     predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}))
     monkeypatch.setattr(fmu, "BINARIES", {})  # its sources alone
-    write_fmu(predictor_unit(model(predictor), "path"), tmp_path / "path.fmu")
+    write_fmu(predictor_unit(build_model(predictor), "path"), tmp_path / "path.fmu")
     with zipfile.ZipFile(tmp_path / "path.fmu") as archive:
         archive.extractall(tmp_path)
     command = [compiler(), *FLAGS, "-Wframe-larger-than=32768", "-c", "path.c", "-o", "path.o"]
@@ -454,7 +456,7 @@ def test_a_long_past_is_not_on_the_stack(tmp_path, monkeypatch):
 def test_no_name_collides_with_those_of_the_source(predictor, name, tmp_path):
     compiler()
     title = c_name(name)
-    for unit in (predictor_unit(model(predictor), title), vessel_unit(variety()["actuators"], title, "rk4")):
+    for unit in (predictor_unit(build_model(predictor), title), vessel_unit(variety()["actuators"], title, "rk4")):
         assert write_fmu(unit, tmp_path / "a.fmu")  # compiled
 
 
@@ -794,7 +796,7 @@ def test_the_band_of_a_predictor_is_that_of_python(tmp_path):
     bands = replace(strange.predictor.bands, runs=10)
     predictor = Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 8.0)}, {}, "held", bands=bands)
     file = tmp_path / "banded.fmu"
-    assert write_fmu(predictor_unit(model(predictor), "banded"), file)
+    assert write_fmu(predictor_unit(build_model(predictor), "banded"), file)
     assert pytest.importorskip("fmpy.validation").validate_fmu(str(file)) == []
     t = np.arange(0.0, 21.0)
     u, delta = 6 + np.sin(t / 10), np.full_like(t, 0.1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.export.model import model
+from shipid.export.model import build_model
 from shipid.export.write import export_predictor
 from shipid.hybrid.features import feature_table
 from tests.export.strange import drawn
@@ -39,4 +39,4 @@ def test_what_has_no_networks_is_refused_in_one_line(tmp_path):
     pytest.importorskip("onnx")
     with pytest.raises(ShipidError, match="ONNX takes path-drawn"):
         export_predictor(drawn("alone", 5, vessel="mariner").predictor, "onnx", tmp_path / "a.onnx")
-    assert model(drawn("alone", 5, vessel="mariner").predictor).layout.now
+    assert build_model(drawn("alone", 5, vessel="mariner").predictor).layout.now

@@ -12,8 +12,8 @@ import pytest
 from shipid.errors import ShipidError
 from shipid.export.c import c_name
 from shipid.export.fmu import predictor_unit, vessel_unit
-from shipid.export.model import model
-from shipid.export.write import TARGETS, export_predictor, export_vessel
+from shipid.export.model import build_model
+from shipid.export.write import EXPORT_TARGETS, export_predictor, export_vessel
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.compensator import Normaliser
@@ -33,7 +33,7 @@ def simple():
 @pytest.mark.parametrize("kind", ["path-drawn", "recurrent"])
 def test_no_name_of_an_export_is_one_of_its_source(kind):
     """Before, a predictor called `guid`, `kinds` or `no` gave an FMU that no compiler took."""
-    kept = model(drawn(kind, 1).predictor)
+    kept = build_model(drawn(kind, 1).predictor)
     vessel = vessel_unit(load_vessel("mariner"), "zzz", "rk4")
     for unit in (predictor_unit(kept, "zzz"), vessel):
         source = "\n".join([*unit.files.texts.values(), unit.wrapper])
@@ -64,9 +64,9 @@ def test_an_example_that_the_user_has_made_hers_is_kept(simple, tmp_path):
 def test_on_a_full_disk_the_export_that_was_there_stays(simple, tmp_path, monkeypatch, to, seed):
     """Before, CasADi wrote a part of its function and said nothing, and the names of the old one were gone."""
     resource = pytest.importorskip("resource")
-    file = tmp_path / f"ship{TARGETS[to].ending}"
+    file = tmp_path / f"ship{EXPORT_TARGETS[to].ending}"
     old = {one: one.read_bytes() for one in simple.export(to, file)}
-    monkeypatch.setattr("shipid.export.write.EXAMPLE", "none")
+    monkeypatch.setattr("shipid.export.write.EXAMPLE_FILE", "none")
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     least = int(np.random.default_rng(seed).integers(max(map(len, old.values()))))
     resource.setrlimit(resource.RLIMIT_FSIZE, (least, hard))
@@ -82,9 +82,9 @@ def test_on_a_full_disk_the_export_that_was_there_stays(simple, tmp_path, monkey
 @pytest.mark.parametrize("to", ["c", "fmu", "casadi"])
 def test_no_export_needs_a_temporary_folder_of_the_system(to, simple, tmp_path, monkeypatch):
     """Before, a full one ended the export, and the error named another disk."""
-    expected = [file.name for file in simple.export(to, tmp_path / f"first/ship{TARGETS[to].ending}")]
+    expected = [file.name for file in simple.export(to, tmp_path / f"first/ship{EXPORT_TARGETS[to].ending}")]
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    written = simple.export(to, tmp_path / f"second/ship{TARGETS[to].ending}")
+    written = simple.export(to, tmp_path / f"second/ship{EXPORT_TARGETS[to].ending}")
     assert [file.name for file in written] == expected
     assert all(file.stat().st_size for file in written)
 
@@ -109,7 +109,7 @@ def test_a_wrong_wish_is_one_line(simple, tmp_path, to, out, options, message):
 def test_a_vessel_has_no_networks(tmp_path):
     with pytest.raises(ShipidError, match="export it to c, fmu or casadi"):
         export_vessel(load_vessel("mariner"), "onnx", tmp_path / "a.onnx")
-    assert set(TARGETS) == {"c", "fmu", "casadi", "onnx"}
+    assert set(EXPORT_TARGETS) == {"c", "fmu", "casadi", "onnx"}
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from shipid.hybrid.features import Inputs, Memory, input_group
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.path_drawn import MEMORIES, MEMORY_KINDS, PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.observer import Observer, observe
+from shipid.observer import Observer, run_observer
 from shipid.study.prepare import at_instants
 from shipid.vessel.load import load_vessel
 from tests.hybrid.mirror import mirrored
@@ -36,7 +36,7 @@ def known_at(dataset: Dataset, windows: Windows, foundation: Physics) -> dict[st
     """What the observer of a foundation knows at the windows."""
     if foundation.vessel is None or foundation.observer is None:
         return {}
-    return at_instants(dataset, windows, observe(foundation.vessel, dataset, foundation.observer))
+    return at_instants(dataset, windows, run_observer(foundation.vessel, dataset, foundation.observer))
 
 
 def task(dataset: Dataset, foundations: dict[str, Physics], future: Array | None = None, seed: int = 3) -> Task:

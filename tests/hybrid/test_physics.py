@@ -12,7 +12,7 @@ from shipid.data.windows import Instants, Windows, cut_windows, to_frame
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, ShipidError
 from shipid.hybrid.physics import Physics, check_columns, missing_columns
-from shipid.observer import MEASURED, Observer, observe
+from shipid.observer import MEASURED_MOTION, Observer, run_observer
 from shipid.study.prepare import at_instants
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -75,7 +75,7 @@ def test_the_slope_of_the_error_is_that_of_differences(seen: bool) -> None:
     dataset = windy("ab")
     windows = cut_windows(dataset, horizon=5, interval=4.0)
     physics = replace(WRONG, observer=Observer()) if seen else WRONG
-    known = at_instants(dataset, windows, observe(SHIP, dataset, Observer()) if seen else None)
+    known = at_instants(dataset, windows, run_observer(SHIP, dataset, Observer()) if seen else None)
     instants, names = windows.instants(estimates=known), ["hull.derivatives.N_ur", "inertia.m"]
     values = np.array(list(SHIP.with_values({"hull.derivatives.N_ur": -3e5}).parameters.values()))
     places = [list(SHIP.parameters).index(name) for name in names]
@@ -135,7 +135,7 @@ def afloat(count: int = 4) -> Instants:
     columns["u"] += 3.0
     columns |= {f"{side}.n": rng.uniform(1.0, 3.0, count) for side in ("port", "starboard")}
     columns |= {f"{side}.alpha": rng.uniform(-0.3, 0.3, count) for side in ("port", "starboard")}
-    known = {f"observer.{name}": columns[name] + 0.01 * rng.normal(size=count) for name in MEASURED}
+    known = {f"observer.{name}": columns[name] + 0.01 * rng.normal(size=count) for name in MEASURED_MOTION}
     known |= {f"observer.{name}": 1e-3 * rng.normal(size=count) for name in "XYN"}
     known |= {f"observer.current_{name}": rng.uniform(0.2, 0.5, count) for name in ("north", "east")}
     return Instants(columns, estimates=known)

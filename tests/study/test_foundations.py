@@ -18,7 +18,7 @@ from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
 from shipid.metrics import position_error
-from shipid.observer import Observer, observe
+from shipid.observer import Observer, run_observer
 from shipid.predictor import Predictor
 from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
@@ -147,7 +147,7 @@ def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Reco
     assert shared.sum() > 10
     for name, values in prepared.estimates["plain"].columns.items():
         np.testing.assert_array_equal(values[~shared], other.estimates["plain"].columns[name][~shared], err_msg=name)
-    alone = observe(plan.foundations[1].vessel, dataset, plan.foundations[1].observer)  # type: ignore[arg-type]
+    alone = run_observer(plan.foundations[1].vessel, dataset, plan.foundations[1].observer)  # type: ignore[arg-type]
     mine = (frame["run"] == "c").to_numpy()
     np.testing.assert_array_equal(
         prepared.estimates["plain"].columns["observer.u"][mine], alone.columns["observer.u"][mine]

@@ -330,7 +330,7 @@ def test_nothing_that_a_prediction_knows_depends_on_a_later_fix(
     assert not np.array_equal(data[0].frame["u"][10:11], data[1].frame["u"][10:11])  # row 10 s is on the way to 12 s
     np.testing.assert_array_equal(one.columns["u"][early], other.columns["u"][early])
     np.testing.assert_array_equal(one.past["u"][:, early], other.past["u"][:, early])
-    monkeypatch.setattr("shipid.study.prepare.observe", lambda _, dataset, *__, **___: dataset.frame)
+    monkeypatch.setattr("shipid.study.prepare.run_observer", lambda _, dataset, *__, **___: dataset.frame)
     frames = [estimates_of(plan.study, plan.foundations[0], dataset, one) for dataset in data]
     rows = data[0].frame["t"] <= 11.0
     assert frames[0][rows].equals(frames[1][rows])  # type: ignore[index]

@@ -21,7 +21,7 @@ from shipid.errors import DocumentError
 from shipid.hybrid.features import Inputs, Memory, input_group
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
-from shipid.observer import Estimates, Observer, observe
+from shipid.observer import Estimates, Observer, run_observer
 from shipid.predictor import Predictor
 from shipid.study import apply, store
 from shipid.study.apply import predict_log
@@ -111,7 +111,7 @@ def observed_once() -> Iterator[None]:
     def once(vessel: Vessel, dataset: Dataset, observer: Observer) -> Estimates:
         key = (vessel.digest, tuple(vessel.parameters.items()), dataset.digest, observer.model_dump_json())
         if key not in seen:
-            seen[key] = observe(vessel, dataset, observer)
+            seen[key] = run_observer(vessel, dataset, observer)
         return seen[key]
 
     with patch.object(apply, "observe", once):
@@ -200,7 +200,7 @@ def test_stored_predictors_give_the_paths_of_the_results(whole: Finished, result
         again = Predictor.load(first.save(whole.folder.parent / "again.npz"))
         estimates = None
         if again.vessel is not None and again.physics.observer is not None:
-            estimates = apply.observe(again.vessel, results.dataset, again.physics.observer)
+            estimates = apply.run_observer(again.vessel, results.dataset, again.physics.observer)
         instants = instants_of(whole.plan.study, again.vessel, results.dataset, results.test, estimates)
         np.testing.assert_allclose(again.predict(instants), results.paths[cell], atol=1e-9, err_msg=cell)
 
@@ -245,7 +245,7 @@ def inputs_at(dataset: Dataset, physics: Physics, known: bool) -> tuple[Windows,
     windows = cut_windows(dataset, horizon=5, past=6)
     assert physics.vessel is not None
     assert physics.observer is not None
-    estimates = at_instants(dataset, windows, observe(physics.vessel, dataset, physics.observer))
+    estimates = at_instants(dataset, windows, run_observer(physics.vessel, dataset, physics.observer))
     inputs = Inputs(tuple(dataset.commands), Memory(**EVERYTHING))
     return windows, inputs.table(physics, windows.instants(known=known, estimates=estimates))
 
