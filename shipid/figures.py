@@ -26,7 +26,7 @@ from shipid.report import factors as models
 from shipid.report import search as trials
 from shipid.report.checks import CheckContent
 from shipid.report.content import ReportContent
-from shipid.report.figure import Figure, draw_alone, dress_panels
+from shipid.report.figure import PageFigure, draw_alone, dress_panels
 from shipid.report.identification import IdentificationContent
 from shipid.report.manoeuvre import ManoeuvreContent
 
@@ -67,7 +67,7 @@ __all__ = [
 def error_map(source: Source, *, dark: bool = False) -> go.Figure:
     """H over the accuracy A of the physics and the amount of data N_D; needs several N_D and two physics models."""
     content = content_of(source)
-    return _draw(physics_and_data.error_map(content), dark=dark, lack=physics_and_data.map_lack(content))
+    return _draw(physics_and_data.map_figure(content), dark=dark, lack=physics_and_data.map_lack(content))
 
 
 def gain(
@@ -80,18 +80,18 @@ def gain(
     """H over N_D, a line per model; A beside H, a row per model, where there is a single N_D (`scale` is not used)."""
     content = content_of(source)
     chosen = [statistic, scale] if content.cells["N_D"].nunique() > 1 else [statistic]
-    return _draw(physics_and_data.gain(content), chosen, dark=dark, lack=physics_and_data.gain_lack(content))
+    return _draw(physics_and_data.gain_figure(content), chosen, dark=dark, lack=physics_and_data.gain_lack(content))
 
 
 def coverage(source: Source, N_D: int | None = None, *, dark: bool = False) -> go.Figure:
     """Share of whole test paths in their bands over the share promised, with intervals; `N_D` default: the most."""
-    return _draw(bands.coverage(content_of(source)), [N_D], dark=dark)
+    return _draw(bands.coverage_figure(content_of(source)), [N_D], dark=dark)
 
 
 def width_map(source: Source, *, dark: bool = False) -> go.Figure:
     """Mean radius of the bands over the accuracy A of the physics and the amount of data N_D."""
     content = content_of(source)
-    return _draw(bands.width_map(content), dark=dark, lack=physics_and_data.map_lack(content))
+    return _draw(bands.width_figure(content), dark=dark, lack=physics_and_data.map_lack(content))
 
 
 def error_over_horizon(
@@ -102,12 +102,12 @@ def error_over_horizon(
     dark: bool = False,
 ) -> go.Figure:
     """Error over the time ahead, of position [m] or course [deg]; `N_D` default: the most."""
-    return _draw(errors_over.error_over_horizon(content_of(source)), [statistic, N_D], dark=dark)
+    return _draw(errors_over.horizon_figure(content_of(source)), [statistic, N_D], dark=dark)
 
 
 def error_over_time(source: Source, run: str | None = None, *, dark: bool = False) -> go.Figure:
     """Position error at each instant of prediction of a test run, with its commands below; with the largest N_D."""
-    return _draw(errors_over.error_over_time(content_of(source)), [run], dark=dark)
+    return _draw(errors_over.time_figure(content_of(source)), [run], dark=dark)
 
 
 def prediction(
@@ -125,29 +125,29 @@ def prediction(
         raise ShipidError(f"t must be a time in seconds, not {t}", path="prediction")
     content = content_of(source)
     window, size = paths.find_window(content, run, t, N_D)
-    record = paths.browser(content)
+    record = paths.browser_figure(content)
     assert record is not None  # find_window has raised where there are no windows
     return dress_panels(record, [paths.draw_window(content, window, size)], dark=dark)
 
 
 def factors(source: Source, *, dark: bool = False) -> go.Figure:
     """Factors of the perturbed numbers of every model, as dots on a logarithmic axis."""
-    return _draw(models.factors(content_of(source)), dark=dark)
+    return _draw(models.factors_figure(content_of(source)), dark=dark)
 
 
 def tracks(source: Source, *, dark: bool = False) -> go.Figure:
     """Map of the tracks of all runs, north up; runs of the test in another colour than all others."""
-    return _draw(logs.manoeuvres(content_of(source)), dark=dark)
+    return _draw(logs.tracks_figure(content_of(source)), dark=dark)
 
 
 def envelope(source: Source, *, dark: bool = False) -> go.Figure:
     """Least, mean and greatest value of every input, per set of runs."""
-    return _draw(logs.envelope(content_of(source)), dark=dark)
+    return _draw(logs.envelope_figure(content_of(source)), dark=dark)
 
 
 def search(source: Source, N_D: int | Literal["all"] | None = None, *, dark: bool = False) -> go.Figure:
     """Error of the trials of the search over each hyperparameter."""
-    return _draw(trials.search(content_of(source)), [] if N_D is None else [N_D], dark=dark)
+    return _draw(trials.search_figure(content_of(source)), [] if N_D is None else [N_D], dark=dark)
 
 
 def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
@@ -164,46 +164,50 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
 
 def estimates(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Estimates of an identification with 95 % intervals, as factors on the base values."""
-    return _draw(identification.estimates(_identification(source)), dark=dark)
+    return _draw(identification.estimates_figure(_identification(source)), dark=dark)
 
 
 def correlations(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Correlations of the estimates of an identification; needs two of them."""
-    return _draw(identification.correlations(_identification(source)), dark=dark)
+    return _draw(identification.correlations_figure(_identification(source)), dark=dark)
 
 
 def free_runs(source: Identified | IdentificationContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
     """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
-    return _draw(identification.free_runs(_identification(source)), [run], dark=dark)
+    return _draw(identification.free_runs_figure(_identification(source)), [run], dark=dark)
 
 
 def residuals(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Autocorrelation of the residuals of an identification."""
-    return _draw(identification.residuals(_identification(source)), dark=dark)
+    return _draw(identification.residuals_figure(_identification(source)), dark=dark)
 
 
 def profiles(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Profile likelihoods of an identification, of the paths that were asked for."""
-    return _draw(identification.profiles(_identification(source)), dark=dark)
+    return _draw(identification.profiles_figure(_identification(source)), dark=dark)
 
 
 def track(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Track of a standard manoeuvre, north up, ship to scale."""
-    return _draw(manoeuvre.track(_manoeuvre(source)), dark=dark)
+    return _draw(manoeuvre.track_figure(_manoeuvre(source)), dark=dark)
 
 
 def histories(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Heading, helm, speeds and yaw rate of a standard manoeuvre over time."""
-    return _draw(manoeuvre.histories(_manoeuvre(source)), dark=dark)
+    return _draw(manoeuvre.histories_figure(_manoeuvre(source)), dark=dark)
 
 
 def spiral(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Steady yaw rate over helm angle, of a spiral."""
-    return _draw(manoeuvre.spiral(_manoeuvre(source)), dark=dark)
+    return _draw(manoeuvre.spiral_figure(_manoeuvre(source)), dark=dark)
 
 
 def _draw(
-    figure: Figure | None, chosen: Sequence[object] = (), *, dark: bool, lack: str = "the results hold no rows for it"
+    figure: PageFigure | None,
+    chosen: Sequence[object] = (),
+    *,
+    dark: bool,
+    lack: str = "the results hold no rows for it",
 ) -> go.Figure:
     """Draw a figure of a page; ShipidError where there is none, with what the source lacks for it."""
     if figure is None:

@@ -36,7 +36,7 @@ from shipid.physics import TERMS, Term, helm, signals
 from shipid.physics.frames import wrench_of_force
 from shipid.physics.signals import Signal
 from shipid.predictor import fit
-from shipid.report.wording import number
+from shipid.report.wording import number_text
 from shipid.schemas import document_schema as schema_of
 from shipid.simulation import manoeuvre
 from shipid.simulation.approach import Controls
@@ -443,7 +443,7 @@ def test_a_document_the_measures_of_a_log_and_the_command_take_the_manoeuvre(tmp
     done = command("manoeuvre", "kvlcc2-l7", "coast-down", "--out", page)
     assert done["title"] == "coast down"
     assert [row["measure"] for row in done["measures"]] == list(rows)
-    assert re.search(rf"half run: {number(done['measures'][2]['value'])}\sm", page.read_text())
+    assert re.search(rf"half run: {number_text(done['measures'][2]['value'])}\sm", page.read_text())
     with pytest.raises(ShipidError, match="coast-down takes no angles"):
         define_standard(load_vessel("kvlcc2-l7"), "coast-down", 10)
 

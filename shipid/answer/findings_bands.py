@@ -41,7 +41,7 @@ from shipid.answer.verdict import (
 )
 from shipid.evidence import all_significant, any_significant, share_interval
 from shipid.metrics import coverage_share, rank_correlation
-from shipid.report.wording import listed
+from shipid.report.wording import listed_names
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import judged_method
 from shipid.study.results import Results
@@ -180,7 +180,7 @@ def _judge_promise(bands: BandEvidence) -> Judgement:
         like = np.isin(promise.kinds, list(promise.calibrated))
         these, count = sorted(set(promise.kinds[~like])), len(set(promise.run[~like]))
         if count:
-            left_out = f"no run of the kind {listed(these)} calibrated them, so they promise nothing for "
+            left_out = f"no run of the kind {listed_names(these)} calibrated them, so they promise nothing for "
             left_out += count_manoeuvres(count)
         if not like.any():
             raise Undecided(left_out)

@@ -67,7 +67,7 @@ from shipid.evidence import (
     which_significant,
 )
 from shipid.metrics import path_roughness, rank_correlation
-from shipid.report.wording import listed
+from shipid.report.wording import listed_names
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import judged_method
 from shipid.study.results import Results
@@ -236,7 +236,7 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
     lead = table.lead(NO_MODEL, high, place)
     better, worse = which_significant(lead.above), which_significant(lead.below)
     worst = [model for model, behind in zip(high, worse, strict=True) if behind]
-    names = f" ({listed([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
+    names = f" ({listed_names([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
     evidence = (
         f"at N_D = {grid.amounts[-1]}, {better.sum()} of {len(better)} high models "
         f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
@@ -296,7 +296,7 @@ def _judge_metric(grid: ErrorGrid) -> Judgement:
     words = [f"{key} is {by_90} instead of {by_mean}" for key, (by_mean, by_90) in changed.items()]
     evidence = (
         f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
-        f"{listed(words) if words else 'S1-S4 are the same'}"
+        f"{listed_names(words) if words else 'S1-S4 are the same'}"
     )
     enough = grid.table.runs >= FEWEST_RUNS
     decided = verdict_of(enough and alike >= ALIKE and not opposite, enough and (opposite or alike < UNLIKE))

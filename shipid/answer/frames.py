@@ -13,8 +13,8 @@ from shipid.files import read_json
 from shipid.hybrid.bands import Region
 from shipid.metrics import course_over_horizon, error_of_steps, error_of_windows, over_horizon_by_axis, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
-from shipid.report import Snapshot
-from shipid.report.selection import FEW_RUNS, spread
+from shipid.report import WindowSnapshot
+from shipid.report.selection import FEW_RUNS, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
 from shipid.study.envelope import envelope_table
@@ -38,7 +38,7 @@ def shown_amounts(results: Results) -> list[int]:
 
 def shown_runs(results: Results) -> list[str]:
     """Test runs that figures over time show: of many some at even distances, first and last included."""
-    return spread(list(results.test.spans), FEW_RUNS)
+    return spread_items(list(results.test.spans), FEW_RUNS)
 
 
 def alone_models(results: Results) -> frozenset[str]:
@@ -166,7 +166,7 @@ def commands_frame(results: Results) -> pd.DataFrame:
     return insert_gaps(result, ["run"])
 
 
-def window_snapshots(results: Results) -> list[Snapshot]:
+def window_snapshots(results: Results) -> list[WindowSnapshot]:
     """Windows of the shown test runs, spread over each run, with every model's paths of the first seed."""
     particulars: Mapping[str, float] = next(
         (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
@@ -189,7 +189,7 @@ def window_snapshots(results: Results) -> list[Snapshot]:
         for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             lines = {key: path[:, index] for key, path in paths.items() if np.isfinite(path[:, index]).all()}
             windows.append(
-                Snapshot(
+                WindowSnapshot(
                     run=run,
                     t=round(float(test.t[index] - begins[run]), CLOCK),
                     outline=ship_outline(particulars),

@@ -17,9 +17,9 @@ from shipid.arguments import as_path
 from shipid.errors import ResultError
 from shipid.files import temporary_folder, write_table, write_text
 from shipid.metrics import summarise_errors
-from shipid.report import Finding, ReportContent, Sentence, write_report, write_summary
+from shipid.report import AnswerSentence, ReportContent, ReportFinding, write_report, write_summary
 from shipid.report.comparison import write_comparison
-from shipid.report.methods import MethodsContent, verdicts
+from shipid.report.methods import MethodsContent, sentences_on_methods
 from shipid.study import store
 from shipid.study.declared import NO_MODEL
 from shipid.study.lock import PAGES, sole_writer
@@ -54,13 +54,16 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         tables[name] = frames.count_from_start(results, frame(results))
     if say is not None:
         say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
-    words = *sentences.answer_sentences(results, verdicts(tables["methods"])), *bands.answer_on_bands(results)
+    words = (
+        *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
+        *bands.answer_on_bands(results),
+    )
     best, naive = sentences.best_model(results), summarise_errors(results.naive)
     return ReportContent(
         title=plan.study.question,
         name=plan.name,
-        answer=[Sentence(text, figure) for text, figure in words],
-        findings=[Finding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in judge_findings(results)],
+        answer=[AnswerSentence(text, figure) for text, figure in words],
+        findings=[ReportFinding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in judge_findings(results)],
         cells=results.cells,
         naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
         models=_shown_models(results),

@@ -27,7 +27,7 @@ from shipid.answer.verdict import (
 from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
-from shipid.report.wording import listed
+from shipid.report.wording import listed_names
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, judged_method, learning_methods, orders_may_react
 from shipid.study.results import Results
@@ -230,7 +230,7 @@ def _least_errors(errors: pd.Series[float]) -> str:
     shown = errors.sort_values(kind="stable")[:MOST_SHOWN]
     of = f" (the least of {len(errors)})" if len(errors) > MOST_SHOWN else ""
     words = [f"{quoted_model(str(name))} {length_in_metres(value)}" for name, value in shown.items()]
-    return f"{of}: {listed(words, MOST_SHOWN)}"
+    return f"{of}: {listed_names(words, MOST_SHOWN)}"
 
 
 def _horizon_in_words(results: Results) -> str:

@@ -9,8 +9,8 @@ from typing import Any, Generic, Literal, TypedDict, TypeVar
 import numpy as np
 
 from shipid.evidence import FEWEST_RUNS, Differences
-from shipid.report.content import spoken
-from shipid.report.wording import listed
+from shipid.report.content import spoken_model
+from shipid.report.wording import listed_names
 from shipid.study.declared import NO_MODEL
 from shipid.units import length_decimals, plural_word
 
@@ -131,10 +131,10 @@ def count_runs(count: int) -> str:
 def quoted_model(model: str) -> str:
     """Name a model inside a sentence; that without physics in quotes: `no physics is worse` would say that none is."""
     name, plus, method = model.partition(" + ")  # of a method beside the one that the study judges by
-    return f'"{spoken(name)}"{plus}{method}' if name == NO_MODEL else model
+    return f'"{spoken_model(name)}"{plus}{method}' if name == NO_MODEL else model
 
 
 def model_list(models: Iterable[str]) -> str:
     """Return names as in a sentence, the first few of many."""
     names = [quoted_model(model) for model in models]
-    return listed(names, MOST_NAMES + 1) if names else ""
+    return listed_names(names, MOST_NAMES + 1) if names else ""

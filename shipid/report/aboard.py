@@ -10,23 +10,35 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, Line, PageContent, Sentence
-from shipid.report.figure import INK, Chip, Control, Figure, axis, category, chart, even_places, line, plot, run_names
+from shipid.report.content import AnswerSentence, Floats, PageContent, SummaryLine
+from shipid.report.figure import (
+    INK,
+    Chip,
+    Control,
+    PageFigure,
+    category_colour,
+    even_places,
+    make_axis,
+    make_chart,
+    make_line,
+    make_plot,
+    names_in,
+)
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.selection import spread
-from shipid.report.wording import metres
+from shipid.report.selection import spread_items
+from shipid.report.wording import metres_text
 
-LOGGED, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
+LOGGED_TRACK, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
 LOOKS = {
-    LOGGED: {"color": INK, "dash": "solid", "width": 1.6},
-    PATH: {"color": category(0), "dash": "solid", "width": 2.4},
-    PHYSICS: {"color": category(1), "dash": "dash", "width": 1.4},
-    BAND: {"color": category(0), "dash": "dot", "width": 1.2},
+    LOGGED_TRACK: {"color": INK, "dash": "solid", "width": 1.6},
+    PATH: {"color": category_colour(0), "dash": "solid", "width": 2.4},
+    PHYSICS: {"color": category_colour(1), "dash": "dash", "width": 1.4},
+    BAND: {"color": category_colour(0), "dash": "dot", "width": 1.2},
 }
 HALF_AXES = {"band along": ("band_along", "dash"), "band across": ("band_across", "dot")}
 """Half axes of the band in the figure over time: name -> column, dash."""
-FIRST = ("predictions", "alarm", "band")  # kinds of lines that the page begins with
+FIRST_KINDS = ("predictions", "alarm", "band")  # kinds of lines that the page begins with
 MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
 
 
@@ -44,29 +56,29 @@ class AboardContent(PageContent):
     track : run, t [s], north, east [m], as measured.
     """
 
-    lines: Sequence[Line]
+    lines: Sequence[SummaryLine]
     instants: pd.DataFrame
     points: pd.DataFrame
     track: pd.DataFrame
 
     @property
-    def answer(self) -> list[Sentence]:
+    def answer(self) -> list[AnswerSentence]:
         """What was predicted, how often the alarm was raised, whether the band kept its promise; then its limits."""
-        first = [line for line in self.lines if line.kind in FIRST]
+        first = [line for line in self.lines if line.kind in FIRST_KINDS]
         limits = [line for line in self.lines if line.kind == "limit"]
-        return [Sentence(sentence_of(line), "seen") for line in (*first, *limits)]
+        return [AnswerSentence(sentence_of(line), "seen") for line in (*first, *limits)]
 
 
-def sentence_of(line: Line) -> str:
+def sentence_of(line: SummaryLine) -> str:
     """A line of the terminal as a sentence of the page."""
     return f"{line.text[0].upper()}{line.text[1:]}."
 
 
 def _control_of_runs(content: AboardContent) -> Control:
     """Runs to choose from, if there are many some at even distances; first the one with the largest error."""
-    every = run_names(content.instants)
+    every = names_in(content.instants)
     worst = str(content.instants["run"].iloc[int(content.instants["error"].fillna(-1.0).argmax())])
-    shown = {*spread(every, MOST_RUNS), worst}
+    shown = {*spread_items(every, MOST_RUNS), worst}
     runs = [run for run in every if run in shown]
     return Control("Run", runs, runs.index(worst))
 
@@ -81,11 +93,11 @@ def band_outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Float
     return east.ravel(), north.ravel()
 
 
-def seen(content: AboardContent) -> Figure:
+def paths_figure(content: AboardContent) -> PageFigure:
     """The track of a run with the paths, and bands, that were shown at some instants."""
     banded, physics = "band_along" in content.points, bool(content.points["physics_north"].notna().any())
-    drawn = [LOGGED, PATH, *[PHYSICS] * physics, *[BAND] * banded]
-    return Figure(
+    drawn = [LOGGED_TRACK, PATH, *[PHYSICS] * physics, *[BAND] * banded]
+    return PageFigure(
         id="seen",
         title="What was seen",
         takeaway=sentence_of(next((line for line in content.lines if line.kind == "band"), content.lines[0])),
@@ -101,24 +113,24 @@ def seen(content: AboardContent) -> Figure:
 
 def _draw_seen(content: AboardContent, run: str, drawn: Sequence[str]) -> go.Figure:
     track, points = (frame[frame["run"] == run] for frame in (content.track, content.points))
-    traces = [line(LOGGED, track["east"], track["north"], [LOGGED], line=LOOKS[LOGGED])]
+    traces = [make_line(LOGGED_TRACK, track["east"], track["north"], [LOGGED_TRACK], line=LOOKS[LOGGED_TRACK])]
     times = points["t"].unique()
     for t in times[even_places(len(times), MOMENTS)]:
         mine = points[points["t"] == t]
         few = mine.iloc[np.unique(np.linspace(len(mine) // 4, len(mine) - 1, 3).round().astype(int))]
         places = {PATH: (mine["east"], mine["north"]), PHYSICS: (mine["physics_east"], mine["physics_north"])}
         places |= {BAND: band_outline(few)} if BAND in drawn else {}
-        traces += [line(name, x, y, [name], line=LOOKS[name]) for name, (x, y) in places.items() if name in drawn]
-    return chart(traces, "east [m]", "north [m]")
+        traces += [make_line(name, x, y, [name], line=LOOKS[name]) for name, (x, y) in places.items() if name in drawn]
+    return make_chart(traces, "east [m]", "north [m]")
 
 
-def along_run(content: AboardContent) -> Figure:
+def along_run_figure(content: AboardContent) -> PageFigure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error, runs, banded = content.instants["error"], _control_of_runs(content), "band_along" in content.points
-    takeaway = f"Over all runs, the median error at the end of a path is {metres(error.median())}"
-    takeaway += f"; the largest, {metres(float(error.max()))}, is in {runs.options[runs.start]}."
-    colour = category(0)
-    return Figure(
+    takeaway = f"Over all runs, the median error at the end of a path is {metres_text(error.median())}"
+    takeaway += f"; the largest, {metres_text(float(error.max()))}, is in {runs.options[runs.start]}."
+    colour = category_colour(0)
+    return PageFigure(
         id="along",
         title="Along the run",
         takeaway=takeaway if error.notna().any() else "The log ends before a path can be judged: 0 errors.",
@@ -140,20 +152,24 @@ def along_run(content: AboardContent) -> Figure:
 def _draw_along(content: AboardContent, run: str) -> go.Figure:
     mine, points = (frame[frame["run"] == run] for frame in (content.instants, content.points))
     t = mine["t"] - float(content.track.loc[content.track["run"] == run, "t"].min())
-    traces = [line("error", t, mine["error"], [PATH], line={"color": category(0), "width": 2})]
+    traces = [make_line("error", t, mine["error"], [PATH], line={"color": category_colour(0), "width": 2})]
     last = points.groupby("t", sort=False).last()
     for name, (column, dash) in HALF_AXES.items() if "band_along" in last else ():
-        traces.append(line(name, t, last[column], [name], line={"color": category(0), "dash": dash, "width": 1.4}))
+        traces.append(
+            make_line(name, t, last[column], [name], line={"color": category_colour(0), "dash": dash, "width": 1.4})
+        )
     raised = t[mine["outside"].astype(bool)]
     marker = {"color": INK, "size": 8, "symbol": "triangle-up"}
-    traces.append(line(ALARM, raised, np.zeros(len(raised)), [ALARM], mode="markers", marker=marker))
-    return plot(traces, axis("time in the run [s]"), axis("at the end of the path [m]", rangemode="tozero"))
+    traces.append(make_line(ALARM, raised, np.zeros(len(raised)), [ALARM], mode="markers", marker=marker))
+    return make_plot(
+        traces, make_axis("time in the run [s]"), make_axis("at the end of the path [m]", rangemode="tozero")
+    )
 
 
 ABOARD_PAGE = {
     "aboard": Section(
         "As if at sea",
-        lambda content: (seen(content), along_run(content)),
+        lambda content: (paths_figure(content), along_run_figure(content)),
         needs=("instants",),
         anchors=("seen", "along"),
     ),

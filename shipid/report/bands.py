@@ -9,41 +9,52 @@ from typing import Any
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import ReportContent, rows_in
-from shipid.report.figure import MUTED, Control, Figure, Scale, Trace, axis, escaped, intervals, line, plot
+from shipid.report.content import ReportContent, rows_as_tuples
+from shipid.report.figure import (
+    MUTED,
+    ColourScale,
+    Control,
+    PageFigure,
+    Trace,
+    error_bars,
+    escape_name,
+    make_axis,
+    make_line,
+    make_plot,
+)
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
 from shipid.report.section import Section
-from shipid.report.selection import close_styles, exemplars, model_chips, sizes
-from shipid.report.tables import Cell, Column, Table, frame_table, with_cells
-from shipid.report.wording import counted, listed, metres
+from shipid.report.selection import close_styles, close_up_models, model_chips, shown_sizes
+from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
+from shipid.report.wording import counted_text, listed_names, metres_text
 from shipid.units import level_text, percent_text, plural_word
 
-WORST = 12  # test runs in the table of those that pay
-BY = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
-BANDS = {
-    "model": Column("model"),
-    "N_D [1]": Column("N_D", 0),
-    "promised": Column("promised", numeric=True),
-    "held [95 %]": Column("held", numeric=True),
-    "mean radius [m]": Column("width", "length"),
-    "radius at the end [m]": Column("end", "length"),
-    "in lengths [1]": Column("lengths", 3),
+MOST_WORST_RUNS = 12  # test runs in the table of those that pay
+GROUP_WORDS = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
+BAND_COLUMNS = {
+    "model": TableColumn("model"),
+    "N_D [1]": TableColumn("N_D", 0),
+    "promised": TableColumn("promised", numeric=True),
+    "held [95 %]": TableColumn("held", numeric=True),
+    "mean radius [m]": TableColumn("width", "length"),
+    "radius at the end [m]": TableColumn("end", "length"),
+    "in lengths [1]": TableColumn("lengths", 3),
 }
-GROUPS = {
-    "model": Column("model"),
-    "by": Column("by"),
-    "group": Column("group"),
-    "held [95 %]": Column("held", numeric=True),
-    "mean radius [m]": Column("width", "length"),
-    "test runs [1]": Column("runs", 0),
-    "note": Column("note"),
+BAND_GROUP_COLUMNS = {
+    "model": TableColumn("model"),
+    "by": TableColumn("by"),
+    "group": TableColumn("group"),
+    "held [95 %]": TableColumn("held", numeric=True),
+    "mean radius [m]": TableColumn("width", "length"),
+    "test runs [1]": TableColumn("runs", 0),
+    "note": TableColumn("note"),
 }
-RUNS = {
-    "test run": Column("run"),
-    "manoeuvre": Column("kind"),
-    "model": Column("model"),
-    "paths in the band": Column("held", numeric=True),
-    "greatest error over the band [1]": Column("reach", 2),
+BAND_RUN_COLUMNS = {
+    "test run": TableColumn("run"),
+    "manoeuvre": TableColumn("kind"),
+    "model": TableColumn("model"),
+    "paths in the band": TableColumn("held", numeric=True),
+    "greatest error over the band [1]": TableColumn("reach", 2),
 }
 
 
@@ -52,22 +63,22 @@ def _level_of_sentences(frame: pd.DataFrame) -> float:
     return 0.9 if frame.level.eq(0.9).any() else float(frame.level.max())
 
 
-def coverage(content: ReportContent) -> Figure | None:
+def coverage_figure(content: ReportContent) -> PageFigure | None:
     """Nominal against measured coverage, with intervals; None where no model of a close-up has a band."""
     frame = content.frame("coverage")
-    names = [name for name in exemplars(content) if len(frame) and name in set(frame.model)]
+    names = [name for name in close_up_models(content) if len(frame) and name in set(frame.model)]
     if not names:
         return None
-    counts, banded = sizes(frame.N_D), frame.model.nunique()
-    drawn = f" Of {banded} models, {listed(names, 6)} {plural_word(len(names), 'is', 'are')} drawn; the table has all."
-    return Figure(
+    counts, banded = shown_sizes(frame.N_D), frame.model.nunique()
+    drawn = f" Of {banded} models, {listed_names(names, 6)} {plural_word(len(names), 'is', 'are')} drawn; the table has all."
+    return PageFigure(
         id="coverage",
         title="What bands promise, and what they hold",
         takeaway=_takeaway_coverage(frame, counts[-1]),
         how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
         "and counts runs, not windows. Measured on the test runs, on which no cell trained. Bars are exact binomial "
-        f"95 % intervals for so many windows as the {counted(int(frame.runs.max()), 'test run')} are worth: windows "
+        f"95 % intervals for so many windows as the {counted_text(int(frame.runs.max()), 'test run')} are worth: windows "
         "of one run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less."
         + (drawn if len(names) < banded else ""),
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
@@ -81,22 +92,22 @@ def coverage(content: ReportContent) -> Figure | None:
 
 def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str], size: int) -> go.Figure:
     diagonal = {"color": MUTED, "width": 1, "dash": "dash"}
-    traces = [line("as promised", [0.45, 1.0], [0.45, 1.0], ["nominal"], "", line=diagonal)]
+    traces = [make_line("as promised", [0.45, 1.0], [0.45, 1.0], ["nominal"], "", line=diagonal)]
     for i, name in enumerate(names):
         look, mine = close_styles(content)[name], frame[frame.model.eq(name) & frame.N_D.eq(size)].sort_values("level")
         shift = 0.004 * (i - (len(names) - 1) / 2)  # intervals of several models would hide each other
         held, low, high = (mine[column].to_numpy(dtype=float) for column in ("coverage", "low", "high"))
         words = [
-            f"{escaped(name)}: {_share_words(row)} of {level_text(row['level'])}, mean radius {metres(row['width'])}"
+            f"{escape_name(name)}: {_share_words(row)} of {level_text(row['level'])}, mean radius {metres_text(row['width'])}"
             for row in mine.to_dict("records")
         ]
         ink = {"color": look.colour, "width": look.width}
         drawn: Trace = {"mode": "lines+markers", "line": ink, "marker": {"symbol": look.symbol, "size": 7}}
-        reach = intervals(held, low, high, look.colour)
-        traces.append(line(name, mine.level + shift, held, [f"model:{name}"], hover=words, error_y=reach, **drawn))
+        reach = error_bars(held, low, high, look.colour)
+        traces.append(make_line(name, mine.level + shift, held, [f"model:{name}"], hover=words, error_y=reach, **drawn))
     least = min(0.5, frame.level.min()) - 0.05
-    x = axis("share promised [1]", range=[least, 1.0], tickvals=sorted(set(frame.level)))
-    return plot(traces, x, axis("share of whole test paths in the band [1]", range=[0, 1.02]))
+    x = make_axis("share promised [1]", range=[least, 1.0], tickvals=sorted(set(frame.level)))
+    return make_plot(traces, x, make_axis("share of whole test paths in the band [1]", range=[0, 1.02]))
 
 
 def _share_words(row: dict[Hashable, Any]) -> str:
@@ -113,14 +124,14 @@ def _takeaway_coverage(frame: pd.DataFrame, size: int) -> str:
     text = (
         f"With N_D = {size}, bands of {level_text(level)} hold {percent_text(float(mine.coverage.mean()))} of the test "
     )
-    text += f"paths on average over {counted(len(mine), 'model')}; the mean radius is {metres(least.width)} "
-    text += f"({least.model})" + (f" to {metres(most.width)} ({most.model}). " if len(mine) > 1 else ". ")
+    text += f"paths on average over {counted_text(len(mine), 'model')}; the mean radius is {metres_text(least.width)} "
+    text += f"({least.model})" + (f" to {metres_text(most.width)} ({most.model}). " if len(mine) > 1 else ". ")
     if below.empty:
         return text + "No interval lies below its promise."
-    return text + f"Below their promise, interval and all: {listed([str(name) for name in below.model])}."
+    return text + f"Below their promise, interval and all: {listed_names([str(name) for name in below.model])}."
 
 
-def width_map(content: ReportContent) -> Figure | None:
+def width_figure(content: ReportContent) -> PageFigure | None:
     """Mean radius of the bands over A and N_D; None where there is no map of the error either."""
     cells, frame = content.cells, content.frame("coverage")
     if "width" not in cells:
@@ -132,52 +143,65 @@ def width_map(content: ReportContent) -> Figure | None:
     shown = map_of_cells(replace(content, cells=cells.assign(H=cells.width, H_90=cells.width)))
     if shown is None:
         return None
-    words = [f"<b>{escaped(row.model)}</b>, N_D = {row.N_D}<br>{metres(row.H)}" for row in rows_in(shown.cells)]
+    words = [
+        f"<b>{escape_name(row.model)}</b>, N_D = {row.N_D}<br>{metres_text(row.H)}"
+        for row in rows_as_tuples(shown.cells)
+    ]
     shown = shown._replace(cells=shown.cells.assign(words=words))
     low, high = ends_of_map(shown.cells)
     hatched = " Hatched: not narrower than the band of no physics at the same N_D." if shown.cells.worse.any() else ""
-    return Figure(
+    return PageFigure(
         id="width-map",
         title="Better physics, narrower promise",
         takeaway=f"The mean radius of the band goes from {low} to {high}.",
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
         f"left out.{hatched}",
-        alternative=f"Cells of the mean radius of the band [m] for {counted(len(shown.rows), 'model')} by A and N_D. "
+        alternative=f"Cells of the mean radius of the band [m] for {counted_text(len(shown.rows), 'model')} by A and N_D. "
         "The numbers are in a table.",
         height=HEIGHT,
         draw=lambda: [draw_map(shown)],
-        scale=Scale("mean radius of the band [m]", float(shown.cells.H.min()), float(shown.cells.H.max()), "heat"),
+        scale=ColourScale(
+            "mean radius of the band [m]", float(shown.cells.H.min()), float(shown.cells.H.max()), "heat"
+        ),
     )
 
 
-def coverage_table(content: ReportContent) -> Table | None:
+def coverage_table(content: ReportContent) -> PageTable | None:
     """Coverage and width by model, N_D and level."""
     frame, refused = content.frame("coverage"), content.frame("no_band")
     if frame.empty:
         return None
     reasons = [
-        f"{listed([f'{row.model} at N_D = {row.N_D}' for row in rows_in(part)])}: {reason}"
+        f"{listed_names([f'{row.model} at N_D = {row.N_D}' for row in rows_as_tuples(part)])}: {reason}"
         for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
     ]
-    promised = [Cell(level_text(level), level) for level in frame.level]
+    promised = [TableCell(level_text(level), level) for level in frame.level]
     takeaway = f"Without a band: {'; '.join(reasons)}." if reasons else ""
-    return frame_table("coverage-table", "Bands by model", takeaway, with_cells(_held(frame), promised=promised), BANDS)
+    return frame_table(
+        "coverage-table",
+        "Bands by model",
+        takeaway,
+        with_cells(_coverage_cells(frame), promised=promised),
+        BAND_COLUMNS,
+    )
 
 
-def _held(frame: pd.DataFrame) -> pd.DataFrame:
+def _coverage_cells(frame: pd.DataFrame) -> pd.DataFrame:
     """The frame with `held`: its coverage with the interval, as cells."""
-    return with_cells(frame, held=[Cell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
+    return with_cells(frame, held=[TableCell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
 
 
-def coverage_by_group(content: ReportContent) -> Table | None:
+def coverage_by_group(content: ReportContent) -> PageTable | None:
     """Coverage at one level by kind of manoeuvre, time ahead and speed."""
     frame = content.frame("coverage_groups")
     if frame.empty:
         return None
-    frame = frame[frame.model.isin(exemplars(content))]
-    shown = _held(frame).assign(by=frame.by.map(BY), note=frame.note.where(frame.note.ne(""), None))
-    return frame_table("coverage-groups", "Where bands hold more and less", _least_held(frame), shown, GROUPS)
+    frame = frame[frame.model.isin(close_up_models(content))]
+    shown = _coverage_cells(frame).assign(by=frame.by.map(GROUP_WORDS), note=frame.note.where(frame.note.ne(""), None))
+    return frame_table(
+        "coverage-groups", "Where bands hold more and less", _least_held(frame), shown, BAND_GROUP_COLUMNS
+    )
 
 
 def _least_held(frame: pd.DataFrame) -> str:
@@ -190,26 +214,26 @@ def _least_held(frame: pd.DataFrame) -> str:
     return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
 
 
-def coverage_by_run(content: ReportContent) -> Table | None:
+def coverage_by_run(content: ReportContent) -> PageTable | None:
     """Test runs whose paths leave their bands most often."""
     frame = content.frame("coverage_runs")
     if frame.empty:
         return None
-    shown = frame[frame.model.isin(exemplars(content))].head(WORST)
+    shown = frame[frame.model.isin(close_up_models(content))].head(MOST_WORST_RUNS)
     mean = frame.groupby("run").coverage.mean()
     half = int((mean < 0.5).sum())
     have = "has less than half of its" if half == 1 else "have less than half of their"
-    takeaway = f"Mean over models, {counted(half, 'run')} of {len(mean)} {have} paths in the bands."
-    held = with_cells(shown, held=[Cell(percent_text(share), share) for share in shown.coverage])
-    return frame_table("coverage-runs", "Runs that bands hold least", takeaway, held, RUNS)
+    takeaway = f"Mean over models, {counted_text(half, 'run')} of {len(mean)} {have} paths in the bands."
+    held = with_cells(shown, held=[TableCell(percent_text(share), share) for share in shown.coverage])
+    return frame_table("coverage-runs", "Runs that bands hold least", takeaway, held, BAND_RUN_COLUMNS)
 
 
 HOW_FAR_OFF = Section(
     "How far off it may be",
     draw=lambda content: (
-        coverage(content),
+        coverage_figure(content),
         coverage_table(content),
-        width_map(content),
+        width_figure(content),
         coverage_by_group(content),
         coverage_by_run(content),
     ),

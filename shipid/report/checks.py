@@ -9,21 +9,32 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.report import logs
-from shipid.report.content import PageContent, Sentence, rows_in
-from shipid.report.figure import POINTS, Chip, Control, Figure, axis, category, even_places, line, plot, run_names
+from shipid.report.content import AnswerSentence, PageContent, rows_as_tuples
+from shipid.report.figure import (
+    MOST_LINE_POINTS,
+    Chip,
+    Control,
+    PageFigure,
+    category_colour,
+    even_places,
+    make_axis,
+    make_line,
+    make_plot,
+    names_in,
+)
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import Cell, Column, Table, frame_table, with_cells, word_cell
-from shipid.report.wording import bound, counted, listed, scientific, short
+from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells, word_cell
+from shipid.report.wording import counted_text, listed_names, scientific_text, set_sentence, short_text
 
-CHECKS = {
-    "run": Column("run"),
-    "check": Column("check"),
-    "result": Column("ok"),
-    "value": Column("value", numeric=True),
-    "limit": Column("limit", numeric=True),
-    "what it says": Column("sentence"),
+CHECK_COLUMNS = {
+    "run": TableColumn("run"),
+    "check": TableColumn("check"),
+    "result": TableColumn("ok"),
+    "value": TableColumn("value", numeric=True),
+    "limit": TableColumn("limit", numeric=True),
+    "what it says": TableColumn("sentence"),
 }
 SIGNALS_OF_CHECKS = {
     "rate [deg/s]": {"psi_rate": "rate of the heading", "r": "yaw rate r"},
@@ -53,67 +64,76 @@ class CheckContent(PageContent):
     title: str = "Is this log in order?"
 
     @property
-    def answer(self) -> list[Sentence]:
+    def answer(self) -> list[AnswerSentence]:
         """How many checks passed, and which failed."""
-        failed, runs = self.checks[~self.checks["ok"].astype(bool)], counted(self.checks["run"].nunique(), "run")
-        every = counted(len(self.checks), "check")
+        failed, runs = self.checks[~self.checks["ok"].astype(bool)], counted_text(self.checks["run"].nunique(), "run")
+        every = counted_text(len(self.checks), "check")
         if failed.empty:
-            return [Sentence(f"All {every} of {runs} passed.")]
+            return [AnswerSentence(f"All {every} of {runs} passed.")]
         return [
-            Sentence(f"{len(failed)} of {every} failed, in {failed['run'].nunique()} of {runs}."),
-            Sentence(f"What failed: {listed(run_names(failed, 'check'), 8)}."),
+            AnswerSentence(f"{len(failed)} of {every} failed, in {failed['run'].nunique()} of {runs}."),
+            AnswerSentence(f"What failed: {listed_names(names_in(failed, 'check'), 8)}."),
         ]
 
 
-def checks_table(content: CheckContent) -> Table:
+def checks_table(content: CheckContent) -> PageTable:
     """Return the table of all checks, failed ones first; what these say is shown whole."""
     frame = content.checks.assign(ok=content.checks["ok"].astype(bool)).sort_values("ok", kind="stable")
     rows = [
         {
             "ok": word_cell("passed" if row.ok else "failed", bad=not row.ok),
-            "value": Cell(scientific(row.value, 3) + (f" {row.unit}" if row.unit != "1" else ""), float(row.value)),
-            "limit": Cell(scientific(row.limit, 3), float(row.limit)),
-            "sentence": word_cell(bound(row.sentence), bad=not row.ok),
+            "value": TableCell(
+                scientific_text(row.value, 3) + (f" {row.unit}" if row.unit != "1" else ""), float(row.value)
+            ),
+            "limit": TableCell(scientific_text(row.limit, 3), float(row.limit)),
+            "sentence": word_cell(set_sentence(row.sentence), bad=not row.ok),
         }
-        for row in rows_in(frame)
+        for row in rows_as_tuples(frame)
     ]
     cells = {name: [row[name] for row in rows] for name in ("ok", "value", "limit", "sentence")}
-    return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECKS)
+    return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECK_COLUMNS)
 
 
-def checked_motion(series: pd.DataFrame) -> Figure | None:
+def checked_motion(series: pd.DataFrame) -> PageFigure | None:
     """Rate of the heading and yaw rate, drift of the position, and velocities, over time, one run at a time."""
-    runs = run_names(series)
+    runs = names_in(series)
     if not runs:
         return None
     worst = series.groupby("run")["drift"].max()
     names = [name for columns in SIGNALS_OF_CHECKS.values() for name in columns.items()]
-    return Figure(
+    return PageFigure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {short(float(worst.max()))} m.",
+        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {short_text(float(worst.max()))} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",
         height=240,
         draw=lambda run: _draw_checked(series[series["run"] == run]),
         controls=[Control("Run", runs, runs.index(str(worst.idxmax())))],
-        chips=[Chip(column, name, category(i)) for i, (column, name) in enumerate(names)],
+        chips=[Chip(column, name, category_colour(i)) for i, (column, name) in enumerate(names)],
     )
 
 
 def _draw_checked(rows: pd.DataFrame) -> list[go.Figure]:
-    shown = rows.iloc[even_places(len(rows), POINTS)]
+    shown = rows.iloc[even_places(len(rows), MOST_LINE_POINTS)]
     t = shown["t"] - rows["t"].iloc[0]  # single precision would not do for a clock since 1970
     shown = shown.assign(psi_rate=DEGREES * shown["psi_rate"], r=DEGREES * shown["r"])
     order, panels = [column for columns in SIGNALS_OF_CHECKS.values() for column in columns], []
     for title, columns in SIGNALS_OF_CHECKS.items():
         unit = title.partition("[")[2].rstrip("]")
         traces = [
-            line(name, t, shown[column], [column], unit, line={"color": category(order.index(column)), "width": 1.5})
+            make_line(
+                name,
+                t,
+                shown[column],
+                [column],
+                unit,
+                line={"color": category_colour(order.index(column)), "width": 1.5},
+            )
             for column, name in columns.items()
         ]
-        panels.append(plot(traces, axis("time in the run [s]"), axis(title)))
+        panels.append(make_plot(traces, make_axis("time in the run [s]"), make_axis(title)))
     return panels
 
 
@@ -124,7 +144,7 @@ CHECK_PAGE = {
     "checks": Section("The checks", lambda content: (checks_table(content),), ("checks",), ("all-checks",)),
     "data": Section(
         "The data",
-        lambda content: (logs.manoeuvres(content), logs.repairs_table(content)),
+        lambda content: (logs.tracks_figure(content), logs.repairs_table(content)),
         anchors=("manoeuvres", "repairs"),
     ),
 }

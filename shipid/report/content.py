@@ -17,19 +17,19 @@ DATA_DRIVEN = "none"  # the family of the model without physics
 NO_PHYSICS = "no physics"
 """Name of that model for people, in sentences and figures: `none` would say that nobody does."""
 # Columns of a trial; every other column of its frame is a searched hyperparameter.
-TRIAL = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
-MODELS = ("model", "without", "with")  # columns that name a model
+TRIAL_COLUMNS = ("cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen")
+MODEL_NAME_COLUMNS = ("model", "without", "with")  # columns that name a model
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
 
 
-def spoken(model: str) -> str:
+def spoken_model(model: str) -> str:
     """Name of a model or family for people, with the method that may follow: `none` is `no physics`."""
     alone = model == DATA_DRIVEN or model.startswith(f"{DATA_DRIVEN} + ")
     return model.replace(DATA_DRIVEN, NO_PHYSICS, 1) if alone else model
 
 
 @dataclass(frozen=True)
-class Line:
+class SummaryLine:
     """A line of the summary of a log played as if at sea: what it is about, and its text.
 
     kind : `predictions`, `alarm` and `band` are how it went, `limit` is what limits that; a `detail` belongs to a line
@@ -41,7 +41,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Sentence:
+class AnswerSentence:
     """One sentence of the answer and the figure or table that carries it.
 
     Parameters
@@ -56,7 +56,7 @@ class Sentence:
 
 
 @dataclass(frozen=True)
-class Finding:
+class ReportFinding:
     """A claim of the paper, the verdict of the results, and the numbers behind it."""
 
     id: str
@@ -66,7 +66,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot:
+class WindowSnapshot:
     """One window of a test run with its predictions, in the frame (11) frozen at the instant of prediction.
 
     Parameters
@@ -108,15 +108,15 @@ class PageContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
     study_document: str = ""
-    findings: Sequence[Finding] = ()
+    findings: Sequence[ReportFinding] = ()
 
 
-def rows_in(frame: pd.DataFrame) -> list[Any]:
+def rows_as_tuples(frame: pd.DataFrame) -> list[Any]:
     """Rows of a frame as named tuples."""
     return list(frame.itertuples())
 
 
-def rows_of(*columns: str) -> Callable[[], pd.DataFrame]:
+def empty_frame(*columns: str) -> Callable[[], pd.DataFrame]:
     """What makes a frame that has these columns and no rows."""
     return lambda: pd.DataFrame(columns=list(columns))
 
@@ -155,19 +155,19 @@ class ReportContent(PageContent):
     alone : models of the cells whose method learns nothing from data: their path is that of the physics.
     """
 
-    answer: Sequence[Sentence] = ()
+    answer: Sequence[AnswerSentence] = ()
     cells: pd.DataFrame
     naive: Mapping[str, float]
     models: pd.DataFrame
-    horizon: pd.DataFrame = field(default_factory=rows_of("model", "N_D", "seed", "source", "ahead", "mean", "p90"))
-    over_time: pd.DataFrame = field(default_factory=rows_of("run", "t", "model", "N_D", "seed", "source", "error"))
-    commands: pd.DataFrame = field(default_factory=rows_of("run", "t"))
-    snapshots: Sequence[Snapshot] = ()
-    tracks: pd.DataFrame = field(default_factory=rows_of("run", "set", "north", "east"))
-    envelope: pd.DataFrame = field(default_factory=rows_of("set", "quantity", "unit", "min", "mean", "max"))
-    factors: pd.DataFrame = field(default_factory=rows_of("model", "path", "group", "factor"))
-    trials: pd.DataFrame = field(default_factory=rows_of(*TRIAL))
-    repairs: pd.DataFrame = field(default_factory=rows_of("kind", "column", "count", "note"))
+    horizon: pd.DataFrame = field(default_factory=empty_frame("model", "N_D", "seed", "source", "ahead", "mean", "p90"))
+    over_time: pd.DataFrame = field(default_factory=empty_frame("run", "t", "model", "N_D", "seed", "source", "error"))
+    commands: pd.DataFrame = field(default_factory=empty_frame("run", "t"))
+    snapshots: Sequence[WindowSnapshot] = ()
+    tracks: pd.DataFrame = field(default_factory=empty_frame("run", "set", "north", "east"))
+    envelope: pd.DataFrame = field(default_factory=empty_frame("set", "quantity", "unit", "min", "mean", "max"))
+    factors: pd.DataFrame = field(default_factory=empty_frame("model", "path", "group", "factor"))
+    trials: pd.DataFrame = field(default_factory=empty_frame(*TRIAL_COLUMNS))
+    repairs: pd.DataFrame = field(default_factory=empty_frame("kind", "column", "count", "note"))
     best: str = ""
     alone: Collection[str] = ()
     frames: Mapping[str, pd.DataFrame] = field(default_factory=dict)
@@ -178,7 +178,7 @@ class ReportContent(PageContent):
             object.__setattr__(self, name, with_spoken_models(getattr(self, name)))
         object.__setattr__(self, "frames", {name: with_spoken_models(frame) for name, frame in self.frames.items()})
         object.__setattr__(self, "snapshots", [window_with_spoken_models(snapshot) for snapshot in self.snapshots])
-        object.__setattr__(self, "alone", {spoken(model) for model in self.alone})
+        object.__setattr__(self, "alone", {spoken_model(model) for model in self.alone})
 
     def frame(self, name: str) -> pd.DataFrame:
         """One of `frames`; without rows and columns where there is none of that name."""
@@ -187,14 +187,14 @@ class ReportContent(PageContent):
 
 def with_spoken_models(frame: pd.DataFrame) -> pd.DataFrame:
     """A frame whose models have their names for people."""
-    columns = [column for column in MODELS if column in frame]
-    return frame.assign(**{column: frame[column].map(spoken, na_action="ignore") for column in columns})
+    columns = [column for column in MODEL_NAME_COLUMNS if column in frame]
+    return frame.assign(**{column: frame[column].map(spoken_model, na_action="ignore") for column in columns})
 
 
-def window_with_spoken_models(snapshot: Snapshot) -> Snapshot:
+def window_with_spoken_models(snapshot: WindowSnapshot) -> WindowSnapshot:
     """A window whose models have their names for people."""
     paths, bands = (
-        {(spoken(model), source, size): line for (model, source, size), line in lines.items()}
+        {(spoken_model(model), source, size): line for (model, source, size), line in lines.items()}
         for lines in (snapshot.paths, snapshot.bands)
     )
     return replace(snapshot, paths=paths, bands=bands)

@@ -9,19 +9,19 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, ReportContent, rows_in
+from shipid.report.content import Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
     INK,
     LINE_DASHES,
     NAIVE,
     Chip,
     Control,
-    Figure,
+    PageFigure,
     Trace,
-    axis,
     even_places,
-    line,
-    plot,
+    make_axis,
+    make_line,
+    make_plot,
     spread_apart,
 )
 from shipid.report.section import Section
@@ -29,25 +29,25 @@ from shipid.report.selection import (
     FEW_RUNS,
     SOURCE_DASHES,
     close_styles,
+    close_up_models,
     data_driven,
     drawn_source,
-    exemplars,
     in_words,
     model_chips,
     nothing_learns,
     over_seeds,
-    sizes,
-    spread,
-    thinned,
+    shown_sizes,
+    spread_items,
+    thin_lines,
 )
-from shipid.report.tables import Column, Table, frame_table
-from shipid.report.wording import CONSTANT, counted, listed, metres, number, shortened
+from shipid.report.tables import PageTable, TableColumn, frame_table
+from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text, shorten_name
 
-BY = ["model", "source", "N_D"]
-ERROR, GAP, COMMAND, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
-PIXELS = 540  # twice the height of the error over time
-LONGEST = 14  # characters of a name beside a line
-NAME = 0.055  # height of a name beside a line, as a share of the greatest error
+LINE_COLUMNS = ["model", "source", "N_D"]
+ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
+PLOT_DETAIL = 540  # twice the height of the error over time
+MOST_LETTERS_AT_LINE = 14  # characters of a name beside a line
+NAME_SHARE = 0.055  # height of a name beside a line, as a share of the greatest error
 LEADER, LETTER, EDGE = 16, 7, 6  # line from an end to its name; a letter of a name, at most; space around it [px]
 HORIZON_ERRORS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
@@ -61,28 +61,28 @@ BY_AXIS = (
     "Predictors give positions, so no error of the heading is shown. The course is the direction of the track, "
     "where the ship truly makes 0.2 m/s or more."
 )
-KINDS = {
-    "kind of run": Column("kind"),
-    "test runs": Column("runs"),
-    "model": Column("model"),
-    "how": Column("how"),
-    "over the horizon [m]": Column("mean", "length"),
-    "at its end [m]": Column("end", "length"),
+KIND_COLUMNS = {
+    "kind of run": TableColumn("kind"),
+    "test runs": TableColumn("runs"),
+    "model": TableColumn("model"),
+    "how": TableColumn("how"),
+    "over the horizon [m]": TableColumn("mean", "length"),
+    "at its end [m]": TableColumn("end", "length"),
 }
-HOW_PREDICTED = {"naive": CONSTANT, "physics": "physics alone", "cooperative": "with data"}
+HOW_PREDICTED = {"naive": CONSTANT_MOTION, "physics": "physics alone", "cooperative": "with data"}
 
 
-def error_over_horizon(content: ReportContent) -> Figure | None:
+def horizon_figure(content: ReportContent) -> PageFigure | None:
     """Mean and 90th percentile of the error at each second ahead; None without rows."""
     if content.horizon.empty:
         return None
     frame = _rows_of_close_up(content.horizon, content)
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
-    columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], sizes(frame.N_D)
-    means = over_seeds(frame, [*BY, "ahead"], columns)
-    seeds = frame[frame.source.eq("cooperative")].groupby([*BY, "ahead"])[columns].agg(["min", "max", "size"])
+    columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], shown_sizes(frame.N_D)
+    means = over_seeds(frame, [*LINE_COLUMNS, "ahead"], columns)
+    seeds = frame[frame.source.eq("cooperative")].groupby([*LINE_COLUMNS, "ahead"])[columns].agg(["min", "max", "size"])
     seeds = seeds.reset_index()
-    return Figure(
+    return PageFigure(
         id="horizon",
         title="Error over the horizon",
         takeaway=_takeaway_horizon(content, means, counts[-1]),
@@ -112,22 +112,22 @@ def _draw_horizon(
         keys = [f"source:{drawn_source(content, str(model), 'cooperative')}", f"model:{model}"]
         area: Trace = {"line": {"width": 0}, "fill": "toself", "fillcolor": looks[str(model)].colour, "opacity": 0.18}
         around = np.concatenate([ahead, ahead[::-1]]), np.concatenate([high, low[::-1]])
-        bands.append(line(f"{model}, seeds", *around, keys, hover="", **area))
+        bands.append(make_line(f"{model}, seeds", *around, keys, hover="", **area))
     names = _names_at_ends(lines)
     room = LEADER + EDGE + LETTER * max((len(name["text"]) for name in names), default=0)  # that they fit any window
-    x = axis("time ahead [s]", range=[0.0, float(means.ahead.max())])
+    x = make_axis("time ahead [s]", range=[0.0, float(means.ahead.max())])
     margin = {"l": 48, "r": max(12, room), "t": 12, "b": 44}
-    y = axis(f"{title} [{unit}]", rangemode="tozero")
-    return plot([*bands, *lines], x, y, hovermode="x unified", annotations=names, margin=margin)
+    y = make_axis(f"{title} [{unit}]", rangemode="tozero")
+    return make_plot([*bands, *lines], x, y, hovermode="x unified", annotations=names, margin=margin)
 
 
-def error_over_time(content: ReportContent) -> Figure | None:
+def time_figure(content: ReportContent) -> PageFigure | None:
     """Error per instant of prediction of a test run, the commands below on the same axis; None without times."""
     frame = _rows_of_close_up(content.over_time, content)
-    runs, size = spread(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), sizes(frame.N_D)[-1]
+    runs, size = spread_items(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), shown_sizes(frame.N_D)[-1]
     if not runs:
         return None
-    means = over_seeds(frame[frame.run.isin(runs) & frame.N_D.isin([0, size])], [*BY, "run", "t"], ["error"])
+    means = over_seeds(frame[frame.run.isin(runs) & frame.N_D.isin([0, size])], [*LINE_COLUMNS, "run", "t"], ["error"])
     left, seeds = content.over_time.run.nunique() - len(runs), content.cells["seed"].nunique()
     worst, units = _worst_instant(content, means), _commands_by_unit(content.commands)
     chips = [
@@ -135,7 +135,7 @@ def error_over_time(content: ReportContent) -> Figure | None:
         for columns in units.values()
         for i, column in enumerate(columns)
     ]
-    return Figure(
+    return PageFigure(
         id="over-time",
         title="Error over time",
         takeaway=_takeaway_time(worst, means),
@@ -144,9 +144,9 @@ def error_over_time(content: ReportContent) -> Figure | None:
         + ". The commands that were given are below."
         + (f" Of {seeds} seeds the first is drawn." if seeds > 1 else "")
         + _models_of_close_up(content)
-        + (f" {counted(left, 'test run')} more are not drawn." if left else ""),
+        + (f" {counted_text(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
-        height=AROUND + ERROR + (COMMAND + GAP) * len(units),
+        height=AROUND + ERROR_HEIGHT + (COMMAND_HEIGHT + COMMAND_GAP) * len(units),
         draw=lambda run: [_draw_time(content, means[means.run == run], content.commands[content.commands.run == run])],
         controls=[Control("Test run", runs, 0 if worst is None else runs.index(worst.run))],
         chips=[*close_up_chips(content, set(means.source)), *chips],
@@ -155,9 +155,9 @@ def error_over_time(content: ReportContent) -> Figure | None:
 
 def close_up_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
     """Legend of a close-up: models by colour, sources by dash."""
-    names = exemplars(content)
+    names = close_up_models(content)
     drawn = {drawn_source(content, name, source) for name in names for source in sources}
-    words = {"cooperative": "compensated or no physics", "physics": "physics alone", "naive": CONSTANT}
+    words = {"cooperative": "compensated or no physics", "physics": "physics alone", "naive": CONSTANT_MOTION}
     chips = [
         Chip(f"source:{source}", word, NAIVE if source == "naive" else INK, SOURCE_DASHES[source])
         for source, word in words.items()
@@ -170,14 +170,16 @@ def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFra
     """Return the rows of the models in the close-up; physics and naive do not depend on N_D and have N_D = 0."""
     frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
     frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
-    kept = frame.model.isin(exemplars(content)) | frame.source.eq("naive")
-    return frame[kept & frame.N_D.isin([0, *sizes(frame.N_D)])]
+    kept = frame.model.isin(close_up_models(content)) | frame.source.eq("naive")
+    return frame[kept & frame.N_D.isin([0, *shown_sizes(frame.N_D)])]
 
 
 def _models_of_close_up(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
-    total, shown = content.models.model.nunique(), exemplars(content)
-    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {listed(shown, 6)}."
+    total, shown = content.models.model.nunique(), close_up_models(content)
+    words = (
+        f" Of {total} models, the middle one of each family by A, and the best in validation: {listed_names(shown, 6)}."
+    )
     return words if len(shown) < total else ""
 
 
@@ -196,7 +198,7 @@ def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column:
         mark = {"symbol": look.symbol if look else "", "size": 7, "color": ink["color"], "maxdisplayed": 9}
         more: Trace = {"mode": "lines+markers", "marker": mark} if look and given == "cooperative" else {}
         name = name_of_line(content, model, source)
-        traces.append(line(name, points[:, 0], points[:, 1], keys, unit, line=ink, **more))
+        traces.append(make_line(name, points[:, 0], points[:, 1], keys, unit, line=ink, **more))
     return traces
 
 
@@ -209,7 +211,7 @@ def line_source(content: ReportContent, model: str, source: str) -> tuple[str, l
 def name_of_line(content: ReportContent, model: str, source: str) -> str:
     """Name of a line of a close-up, of a source as it is called."""
     if source == "naive" or model == data_driven(content):
-        return CONSTANT if source == "naive" else model
+        return CONSTANT_MOTION if source == "naive" else model
     return f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
 
 
@@ -223,15 +225,15 @@ def _names_at_ends(traces: Sequence[Trace]) -> list[dict[str, Any]]:
         ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
         key=lambda end: end[:2],
     )
-    ends = [ends[i] for i in even_places(len(ends), int(1 / NAME))] if ends else []
-    heights = spread_apart([height for height, _, _ in ends], NAME * most, 1.1 * most)
+    ends = [ends[i] for i in even_places(len(ends), int(1 / NAME_SHARE))] if ends else []
+    heights = spread_apart([height for height, _, _ in ends], NAME_SHARE * most, 1.1 * most)
     notes = []
     for height, (end, place, trace) in zip(heights, ends, strict=True):
         name, colour = (
             trace["name"].removesuffix(", compensated").removesuffix(", physics alone"),
             trace["line"]["color"],
         )
-        text = {"text": shortened(name, LONGEST), "xanchor": "left", "align": "left"}
+        text = {"text": shorten_name(name, MOST_LETTERS_AT_LINE), "xanchor": "left", "align": "left"}
         leader = {"axref": "pixel", "ayref": "y", "ax": LEADER, "ay": height, "arrowhead": 0, "arrowwidth": 1}
         ink = {"font": {"size": 11, "color": colour}, "arrowcolor": colour, "showarrow": True}
         notes.append({"x": place, "y": end, **text, **leader, **ink})
@@ -243,7 +245,7 @@ def _visible_points(lines: Sequence[Floats]) -> list[Floats]:
     kept = list(lines)
     whole = [i for i, points in enumerate(lines) if len(points) and np.isfinite(points).all()]
     unit = [lines[i] / np.maximum(np.ptp(lines[i], axis=0), 1e-9) for i in whole]
-    for i, chosen in zip(whole, thinned(unit, 1 / PIXELS), strict=True):
+    for i, chosen in zip(whole, thin_lines(unit, 1 / PLOT_DETAIL), strict=True):
         kept[i] = lines[i][chosen]
     return kept
 
@@ -259,21 +261,27 @@ def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
 def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> go.Figure:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
     units = _commands_by_unit(commands)
-    traces, total, axes = _error_lines(content, means, "t", "error"), ERROR + (COMMAND + GAP) * len(units), {}
+    traces, total, axes = (
+        _error_lines(content, means, "t", "error"),
+        ERROR_HEIGHT + (COMMAND_HEIGHT + COMMAND_GAP) * len(units),
+        {},
+    )
     for row, (unit, columns) in enumerate(units.items(), start=2):
         for i, column in enumerate(columns):
             changed = np.flatnonzero(np.diff(commands[column]) != 0)
             held = commands.iloc[np.unique([0, *changed, *(changed + 1), len(commands) - 1])]  # what a step line needs
             ink = {"color": INK, "width": 1.5, "dash": LINE_DASHES[i % 4], "shape": "hv"}
             name, place = column.partition("[")[0].strip(), {"xaxis": "x", "yaxis": f"y{row}"}
-            traces.append(line(name, held.t, held[column], [f"command:{column}"], unit, line=ink, **place))
-        low = (len(units) - row + 1) * (COMMAND + GAP) / total
+            traces.append(make_line(name, held.t, held[column], [f"command:{column}"], unit, line=ink, **place))
+        low = (len(units) - row + 1) * (COMMAND_HEIGHT + COMMAND_GAP) / total
         shared = ", ".join(sorted({column.partition("[")[0].split()[-1] for column in columns}))
-        axes[f"yaxis{row}"] = axis(f"{shared} [{unit}]", domain=[low, low + COMMAND / total], anchor="x", nticks=4)
+        axes[f"yaxis{row}"] = make_axis(
+            f"{shared} [{unit}]", domain=[low, low + COMMAND_HEIGHT / total], anchor="x", nticks=4
+        )
     # The time axis belongs to the lowest row, so that it is drawn at the bottom and shared by all.
-    x = axis("time in the run [s]", anchor=f"y{len(units) + 1}" if units else "y")
-    y = axis("position error [m]", rangemode="tozero", domain=[1 - ERROR / total, 1.0])
-    return plot(traces, x, y, hovermode="x unified", **axes)
+    x = make_axis("time in the run [s]", anchor=f"y{len(units) + 1}" if units else "y")
+    y = make_axis("position error [m]", rangemode="tozero", domain=[1 - ERROR_HEIGHT / total, 1.0])
+    return make_plot(traces, x, y, hovermode="x unified", **axes)
 
 
 def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) -> str:
@@ -285,9 +293,11 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     best = content.best if known else str(together.idxmin())
     of = "" if known or len(together) < 2 else f", the least of {len(together)} models"
     text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is "
-    text += f"{metres(together[best])} off on average{of}"
-    text += f", its physics alone {metres(alone[best])}" if best in alone.index else ""
-    other = f"; {in_words(pure)} {metres(together[pure])}" if pure and pure != best and pure in together.index else ""
+    text += f"{metres_text(together[best])} off on average{of}"
+    text += f", its physics alone {metres_text(alone[best])}" if best in alone.index else ""
+    other = (
+        f"; {in_words(pure)} {metres_text(together[pure])}" if pure and pure != best and pure in together.index else ""
+    )
     return f"{text}{other}."
 
 
@@ -303,37 +313,37 @@ def _worst_instant(content: ReportContent, means: pd.DataFrame) -> Any | None:
 def _takeaway_time(worst: Any | None, means: pd.DataFrame) -> str:
     if worst is None:
         return "No compensated model gave a prediction."
-    text = f"{in_words(worst.model)} errs most in {worst.run} at t = {worst.t:g} s: {metres(worst.error)}"
+    text = f"{in_words(worst.model)} errs most in {worst.run} at t = {worst.t:g} s: {metres_text(worst.error)}"
     same = means[
         means.model.eq(worst.model) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)
     ]
-    alone = f", where its physics alone errs by {metres(float(same.error.iloc[0]))}" if len(same) else ""
+    alone = f", where its physics alone errs by {metres_text(float(same.error.iloc[0]))}" if len(same) else ""
     return f"{text} on average over the horizon{alone}."
 
 
-def error_by_kind(content: ReportContent) -> Table | None:
+def error_by_kind(content: ReportContent) -> PageTable | None:
     """Error over the horizon and at its end, by kind of test run; None without rows."""
     frame = content.frame("kinds")
     if frame.empty:
         return None
     how = [
-        HOW_PREDICTED[row.source] + (f", {counted(int(row.N_D), 'run')}" if row.N_D else "")
-        for row in rows_in(frame[["source", "N_D"]])
+        HOW_PREDICTED[row.source] + (f", {counted_text(int(row.N_D), 'run')}" if row.N_D else "")
+        for row in rows_as_tuples(frame[["source", "N_D"]])
     ]
     of, source = ("of physics alone", "physics") if nothing_learns(content) else ("with data", "cooperative")
     learned = frame[frame.source.eq(source)]
     best = learned.loc[learned.groupby("kind", sort=False)["mean"].idxmin()] if len(learned) else learned
     parts = [
-        f"{row['kind']}: {number(row['mean'])} m, at the end {number(row['end'])} m ({row['model']})"
+        f"{row['kind']}: {number_text(row['mean'])} m, at the end {number_text(row['end'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
     takeaway = f"Least error {of}: {'; '.join(parts)}." if parts else "No model with data has a result."
     shown = frame.assign(how=how, model=frame.model.where(frame.source.ne("naive"), ""))
-    return frame_table("kinds", "Errors by kind of run", takeaway, shown, KINDS)
+    return frame_table("kinds", "Errors by kind of run", takeaway, shown, KIND_COLUMNS)
 
 
-ERRORS = Section(
+WHERE_ERRORS_GROW = Section(
     "Where the error grows",
-    draw=lambda content: (error_over_horizon(content), error_by_kind(content), error_over_time(content)),
+    draw=lambda content: (horizon_figure(content), error_by_kind(content), time_figure(content)),
     anchors=("horizon", "kinds", "over-time"),
 )

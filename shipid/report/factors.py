@@ -9,51 +9,69 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import DATA_DRIVEN, ReportContent, rows_in, spoken
-from shipid.report.figure import INK, MUTED, SYMBOLS, Chip, Figure, axis, category, escaped, line, plot, row_name
+from shipid.report.content import DATA_DRIVEN, ReportContent, rows_as_tuples, spoken_model
+from shipid.report.figure import (
+    INK,
+    MARKERS,
+    MUTED,
+    Chip,
+    PageFigure,
+    category_colour,
+    escape_name,
+    make_axis,
+    make_line,
+    make_plot,
+    row_name,
+)
 from shipid.report.section import Section
-from shipid.report.selection import families
-from shipid.report.tables import Column, Table, frame_table, with_cells, word_cell
-from shipid.report.wording import counted, listed, metres, number, shortened
+from shipid.report.selection import models_by_accuracy
+from shipid.report.tables import PageTable, TableColumn, frame_table, with_cells, word_cell
+from shipid.report.wording import counted_text, listed_names, metres_text, number_text, shorten_name
 
-ROW = 42  # height of a model [px]
-LONGEST = 11  # characters of a name that fit beside its errors on a phone
-TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 5.0, 10.0, 20.0, 50.0, 100.0)
-MODELS = {
-    "model": Column("model"),
-    "family": Column("family"),
-    "A [m]": Column("A", "length"),
-    "A_90 [m]": Column("A_90", "length"),
-    "rms [m]": Column("A_rms", "length"),
-    "A along [m]": Column("A_along", "length"),
-    "A across [m]": Column("A_across", "length"),
-    "status": Column("status"),
-    "what it is": Column("description"),
+STRIP_HEIGHT = 42  # height of a model [px]
+MOST_LETTERS_OF_ROW = 11  # characters of a name that fit beside its errors on a phone
+FACTOR_TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 5.0, 10.0, 20.0, 50.0, 100.0)
+MODEL_COLUMNS = {
+    "model": TableColumn("model"),
+    "family": TableColumn("family"),
+    "A [m]": TableColumn("A", "length"),
+    "A_90 [m]": TableColumn("A_90", "length"),
+    "rms [m]": TableColumn("A_rms", "length"),
+    "A along [m]": TableColumn("A_along", "length"),
+    "A across [m]": TableColumn("A_across", "length"),
+    "status": TableColumn("status"),
+    "what it is": TableColumn("description"),
 }
 
 
-def factors(content: ReportContent) -> Figure | None:
+def factors_figure(content: ReportContent) -> PageFigure | None:
     """Dot strips of the factors, a row per model by rising A; None without rows."""
     frame = content.factors[content.factors.factor.notna()]
     if frame.empty:
         return None
-    names = [str(name) for name in families(content).model if name in set(frame.model)]
+    names = [str(name) for name in models_by_accuracy(content).model if name in set(frame.model)]
     bases = set(content.models.model[content.models.family.ne(DATA_DRIVEN)])  # further methods have their numbers
-    untouched = [str(name) for name in families(content).model if name in bases and name not in names]
+    untouched = [str(name) for name in models_by_accuracy(content).model if name in bases and name not in names]
     crosses = bool((frame.factor <= 0).any())  # a factor without a logarithm
-    return Figure(
+    return PageFigure(
         id="factors",
         title="How the models were degraded",
         takeaway=_takeaway_factors(frame, names),
         how="One dot per perturbed number, at its factor on the base model, logarithmic; rows by "
         "rising A, with the mean absolute error along and across the heading at the instant of prediction where known."
         + (" A factor that is not positive lies at the left edge: 0 removes the term." if crosses else "")
-        + (f" Not perturbed: {listed(untouched, 6)}." if untouched else ""),
-        alternative=f"Dots at the factors of {counted(len(names), 'model')}; the table of models has A.",
-        height=ROW * len(names) + 70,
+        + (f" Not perturbed: {listed_names(untouched, 6)}." if untouched else ""),
+        alternative=f"Dots at the factors of {counted_text(len(names), 'model')}; the table of models has A.",
+        height=STRIP_HEIGHT * len(names) + 70,
         draw=lambda: [_draw_strips(content, frame, names)],
         chips=[
-            Chip(f"group:{name}", str(name).replace("_", " "), category(i), "none", symbol=SYMBOLS[i % len(SYMBOLS)])
+            Chip(
+                f"group:{name}",
+                str(name).replace("_", " "),
+                category_colour(i),
+                "none",
+                symbol=MARKERS[i % len(MARKERS)],
+            )
             for i, name in enumerate(pd.unique(frame.group))
         ],
     )
@@ -70,48 +88,53 @@ def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) 
         # Each group is drawn a little below the one before, so that equal factors do not hide each other.
         y = np.array([names.index(name) for name in mine.model]) + 0.24 * i / max(1, len(groups) - 1)
         x = [math.log(factor) if factor > 0 else edge for factor in mine.factor]
-        marker = {"symbol": SYMBOLS[i % len(SYMBOLS)], "size": 8, "color": category(i), "opacity": 0.75}
-        words = [f"{escaped(row.model)}: {escaped(row.path)} × {row.factor:.3g}" for row in rows_in(mine)]
-        traces.append(line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
+        marker = {"symbol": MARKERS[i % len(MARKERS)], "size": 8, "color": category_colour(i), "opacity": 0.75}
+        words = [
+            f"{escape_name(row.model)}: {escape_name(row.path)} × {row.factor:.3g}" for row in rows_as_tuples(mine)
+        ]
+        traces.append(make_line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
     shown = [1.0]
-    for tick in sorted(TICKS, key=lambda value: abs(math.log(value))):
+    for tick in sorted(FACTOR_TICKS, key=lambda value: abs(math.log(value))):
         far = all(abs(math.log(tick / other)) > 0.08 * (high - low) for other in shown)
         shown += [tick] * (far and low - 0.02 <= math.log(tick) <= high + 0.02)
     ticks = {math.log(tick): f"{tick:g}" for tick in shown}
     ticks |= {edge: "0" if removed.eq(0).all() else "≤ 0"} if len(removed) else {}
     span = [(edge if len(removed) else low) - room, high + room]
-    x_axis = axis("factor [1]", range=span, tickvals=list(ticks), ticktext=list(ticks.values()))
-    y_axis = axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, showgrid=False)
+    x_axis = make_axis("factor [1]", range=span, tickvals=list(ticks), ticktext=list(ticks.values()))
+    y_axis = make_axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, showgrid=False)
     texts = [row_name(row, _words_of_row(content, name)) for row, name in enumerate(names)]
     rule: dict[str, Any] = {"type": "line", "layer": "below", "line": {"color": MUTED, "width": 0.5}}
     rules = [{**rule, "x0": span[0], "x1": span[1], "y0": row, "y1": row} for row in range(len(names))]
     rules.append({**rule, "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "line": {"color": INK, "width": 1}})
     margin = {"l": 12, "r": 12, "t": 4, "b": 44}
-    return plot(traces, x_axis, y_axis, annotations=texts, shapes=rules, margin=margin)
+    return make_plot(traces, x_axis, y_axis, annotations=texts, shapes=rules, margin=margin)
 
 
 def _words_of_row(content: ReportContent, name: str) -> str:
     """Name of a model and its accuracy."""
-    words, mine = f"<b>{escaped(shortened(name, LONGEST))}</b>", content.models[content.models.model == name]
+    words, mine = (
+        f"<b>{escape_name(shorten_name(name, MOST_LETTERS_OF_ROW))}</b>",
+        content.models[content.models.model == name],
+    )
     if mine.empty:
         return words
     record = mine.iloc[0]
-    accuracy = f"A {metres(float(record.A))}" if math.isfinite(float(record.A)) else escaped(record.status)
+    accuracy = f"A {metres_text(float(record.A))}" if math.isfinite(float(record.A)) else escape_name(record.status)
     along, across = (float(record.get(column, math.nan)) for column in ("A_along", "A_across"))
-    split = f": {number(along)} along, {number(across)} across" if math.isfinite(along + across) else ""
+    split = f": {number_text(along)} along, {number_text(across)} across" if math.isfinite(along + across) else ""
     return f"{words}  {accuracy}{split}"
 
 
 def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:
     """How many numbers, how far from 1, and which model is farthest from its base."""
     positive, removed = frame[frame.factor > 0], int((frame.factor == 0).sum())
-    kept, models = frame.factor[frame.factor != 0], counted(len(names), "model")
+    kept, models = frame.factor[frame.factor != 0], counted_text(len(names), "model")
     text = f"{models} changed"
     if len(kept):
-        low, high = number(kept.min()), number(kept.max())
-        text = f"{counted(len(kept), 'number')} in {models}, times "
+        low, high = number_text(kept.min()), number_text(kept.max())
+        text = f"{counted_text(len(kept), 'number')} in {models}, times "
         text += low if low == high else f"factors from {low} to {high}"
-    text += f"; {counted(removed, 'term')} removed" if removed else ""
+    text += f"; {counted_text(removed, 'term')} removed" if removed else ""
     if positive.model.nunique() > 1:
         away = positive.factor.map(lambda factor: math.log(factor) ** 2).groupby(positive.model).mean()
         text += f"; {away.idxmax()} is farthest from its base, by a factor of {math.exp(math.sqrt(away.max())):.2f}"
@@ -119,15 +142,19 @@ def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:
     return f"{text}."
 
 
-def models_table(content: ReportContent) -> Table:
+def models_table(content: ReportContent) -> PageTable:
     """List the models, by rising A."""
     frame = content.models.sort_values("A", kind="stable", na_position="last")
     known = frame[frame.A.notna()]
-    ends = [f"{number(row.A)} m ({row.model})" for row in rows_in(known)]
+    ends = [f"{number_text(row.A)} m ({row.model})" for row in rows_as_tuples(known)]
     takeaway = f"A runs from {ends[0]} to {ends[-1]}." if len(ends) > 1 else "No physics model could be judged."
-    takeaway = f"A of {known.model.iloc[0]} is {number(known.A.iloc[0])} m." if len(ends) == 1 else takeaway
+    takeaway = f"A of {known.model.iloc[0]} is {number_text(known.A.iloc[0])} m." if len(ends) == 1 else takeaway
     return frame_table(
-        "models", "Every model", takeaway, with_failures(frame).assign(family=frame.family.map(spoken)), MODELS
+        "models",
+        "Every model",
+        takeaway,
+        with_failures(frame).assign(family=frame.family.map(spoken_model)),
+        MODEL_COLUMNS,
     )
 
 
@@ -144,7 +171,7 @@ def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
 
 THE_MODELS = Section(
     "The models",
-    draw=lambda content: (factors(content), models_table(content)),
+    draw=lambda content: (factors_figure(content), models_table(content)),
     needs=("models",),
     anchors=("factors", "models"),
 )

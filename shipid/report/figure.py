@@ -22,10 +22,10 @@ from plotly.subplots import make_subplots
 
 from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, Indices
-from shipid.report.wording import scientific
+from shipid.report.wording import scientific_text
 
 INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
-CLEAR = "rgba(0,0,0,0)"
+TRANSPARENT = "rgba(0,0,0,0)"
 PAGE_COLOURS = {
     "light": {
         "page": "#ffffff", "card": "#f6f7f9", "ink": "#15191f", "muted": "#5a6472", "grid": "#dfe3e8",
@@ -40,17 +40,17 @@ PAGE_COLOURS = {
 }  # fmt: skip
 # Okabe and Ito (2008), "Color universal design"; yellow and black are left out: one page is white, one nearly black.
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-SYMBOLS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
+MARKERS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
 LINE_DASHES = ("solid", "dash", "dot", "dashdot")
-LEVELS = 24
-ROUNDING = 1e-9  # of the greatest error: that of an exact model
+COLOUR_LEVELS = 24
+ROUNDING_SHARE = 1e-9  # of the greatest error: that of an exact model
 MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
-POINTS = 600  # of a line over time: more than pixels are wide
-Values: TypeAlias = "Sequence[float] | Floats | pd.Series[Any]"
+MOST_LINE_POINTS = 600  # of a line over time: more than pixels are wide
+NumbersOfLine: TypeAlias = "Sequence[float] | Floats | pd.Series[Any]"
 Trace = dict[str, Any]  # as Plotly takes it: `type` and the options of that type
 
 
-def category(index: int) -> str:
+def category_colour(index: int) -> str:
     """Return the CSS variable of the index-th category colour."""
     return f"var(--category-{index % len(OKABE_ITO)})"
 
@@ -65,7 +65,7 @@ def page_colours(theme: str) -> dict[str, str]:
     named = (OKABE_ITO[-1], *OKABE_ITO[1:-1], OKABE_ITO[0]) if dark else OKABE_ITO
     colours = PAGE_COLOURS[theme] | {f"category-{i}": colour for i, colour in enumerate(named)}
     for name, ends in (("scale", (0.28, 1.0) if dark else (0.0, 0.72)), ("heat", (0.0, 1.0))):
-        steps = sample_colorscale("Viridis", list(np.linspace(*ends, LEVELS)))
+        steps = sample_colorscale("Viridis", list(np.linspace(*ends, COLOUR_LEVELS)))
         colours |= {f"{name}-{i}": colour for i, colour in enumerate(steps)}
         colours[name] = f"linear-gradient(90deg, {', '.join(steps)})"
     return colours
@@ -77,13 +77,13 @@ def least_coloured(span: tuple[float, float]) -> float:
     Above 0, also for a scale of zeros alone.
     """
     low, high = span
-    return (low if low >= ROUNDING * high else 1e-4 * high) or 1.0
+    return (low if low >= ROUNDING_SHARE * high else 1e-4 * high) or 1.0
 
 
 def colour_level(value: float, span: tuple[float, float]) -> int:
-    """Place of a magnitude on a logarithmic scale of `LEVELS` colours: errors are factors apart, a few far off."""
+    """Place of a magnitude on a logarithmic scale of `COLOUR_LEVELS` colours: errors are factors apart, a few far off."""
     low, high, place = np.log(np.maximum([*span, value], least_coloured(span)))
-    return round(float(np.clip((place - low) / (high - low), 0, 1)) * (LEVELS - 1)) if high > low else 0
+    return round(float(np.clip((place - low) / (high - low), 0, 1)) * (COLOUR_LEVELS - 1)) if high > low else 0
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Chip:
 
 
 @dataclass(frozen=True)
-class Scale:
+class ColourScale:
     """A logarithmic colour scale: a label with its unit, the least and greatest value, the CSS variable of it."""
 
     label: str
@@ -118,7 +118,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Figure:
+class PageFigure:
     """A figure of the page.
 
     Parameters
@@ -141,17 +141,17 @@ class Figure:
     controls: Sequence[Control] = ()
     chips: Sequence[Chip] = ()
     captions: Sequence[str] = ()
-    scale: Scale | None = None
+    scale: ColourScale | None = None
     columns: bool = False
     browser: bool = False
 
 
-def escaped(text: object) -> str:
+def escape_name(text: object) -> str:
     """Escape a name for Plotly, which reads tags and links in its texts."""
     return html.escape(str(text), quote=False)
 
 
-def axis(title: str, **options: Any) -> dict[str, Any]:
+def make_axis(title: str, **options: Any) -> dict[str, Any]:
     """Make an axis; its title carries the unit."""
     base = {"gridcolor": GRID, "linecolor": GRID, "zeroline": False, "automargin": True, "minexponent": MILLION}
     return {**base, "title": {"text": title, "standoff": 8, "font": {"size": 13}}, **options}
@@ -159,26 +159,28 @@ def axis(title: str, **options: Any) -> dict[str, Any]:
 
 def zero_axis(title: str, colour: str = GRID, **options: Any) -> dict[str, Any]:
     """Make an axis with a line at 0."""
-    return axis(title, zeroline=True, zerolinecolor=colour, **options)
+    return make_axis(title, zeroline=True, zerolinecolor=colour, **options)
 
 
 def log_axis(title: str, steps: Sequence[float] = (1, 2, 5), **options: Any) -> dict[str, Any]:
     """Make a logarithmic axis with whole numbers at its ticks: Plotly would write 0.5 as 5."""
     ticks = [float(f"{step}e{decade}") for decade in range(-8, 5) for step in steps]
-    return axis(title, type="log", **{"tickvals": ticks, "ticktext": [scientific(tick) for tick in ticks], **options})
+    return make_axis(
+        title, type="log", **{"tickvals": ticks, "ticktext": [scientific_text(tick) for tick in ticks], **options}
+    )
 
 
 def names_axis(names: Sequence[object], title: str = "", **options: Any) -> dict[str, Any]:
     """Make an axis with a name at 0, 1, 2, ..."""
-    return axis(title, tickvals=list(range(len(names))), ticktext=list(map(escaped, names)), **options)
+    return make_axis(title, tickvals=list(range(len(names))), ticktext=list(map(escape_name, names)), **options)
 
 
-def plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **options: Any) -> go.Figure:
+def make_plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **options: Any) -> go.Figure:
     """Make a figure without background, legend or template: the page gives colours and the legend is text."""
     base = {
         "template": None,
-        "paper_bgcolor": CLEAR,
-        "plot_bgcolor": CLEAR,
+        "paper_bgcolor": TRANSPARENT,
+        "plot_bgcolor": TRANSPARENT,
         "font": {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif", "size": 13, "color": INK},
         "margin": {"l": 48, "r": 12, "t": 12, "b": 44},
         "showlegend": False,
@@ -188,22 +190,22 @@ def plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **option
     return go.Figure(traces, {**base, "xaxis": x, "yaxis": y, **options})
 
 
-def chart(
+def make_chart(
     traces: Sequence[Trace], x: str, y: str, spans: Sequence[tuple[float, float]] = (), nticks: int = 6
 ) -> go.Figure:
     """Make a plot of two lengths on equal axes, over given spans of x and y [m] or over what is drawn."""
     room = 0.04 * max((high - low for low, high in spans), default=0.0)
     ranges = [{"range": [low - room, high + room]} for low, high in spans] or [{}, {}]
     # Margins are fixed: automatic ones and equal axes chase each other.
-    right = axis(x, scaleanchor="y", scaleratio=1, nticks=nticks, automargin=False, **ranges[0])
-    up = axis(y, nticks=8, automargin=False, **ranges[1])
-    return plot(traces, right, up, margin={"l": 70, "r": 12, "t": 12, "b": 44})
+    right = make_axis(x, scaleanchor="y", scaleratio=1, nticks=nticks, automargin=False, **ranges[0])
+    up = make_axis(y, nticks=8, automargin=False, **ranges[1])
+    return make_plot(traces, right, up, margin={"l": 70, "r": 12, "t": 12, "b": 44})
 
 
-def line(
+def make_line(
     name: str,
-    x: Values,
-    y: Values,
+    x: NumbersOfLine,
+    y: NumbersOfLine,
     keys: Sequence[str],
     unit: str = "m",
     *,
@@ -221,13 +223,13 @@ def line(
     hover : template of the hover box, or the text of each point; empty for no box, None for name and y.
     """
     template = "%{customdata}" if not isinstance(hover, str | None) else hover
-    template = f"{escaped(name)}: %{{y:.4~r}} {escaped(unit)}" if template is None else template
+    template = f"{escape_name(name)}: %{{y:.4~r}} {escape_name(unit)}" if template is None else template
     trace = {
         "type": "scatter",
         "x": np.asarray(x, dtype=np.float32),
         "y": np.asarray(y, dtype=np.float32),
         "mode": mode,
-        "name": escaped(name),
+        "name": escape_name(name),
         "meta": list(keys),
         "connectgaps": False,
     }
@@ -235,7 +237,7 @@ def line(
     return {**trace, **({} if isinstance(hover, str | None) else {"customdata": list(hover)}), **options}
 
 
-def intervals(middle: Floats, low: Floats, high: Floats, colour: str) -> dict[str, Any]:
+def error_bars(middle: Floats, low: Floats, high: Floats, colour: str) -> dict[str, Any]:
     """Error bars from low to high around the middle; none where an end is not finite."""
     reach = {"array": np.nan_to_num(high - middle, posinf=0.0), "arrayminus": np.nan_to_num(middle - low, posinf=0.0)}
     return {"type": "data", "symmetric": False, "color": colour, "thickness": 1.5, "width": 4, **reach}
@@ -262,12 +264,12 @@ def even_places(length: int, most: int) -> Indices:
     return np.unique(np.linspace(0, length - 1, min(length, most)).round().astype(int))
 
 
-def run_names(frame: pd.DataFrame, column: str = "run") -> list[str]:
+def names_in(frame: pd.DataFrame, column: str = "run") -> list[str]:
     """Names in a column of a frame, each once, in their order."""
     return [str(name) for name in pd.unique(frame[column])]
 
 
-def draw_alone(figure: Figure, chosen: Sequence[object] = (), *, dark: bool = False) -> go.Figure:
+def draw_alone(figure: PageFigure, chosen: Sequence[object] = (), *, dark: bool = False) -> go.Figure:
     """Draw a figure of a page as one Plotly figure with title, legend and real colours.
 
     Parameters
@@ -291,41 +293,41 @@ def _find_option(control: Control, value: object) -> Any:
     return control.options[control.start if value is None else texts.index(str(value))]
 
 
-def dress_panels(figure: Figure, panels: Sequence[go.Figure], *, dark: bool = False) -> go.Figure:
+def dress_panels(figure: PageFigure, panels: Sequence[go.Figure], *, dark: bool = False) -> go.Figure:
     """Put panels below each other, with title, legend and scale, in the colours of the light or the dark page."""
-    whole = make_subplots(rows=len(panels), subplot_titles=[*map(escaped, figure.captions)] or None)
+    whole = make_subplots(rows=len(panels), subplot_titles=[*map(escape_name, figure.captions)] or None)
     whole = go.Figure(panels[0]) if len(panels) == 1 else whole
     for row, panel in enumerate(panels if len(panels) > 1 else (), start=1):
         across = panel.layout.xaxis.to_plotly_json()
         across |= {"scaleanchor": f"y{row}"} if "scaleanchor" in across else {}
         whole.add_traces(panel.data, rows=row, cols=1)
         whole.update_xaxes(across, row=row, col=1).update_yaxes(panel.layout.yaxis, row=row, col=1)
-        whole.update_layout(template=None, plot_bgcolor=CLEAR, font=panel.layout.font, hovermode="closest")
+        whole.update_layout(template=None, plot_bgcolor=TRANSPARENT, font=panel.layout.font, hovermode="closest")
     whole.update_traces(showlegend=False)
     whole.add_traces([_legend_entry(chip) for chip in figure.chips])
     if figure.scale is not None:
         whole.add_trace(_scale_bar(figure.scale))
-    takeaway = "<br>".join(map(escaped, wrap(figure.takeaway, 110)))
-    title = {"text": f"{escaped(figure.title)}<br><sup>{takeaway}</sup>", "x": 0, "xref": "paper", "y": 1}
+    takeaway = "<br>".join(map(escape_name, wrap(figure.takeaway, 110)))
+    title = {"text": f"{escape_name(figure.title)}<br><sup>{takeaway}</sup>", "x": 0, "xref": "paper", "y": 1}
     title |= {"yref": "container", "yanchor": "top", "pad": {"t": 24}}
     height = len(panels) * figure.height + 130 + 70 * (len(panels) - 1)
     beside = 1.25 if whole.layout.annotations else 1.02  # right of names that stand beside the lines
     whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
     whole.update_layout(showlegend=bool(figure.chips))
     colours = page_colours("dark" if dark else "light")
-    data = [_paint(trace.to_plotly_json(), colours) for trace in whole.data]
-    layout = {**_paint(whole.layout.to_plotly_json(), colours), "paper_bgcolor": colours["page"]}
+    data = [_put_colours(trace.to_plotly_json(), colours) for trace in whole.data]
+    layout = {**_put_colours(whole.layout.to_plotly_json(), colours), "paper_bgcolor": colours["page"]}
     return go.Figure(data, layout)
 
 
-def _paint(value: Any, colours: Mapping[str, str]) -> Any:
+def _put_colours(value: Any, colours: Mapping[str, str]) -> Any:
     """Replace the names of colours, `var(--ink)`, in the options of a figure by colours."""
     if isinstance(value, str):
         return re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], value)
     if isinstance(value, Mapping):
-        return {key: _paint(item, colours) for key, item in value.items()}
+        return {key: _put_colours(item, colours) for key, item in value.items()}
     if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype.kind in "OU"):
-        return [_paint(item, colours) for item in value]
+        return [_put_colours(item, colours) for item in value]
     return value
 
 
@@ -334,18 +336,18 @@ def _legend_entry(chip: Chip) -> Trace:
     mode = "+".join(["lines"] * (chip.dash != "none") + ["markers"] * bool(chip.symbol))
     ink = {"color": chip.colour, "width": chip.width, "dash": "solid" if chip.dash == "none" else chip.dash}
     marker = {"color": chip.colour, "symbol": chip.symbol or "circle"}
-    entry = {"x": [None], "y": [None], "name": escaped(chip.label), "mode": mode, "line": ink, "marker": marker}
+    entry = {"x": [None], "y": [None], "name": escape_name(chip.label), "mode": mode, "line": ink, "marker": marker}
     return {"type": "scatter", "showlegend": True, **entry}
 
 
-def _scale_bar(scale: Scale) -> Trace:
+def _scale_bar(scale: ColourScale) -> Trace:
     """Colour bar of a logarithmic scale below the panels, without a point on the plot."""
     least = least_coloured((scale.low, scale.high))
     low, high = (math.log10(max(value, least)) for value in (scale.low, scale.high))
     ticks = np.linspace(low, high, 4).tolist()
-    bar = {"title": {"text": escaped(scale.label), "side": "top"}, "orientation": "h", "y": -0.15, "yanchor": "top"}
+    bar = {"title": {"text": escape_name(scale.label), "side": "top"}, "orientation": "h", "y": -0.15, "yanchor": "top"}
     bar |= {"tickvals": ticks, "ticktext": [f"{10**tick:.3g}" for tick in ticks], "thickness": 16}
-    steps = [[step, f"var(--{scale.gradient}-{i})"] for i, step in enumerate(np.linspace(0, 1, LEVELS).tolist())]
+    steps = [[step, f"var(--{scale.gradient}-{i})"] for i, step in enumerate(np.linspace(0, 1, COLOUR_LEVELS).tolist())]
     marker = {"color": [low, high], "colorscale": steps, "cmin": low, "cmax": high, "showscale": True, "colorbar": bar}
     return {"type": "scatter", "x": [None, None], "y": [None, None], "mode": "markers"} | {
         "marker": marker,

@@ -22,7 +22,7 @@ PATTERN = re.compile(rf"H_90|N_D(?![\w])|\((?:11|14|15|16)\)|{LETTER}")
 AFTER = re.compile(r"\b(by|its|is|has|error|below|equal|along|less) (A|H)(?![\w-])")
 
 
-def glossed(text: str) -> Markup:
+def mark_short_names(text: str) -> Markup:
     """Escape a text and mark its short names with what they mean."""
 
     def mark(match: re.Match[str]) -> str:

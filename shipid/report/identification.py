@@ -12,67 +12,76 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, PageContent, Sentence, rows_of
+from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame
 from shipid.report.figure import (
     INK,
     MUTED,
     Chip,
-    Figure,
+    PageFigure,
     Trace,
-    axis,
-    category,
-    escaped,
-    line,
+    category_colour,
+    escape_name,
+    make_axis,
+    make_line,
+    make_plot,
     names_axis,
-    plot,
-    run_names,
+    names_in,
     zero_axis,
 )
-from shipid.report.motion import LOG, MOTIONS, motion_figure
+from shipid.report.motion import LOG_SERIES, MOTION_AXES, motion_figure
 from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.structures import group_errors
-from shipid.report.tables import MISSING, Cell, Column, Table, decimals_for_median, frame_table, with_cells, word_cell
-from shipid.report.wording import bound, counted, listed, number, scientific
+from shipid.report.tables import (
+    MISSING,
+    PageTable,
+    TableCell,
+    TableColumn,
+    decimals_for_median,
+    frame_table,
+    with_cells,
+    word_cell,
+)
+from shipid.report.wording import counted_text, listed_names, number_text, scientific_text, set_sentence
 from shipid.units import interval_text
 
-ROW, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
+PARAMETER_HEIGHT, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
 WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [px]
 MOST_NAMED = 16  # estimates whose names have room below the columns on a phone
-FARTHEST = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
+FARTHEST_INTERVAL = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
 BEFORE, AFTER = "before", "after"
 RUN_INKS = {
-    LOG: {"color": INK, "dash": "solid"},
-    BEFORE: {"color": category(1), "dash": "dot"},
-    AFTER: {"color": category(0), "dash": "solid"},
+    LOG_SERIES: {"color": INK, "dash": "solid"},
+    BEFORE: {"color": category_colour(1), "dash": "dot"},
+    AFTER: {"color": category_colour(0), "dash": "solid"},
 }
-ESTIMATES = {
-    "parameter": Column("words"),
-    "unit": Column("unit"),
-    "base": Column("base", numeric=True),
-    "estimate": Column("value", numeric=True),
-    "standard error": Column("error", numeric=True),
-    "factor": Column("factor", numeric=True),
-    "factor, 95 %": Column("interval", numeric=True),
-    "identified": Column("identified"),
+ESTIMATE_COLUMNS = {
+    "parameter": TableColumn("words"),
+    "unit": TableColumn("unit"),
+    "base": TableColumn("base", numeric=True),
+    "estimate": TableColumn("value", numeric=True),
+    "standard error": TableColumn("error", numeric=True),
+    "factor": TableColumn("factor", numeric=True),
+    "factor, 95 %": TableColumn("interval", numeric=True),
+    "identified": TableColumn("identified"),
 }
 MEASURES_BEFORE_AND_AFTER = {
-    "manoeuvre": Column("manoeuvre"),
-    "measure": Column("measure"),
-    BEFORE: Column(BEFORE, numeric=True),
-    AFTER: Column(AFTER, numeric=True),
-    "band from": Column("low", numeric=True),
-    "to": Column("high", numeric=True),
-    "unit": Column("unit"),
-    "why missing": Column("missing"),
+    "manoeuvre": TableColumn("manoeuvre"),
+    "measure": TableColumn("measure"),
+    BEFORE: TableColumn(BEFORE, numeric=True),
+    AFTER: TableColumn(AFTER, numeric=True),
+    "band from": TableColumn("low", numeric=True),
+    "to": TableColumn("high", numeric=True),
+    "unit": TableColumn("unit"),
+    "why missing": TableColumn("missing"),
 }
-PROGRAMME = {
-    "manoeuvre": Column("manoeuvre"),
-    "time [h]": Column("hours", 2),
-    "gain [bit]": Column("gain", 2),
-    "gain [bit/h]": Column("per_hour", 2),
-    "narrows most": Column("narrows"),
-    "by [%]": Column("by", 0),
+PROGRAMME_COLUMNS = {
+    "manoeuvre": TableColumn("manoeuvre"),
+    "time [h]": TableColumn("hours", 2),
+    "gain [bit]": TableColumn("gain", 2),
+    "gain [bit/h]": TableColumn("per_hour", 2),
+    "narrows most": TableColumn("narrows"),
+    "by [%]": TableColumn("by", 0),
 }
 
 
@@ -109,56 +118,64 @@ class IdentificationContent(PageContent):
     ahead: float
     manoeuvres: pd.DataFrame
     colours: pd.DataFrame
-    profiles: pd.DataFrame = field(default_factory=rows_of())
-    programme: pd.DataFrame = field(default_factory=rows_of())
-    groups: pd.DataFrame = field(default_factory=rows_of())
+    profiles: pd.DataFrame = field(default_factory=empty_frame())
+    programme: pd.DataFrame = field(default_factory=empty_frame())
+    groups: pd.DataFrame = field(default_factory=empty_frame())
     beyond: Sequence[str] = ()
 
     @property
-    def answer(self) -> list[Sentence]:
+    def answer(self) -> list[AnswerSentence]:
         """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
-        sentences = [Sentence(f"{known} of {counted(count, 'parameter')} are identified by these runs.", "estimates")]
-        sentences.append(Sentence(_errors_before_and_after(self), "free-runs"))
-        return [*sentences, *(Sentence(f"Careful: {warning}.") for warning in self.warnings)]
+        sentences = [
+            AnswerSentence(f"{known} of {counted_text(count, 'parameter')} are identified by these runs.", "estimates")
+        ]
+        sentences.append(AnswerSentence(_errors_before_and_after(self), "free-runs"))
+        return [*sentences, *(AnswerSentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
 def _errors_before_and_after(content: IdentificationContent) -> str:
     which = "test" if content.held_out else "fit"
     rows = content.errors[(content.errors["set"] == which) & (content.errors["run"] == "all")].set_index("model")
-    runs = counted(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
+    runs = counted_text(len(content.held_out), "run") + " held out" if content.held_out else "the fitted runs"
     changes = [
-        f"{name} from {number(factor * rms[BEFORE])} to {number(factor * rms[AFTER])} {unit}"
-        for name, (_, unit, factor) in {**MOTIONS, "position": ("", "m", 1.0)}.items()
+        f"{name} from {number_text(factor * rms[BEFORE])} to {number_text(factor * rms[AFTER])} {unit}"
+        for name, (_, unit, factor) in {**MOTION_AXES, "position": ("", "m", 1.0)}.items()
         for rms in [rows[name].astype(float)]
     ]
-    return f"On {runs}, the root mean square error of a free run {_run_length(content)} goes in {listed(changes)}."
+    return (
+        f"On {runs}, the root mean square error of a free run {_run_length(content)} goes in {listed_names(changes)}."
+    )
 
 
 def _run_length(content: IdentificationContent) -> str:
     return f"of {content.ahead:g} s" if content.ahead else "over the whole run"
 
 
-def estimates(content: IdentificationContent) -> Figure:
+def estimates_figure(content: IdentificationContent) -> PageFigure:
     """Estimates with 95 % intervals as factors on the base values; hollow where not identified."""
     frame = content.estimates
     low, high = _span_of_factors(frame)
     cut = bool(((frame["factor_low"] < low) | (frame["factor_high"] > high)).any())
     vague = frame.loc[~frame["identified"].astype(bool), "name"].tolist()
     none = frame.loc[frame["base"] == 0, "name"].tolist()
-    return Figure(
+    return PageFigure(
         id="estimates",
         title="The estimates",
-        takeaway=f"Not identified: {listed(vague, 8)}." if vague else "Every parameter is identified.",
+        takeaway=f"Not identified: {listed_names(vague, 8)}." if vague else "Every parameter is identified.",
         how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
         "an interval wider than ±100 % of the base value, or the estimate is at a bound or was dropped."
-        + (f" The base has 0 for {listed(none, 8)}: there factors are on the scale, which is dotted." if none else "")
+        + (
+            f" The base has 0 for {listed_names(none, 8)}: there factors are on the scale, which is dotted."
+            if none
+            else ""
+        )
         + (" Bars that reach an edge go on." if cut else ""),
         alternative="Estimates with intervals; the table below has the numbers.",
-        height=ROW * len(frame) + HEAD,
+        height=PARAMETER_HEIGHT * len(frame) + HEAD,
         draw=lambda: [_draw_estimates(frame, low, high)],
         chips=[
-            Chip("identified", "identified", category(0), symbol="circle"),
+            Chip("identified", "identified", category_colour(0), symbol="circle"),
             Chip("vague", "not identified", MUTED, symbol="circle-open", width=1.2),
         ],
     )
@@ -166,29 +183,31 @@ def estimates(content: IdentificationContent) -> Figure:
 
 def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> go.Figure:
     base_ink = {"color": INK, "width": 1, "dash": "dot"}
-    traces = [line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line=base_ink, hover="")]
+    traces = [make_line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line=base_ink, hover="")]
     numbered = frame.assign(row=np.arange(len(frame), dtype=float))
     for known, key, ink, width, symbol in (
-        (True, "identified", category(0), 2.5, "circle"),
+        (True, "identified", category_colour(0), 2.5, "circle"),
         (False, "vague", MUTED, 1.2, "circle-open"),
     ):
         mine = numbered[frame["identified"].astype(bool) == known]
         ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
         x = np.column_stack([ends, np.full(len(mine), np.nan)]).ravel()
         bars: Trace = {"line": {"color": ink, "width": width}, "hover": ""}
-        traces.append(line("interval", x, np.repeat(mine["row"], 3), [key], **bars))
+        traces.append(make_line("interval", x, np.repeat(mine["row"], 3), [key], **bars))
         marker = {"symbol": symbol, "color": ink, "size": 9, "line": {"color": ink, "width": 2}}
         words = [_estimate_words(row) for row in mine.to_dict("records")]
-        traces.append(line("estimate", mine["factor"], mine["row"], [key], mode="markers", marker=marker, hover=words))
+        traces.append(
+            make_line("estimate", mine["factor"], mine["row"], [key], mode="markers", marker=marker, hover=words)
+        )
     y = names_axis(list(frame["name"]), showgrid=False, range=[len(frame) - 0.4, -0.6])
-    x_axis = axis("factor on the base value [1]", nticks=9, range=[low, high])
-    return plot(traces, x_axis, y, margin={"l": 8, "r": 12, "t": 4, "b": 44})
+    x_axis = make_axis("factor on the base value [1]", nticks=9, range=[low, high])
+    return make_plot(traces, x_axis, y, margin={"l": 8, "r": 12, "t": 4, "b": 44})
 
 
 def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
     """Return the range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
     dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
-    reach = FARTHEST * max(float(np.ptp(dots)), 0.25)
+    reach = FARTHEST_INTERVAL * max(float(np.ptp(dots)), 0.25)
     given = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
     ends = np.append(given[np.isfinite(given)], dots)
     low, high = max(float(ends.min()), dots.min() - reach), min(float(ends.max()), dots.max() + reach)
@@ -197,53 +216,53 @@ def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
 
 def _estimate_words(row: Mapping[Any, Any]) -> str:
     interval = interval_text(row["factor_low"], row["factor_high"])
-    words = [f"<b>{escaped(row['path'])}</b> x {row['factor']:.4g}, 95 % {interval}"]
-    return "<br>".join([*words, *wrap(escaped(row["reason"]), 70)])
+    words = [f"<b>{escape_name(row['path'])}</b> x {row['factor']:.4g}, 95 % {interval}"]
+    return "<br>".join([*words, *wrap(escape_name(row["reason"]), 70)])
 
 
-def estimates_table(content: IdentificationContent) -> Table:
+def estimates_table(content: IdentificationContent) -> PageTable:
     """Return the table of all estimates in their units."""
     frame = content.estimates
     words = [row["path"] + (f" (with {row['with']})" if row["with"] else "") for row in frame.to_dict("records")]
     numbers = {name: list(map(_scientific_cell, frame[name])) for name in ("base", "value", "error", "factor")}
     intervals = [
-        Cell(interval_text(low, high, " … ").replace("-", "−"), float(low))
+        TableCell(interval_text(low, high, " … ").replace("-", "−"), float(low))
         if np.isfinite(high - low)
-        else Cell("none", MISSING)
+        else TableCell("none", MISSING)
         for low, high in zip(frame["factor_low"], frame["factor_high"], strict=True)
     ]
     identified = [word_cell("yes" if known else "no", bad=not known) for known in frame["identified"]]
     shown = with_cells(frame.assign(words=words), interval=intervals, identified=identified, **numbers)
-    return frame_table("numbers", "Every estimate", "", shown, ESTIMATES)
+    return frame_table("numbers", "Every estimate", "", shown, ESTIMATE_COLUMNS)
 
 
-def _scientific_cell(value: float) -> Cell:
-    return Cell(scientific(value), float(value)) if np.isfinite(value) else Cell("–", MISSING)
+def _scientific_cell(value: float) -> TableCell:
+    return TableCell(scientific_text(value), float(value)) if np.isfinite(value) else TableCell("–", MISSING)
 
 
-def unseen_table(content: IdentificationContent) -> Table | None:
+def unseen_table(content: IdentificationContent) -> PageTable | None:
     """Return the table of what is not identified, and why; None if everything is."""
-    rows = [[word_cell(bound(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
+    rows = [[word_cell(set_sentence(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
     takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
-    return Table("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
+    return PageTable("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
 
 
-def correlations(content: IdentificationContent) -> Figure | None:
+def correlations_figure(content: IdentificationContent) -> PageFigure | None:
     """Correlations of the estimates; None for a single one."""
     names, matrix = [str(name) for name in content.estimates["name"]], np.asarray(content.correlations, dtype=float)
     if len(names) < 2:
         return None
     i, j = np.unravel_index(int(np.argmax(np.abs(matrix - np.eye(len(names))))), matrix.shape)
     order = " Columns are in the order of the rows." if len(names) > MOST_NAMED else ""
-    return Figure(
+    return PageFigure(
         id="correlations",
         title="Correlated estimates",
-        takeaway=f"Most correlated are {names[i]} and {names[j]}: {number(float(matrix[i, j]))}.",
+        takeaway=f"Most correlated are {names[i]} and {names[j]}: {number_text(float(matrix[i, j]))}.",
         how="Correlations of the errors of the estimates: near 1 or −1, a change of one is compensated by a change "
         f"of the other, and only their combination is known.{order}",
         alternative="Heat map of the correlations of all pairs of estimates.",
         height=WIDTH * len(names) + SIDE,
-        draw=lambda: [_draw_correlations([escaped(name) for name in names], matrix)],
+        draw=lambda: [_draw_correlations([escape_name(name) for name in names], matrix)],
     )
 
 
@@ -254,16 +273,16 @@ def _draw_correlations(names: Sequence[str], matrix: Floats) -> go.Figure:
     heat |= {"colorscale": scale, "xgap": 1, "ygap": 1, "colorbar": {"thickness": 12, "dtick": 0.5, "title": title}}
     heat |= {"hovertemplate": "%{y} and %{x}: %{z:.2f}<extra></extra>"}
     both = {"showgrid": False, "tickmode": "array", "tickvals": names, "ticktext": names}
-    x = axis("", tickangle=-90, showticklabels=len(names) <= MOST_NAMED, **both)
-    return plot([heat], x, axis("", autorange="reversed", **both), margin={"l": 8, "r": 8, "t": 8, "b": 8})
+    x = make_axis("", tickangle=-90, showticklabels=len(names) <= MOST_NAMED, **both)
+    return make_plot([heat], x, make_axis("", autorange="reversed", **both), margin={"l": 8, "r": 8, "t": 8, "b": 8})
 
 
-def free_runs(content: IdentificationContent) -> Figure:
+def free_runs_figure(content: IdentificationContent) -> PageFigure:
     """Measured motion and free runs before and after, one run at a time."""
     return motion_figure(
         content.series,
         RUN_INKS,
-        (LOG, AFTER),
+        (LOG_SERIES, AFTER),
         id="free-runs",
         title="Free runs " + ("of runs held out" if content.held_out else "of the fitted runs"),
         takeaway=_errors_before_and_after(content),
@@ -275,10 +294,10 @@ def free_runs(content: IdentificationContent) -> Figure:
     )
 
 
-def free_run_errors(content: IdentificationContent) -> Table:
+def free_run_errors(content: IdentificationContent) -> PageTable:
     """Root mean square errors of the free runs, run by run: of all runs first, and of those held out before others."""
     places, words = decimals_for_median(content.errors["position"]), {"fit": "fitted", "test": "held out"}
-    factors = {name: factor for name, (_, _, factor) in MOTIONS.items()} | {"position": 1.0}
+    factors = {name: factor for name, (_, _, factor) in MOTION_AXES.items()} | {"position": 1.0}
     by_model = {name: content.errors.pivot(index=["set", "run"], columns="model", values=name) for name in factors}
     wide = pd.DataFrame(
         {
@@ -290,17 +309,20 @@ def free_run_errors(content: IdentificationContent) -> Table:
     pairs = dict.fromkeys((row["set"], row["run"]) for row in content.errors.to_dict("records"))
     wide = wide.reindex(sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))).reset_index()
     heads = {
-        f"{name} {model}": Column(f"{name} {model}", places if name == "position" else 3)
+        f"{name} {model}": TableColumn(f"{name} {model}", places if name == "position" else 3)
         for name in factors
         for model in (BEFORE, AFTER)
     }
     named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map(words))
     title = f"Root mean square errors of free runs {_run_length(content)}"
-    takeaway, columns = "u, v in m/s, r in deg/s, position in m.", {"run": Column("run"), "set": Column("set"), **heads}
+    takeaway, columns = (
+        "u, v in m/s, r in deg/s, position in m.",
+        {"run": TableColumn("run"), "set": TableColumn("set"), **heads},
+    )
     return frame_table("errors", title, takeaway, wide.assign(run=named), columns)
 
 
-def manoeuvres_before_and_after(content: IdentificationContent) -> Table | None:
+def manoeuvres_before_and_after(content: IdentificationContent) -> PageTable | None:
     """Measures of standard manoeuvres before and after; None where there are none."""
     performed = content.manoeuvres[content.manoeuvres["measure"] != ""]
     if performed.empty:
@@ -315,42 +337,42 @@ def manoeuvres_before_and_after(content: IdentificationContent) -> Table | None:
     return frame_table("manoeuvres", "Standard manoeuvres", takeaway, shown, MEASURES_BEFORE_AND_AFTER)
 
 
-def residuals(content: IdentificationContent) -> Figure | None:
+def residuals_figure(content: IdentificationContent) -> PageFigure | None:
     """Autocorrelation of the residuals; None without any."""
     frame = content.colours
     if frame.empty:
         return None
-    parts = {name: frame[frame["signal"] == name] for name in run_names(frame, "signal")}
-    first = [f"{name} {number(([*mine['correlation'], 0.0, 0.0])[1])}" for name, mine in parts.items()]
-    return Figure(
+    parts = {name: frame[frame["signal"] == name] for name in names_in(frame, "signal")}
+    first = [f"{name} {number_text(([*mine['correlation'], 0.0, 0.0])[1])}" for name, mine in parts.items()]
+    return PageFigure(
         id="residuals",
         title="Autocorrelation of the residuals",
-        takeaway=f"The correlation of residuals one sample apart is {listed(first)}.",
+        takeaway=f"The correlation of residuals one sample apart is {listed_names(first)}.",
         how="Autocorrelation of the weighted residuals, pooled over runs. White residuals drop to 0; a long "
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",
         height=300,
         draw=lambda: [_draw_residuals(parts)],
-        chips=[Chip(name, name, category(i)) for i, name in enumerate(parts)],
+        chips=[Chip(name, name, category_colour(i)) for i, name in enumerate(parts)],
     )
 
 
 def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> go.Figure:
     traces = [
-        line(name, mine["lag"], mine["correlation"], [name], "", line={"color": category(i), "width": 2})
+        make_line(name, mine["lag"], mine["correlation"], [name], "", line={"color": category_colour(i), "width": 2})
         for i, (name, mine) in enumerate(parts.items())
     ]
     least = min(-0.5, *(float(mine["correlation"].min()) for mine in parts.values()))
     y = zero_axis("autocorrelation [1]", INK, nticks=6, range=[least - 0.05, 1.05])
-    return plot(traces, axis("lag [s]", nticks=9), y)
+    return make_plot(traces, make_axis("lag [s]", nticks=9), y)
 
 
-def profiles(content: IdentificationContent) -> Figure | None:
+def profiles_figure(content: IdentificationContent) -> PageFigure | None:
     """Return the figure of the profile likelihoods; None if none was asked for."""
     if content.profiles.empty:
         return None
     curves = content.profiles.groupby("path", sort=False)
-    return Figure(
+    return PageFigure(
         id="profiles",
         title="Profile likelihood",
         takeaway="; ".join(curves["sentence"].first()) + ".",
@@ -364,26 +386,26 @@ def profiles(content: IdentificationContent) -> Figure | None:
 
 def _draw_profile(path: str, mine: pd.DataFrame) -> go.Figure:
     x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
-    curve: Trace = {"mode": "lines+markers", "line": {"color": category(0), "width": 2}}
+    curve: Trace = {"mode": "lines+markers", "line": {"color": category_colour(0), "width": 2}}
     traces = [
-        line("limit", [x[0], x[-1]], [limit, limit], [], "", line={"color": MUTED, "width": 1, "dash": "dot"}),
-        line("profile", x, mine["rise"].clip(upper=3 * limit), [], "", **curve),
+        make_line("limit", [x[0], x[-1]], [limit, limit], [], "", line={"color": MUTED, "width": 1, "dash": "dot"}),
+        make_line("profile", x, mine["rise"].clip(upper=3 * limit), [], "", **curve),
     ]
-    y = axis("worse by [variances]", nticks=6, rangemode="tozero")
-    return plot(traces, axis(f"factor of {escaped(path)} [1]", nticks=6), y)
+    y = make_axis("worse by [variances]", nticks=6, rangemode="tozero")
+    return make_plot(traces, make_axis(f"factor of {escape_name(path)} [1]", nticks=6), y)
 
 
-def programme_table(content: IdentificationContent) -> Table | None:
+def programme_table(content: IdentificationContent) -> PageTable | None:
     """Return the table of manoeuvres to run next; None if it was not asked for."""
     frame = content.programme
     if frame.empty:
         return None
     takeaway = f"Most information per hour about these parameters: {frame['manoeuvre'].iloc[0]}."
     shown = frame.assign(by=100 * (1 - frame["after"] / frame["before"]))
-    return frame_table("programme", "Candidates", takeaway, shown, PROGRAMME)
+    return frame_table("programme", "Candidates", takeaway, shown, PROGRAMME_COLUMNS)
 
 
-def errors_by_side(content: IdentificationContent) -> Table | None:
+def errors_by_side(content: IdentificationContent) -> PageTable | None:
     """Errors by side, helm and speed; None without rows."""
     runs = "Runs held out" if content.held_out else "Fitted runs"
     return group_errors(content.groups, f"{runs}, over the horizon of the fit.")
@@ -393,23 +415,23 @@ IDENTIFICATION_PAGE = {
     "what-is-known": Section(
         "What is known",
         lambda content: (
-            estimates(content),
+            estimates_figure(content),
             estimates_table(content),
             unseen_table(content),
-            correlations(content),
+            correlations_figure(content),
         ),
         needs=("estimates",),
         anchors=("estimates", "numbers", "unseen", "correlations"),
     ),
     "what-it-buys": Section(
         "What it buys",
-        lambda content: (free_runs(content), free_run_errors(content), manoeuvres_before_and_after(content)),
+        lambda content: (free_runs_figure(content), free_run_errors(content), manoeuvres_before_and_after(content)),
         needs=("series", "errors"),
         anchors=("free-runs", "errors", "manoeuvres"),
     ),
     "what-is-left": Section(
         "What is left over",
-        lambda content: (errors_by_side(content), residuals(content), profiles(content)),
+        lambda content: (errors_by_side(content), residuals_figure(content), profiles_figure(content)),
         anchors=("sides", "residuals", "profiles"),
     ),
     "next": Section(

@@ -5,53 +5,55 @@ from __future__ import annotations
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import PUBLISHED, ReportContent, rows_in
+from shipid.report.content import PUBLISHED, ReportContent, rows_as_tuples
 from shipid.report.figure import (
     MUTED,
     Chip,
-    Figure,
+    PageFigure,
     Trace,
-    axis,
-    category,
-    chart,
-    escaped,
-    line,
+    category_colour,
+    escape_name,
+    make_axis,
+    make_chart,
+    make_line,
+    make_plot,
     names_axis,
-    plot,
-    run_names,
+    names_in,
 )
 from shipid.report.section import Section
-from shipid.report.selection import thinned
-from shipid.report.tables import Cell, Column, Table, frame_table, word_cell
-from shipid.report.wording import counted, distance, listed, number
+from shipid.report.selection import thin_lines
+from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, word_cell
+from shipid.report.wording import counted_text, distance_text, listed_names, number_text
 
-TRAIN, TEST, VALIDATION = (category(i) for i in range(3))
-NEAR = 0.2  # of the published range: an end this close is met
-PIXELS = 2000  # a track needs no more detail than extent / PIXELS
-REPAIRS = {
-    "repair": Column("kind"),
-    "column": Column("column"),
-    "samples [1]": Column("count", 0),
-    "note": Column("note"),
+TRAINING_COLOUR, TEST_COLOUR, VALIDATION_COLOUR = (category_colour(i) for i in range(3))
+NEAR_PUBLISHED = 0.2  # of the published range: an end this close is met
+TRACK_DETAIL = 2000  # a track needs no more detail than extent / PIXELS
+REPAIR_COLUMNS = {
+    "repair": TableColumn("kind"),
+    "column": TableColumn("column"),
+    "samples [1]": TableColumn("count", 0),
+    "note": TableColumn("note"),
 }
 
 
 def set_colour(name: str) -> str:
     """Blue for what trains, green for what validates, vermillion for the test, for any names of the sets."""
     word = name.lower()
-    return TEST if word.startswith("test") else VALIDATION if word.startswith("valid") else TRAIN
+    return (
+        TEST_COLOUR if word.startswith("test") else VALIDATION_COLOUR if word.startswith("valid") else TRAINING_COLOUR
+    )
 
 
-def manoeuvres(content: ReportContent) -> Figure | None:
+def tracks_figure(content: ReportContent) -> PageFigure | None:
     """Tracks of all manoeuvres by set, north up, equal axes; None without rows. Takes the content of any page."""
     tracks = content.tracks
     if tracks.empty:
         return None
     bounds = [(float(tracks[column].min()), float(tracks[column].max())) for column in ("east", "north")]
-    names, counts = run_names(tracks, "set"), tracks.groupby("set").run.nunique()
-    east, north = (distance(high - low) for low, high in bounds)
-    runs = listed([f"{counted(int(counts[name]), 'run')} ({name})" for name in names], 6)
-    return Figure(
+    names, counts = names_in(tracks, "set"), tracks.groupby("set").run.nunique()
+    east, north = (distance_text(high - low) for low, high in bounds)
+    runs = listed_names([f"{counted_text(int(counts[name]), 'run')} ({name})" for name in names], 6)
+    return PageFigure(
         id="manoeuvres",
         title="The manoeuvres",
         takeaway=f"{runs} cover {north} from south to north and {east} from west to east.",
@@ -65,18 +67,18 @@ def manoeuvres(content: ReportContent) -> Figure | None:
 
 def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> go.Figure:
     """Tracks on a map; those of the test last, so that they lie on top."""
-    detail, traces = max(high - low for low, high in bounds) / PIXELS, []
-    for name in sorted(run_names(tracks, "set"), key=lambda name: set_colour(name) == TEST):
+    detail, traces = max(high - low for low, high in bounds) / TRACK_DETAIL, []
+    for name in sorted(names_in(tracks, "set"), key=lambda name: set_colour(name) == TEST_COLOUR):
         for run, mine in tracks[tracks["set"] == name].groupby("run", sort=False):
             points = mine[["east", "north"]].to_numpy(dtype=float)
-            points = points[thinned([points], detail)[0]]
-            ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == TEST else 1.2}
-            words = f"{escaped(run)} ({escaped(name)})"
-            traces.append(line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink, hover=words))
-    return chart(traces, "east [m]", "north [m]", bounds)
+            points = points[thin_lines([points], detail)[0]]
+            ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == TEST_COLOUR else 1.2}
+            words = f"{escape_name(run)} ({escape_name(name)})"
+            traces.append(make_line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink, hover=words))
+    return make_chart(traces, "east [m]", "north [m]", bounds)
 
 
-def envelope(content: ReportContent) -> Figure | None:
+def envelope_figure(content: ReportContent) -> PageFigure | None:
     """Range and mean of every input per set, one panel per quantity; None without rows."""
     frame = content.envelope
     if frame.empty:
@@ -84,7 +86,7 @@ def envelope(content: ReportContent) -> Figure | None:
     frame = frame.iloc[frame["set"].eq(PUBLISHED).to_numpy().argsort(kind="stable")]
     compared = " The open bar is what the paper published, not data of this study."
     by_count = frame["set"].str.fullmatch(r"D_\d+").any()  # sets called by their number of runs
-    return Figure(
+    return PageFigure(
         id="envelope",
         title="What the inputs cover",
         takeaway=_takeaway_envelope(frame),
@@ -102,23 +104,25 @@ def _draw_ranges(mine: pd.DataFrame) -> go.Figure:
     traces, quantity, unit = [], mine.quantity.iloc[0], mine.unit.iloc[0]
     for row, (name, low, mean, high) in enumerate(mine[["set", "min", "mean", "max"]].itertuples(index=False)):
         published = name == PUBLISHED
-        words = f"{escaped(name)}: {_range_words(low, mean, high)} {escaped(unit)}"
+        words = f"{escape_name(name)}: {_range_words(low, mean, high)} {escape_name(unit)}"
         bar: Trace = {"line": {"color": set_colour(name), "width": 5}, "opacity": 0.55}
         dot: Trace = {"color": set_colour(name), "size": 11}
         x, y = [low, high, high, low, low], [row - 0.2, row - 0.2, row + 0.2, row + 0.2, row - 0.2]
         if published:
             bar, dot = {"line": {"color": MUTED, "width": 1.5}}, {"symbol": "circle-open", "color": MUTED, "size": 9}
-        traces.append(line(name, x if published else x[:2], y if published else [row, row], [], hover=words, **bar))
-        traces.append(line(name, [mean], [row], [], mode="markers", marker=dot, hover=words))
+        traces.append(
+            make_line(name, x if published else x[:2], y if published else [row, row], [], hover=words, **bar)
+        )
+        traces.append(make_line(name, [mean], [row], [], mode="markers", marker=dot, hover=words))
     low, high = float(mine["min"].min()), float(mine["max"].max())
     room = 0.06 * (high - low) or 1.0
-    y_axis = names_axis(run_names(mine, "set"), showgrid=False, range=[len(mine) - 0.4, -0.6])
-    x_axis = axis(f"{escaped(quantity)} [{escaped(unit)}]", nticks=6, range=[low - room, high + room])
-    return plot(traces, x_axis, y_axis, margin={"l": 8, "r": 12, "t": 4, "b": 44})
+    y_axis = names_axis(names_in(mine, "set"), showgrid=False, range=[len(mine) - 0.4, -0.6])
+    x_axis = make_axis(f"{escape_name(quantity)} [{escape_name(unit)}]", nticks=6, range=[low - room, high + room])
+    return make_plot(traces, x_axis, y_axis, margin={"l": 8, "r": 12, "t": 4, "b": 44})
 
 
 def _range_words(low: float, mean: float, high: float) -> str:
-    return " / ".join(number(float(value)) for value in (low, mean, high))
+    return " / ".join(number_text(float(value)) for value in (low, mean, high))
 
 
 def _takeaway_envelope(frame: pd.DataFrame) -> str:
@@ -132,59 +136,66 @@ def _published_words(ours: pd.DataFrame, published: pd.DataFrame) -> str:
     if ours.empty or published.empty:
         return ""
     known, far = 0, []
-    for theirs in rows_in(published):
+    for theirs in rows_as_tuples(published):
         mine, low, high = ours[ours.quantity == theirs.quantity], theirs.min, theirs.max
         for word, end, value in (("min", low, mine["min"].min()), ("max", high, mine["max"].max())):
             known += bool(pd.notna(value))
-            far += [f"{word} of {theirs.quantity}"] * (abs(float(value) - end) > NEAR * (high - low))
-    text = f"{known - len(far)} of {known} published ends are met within {100 * NEAR:.0f} % of the published range"
-    return f"{text}; not {listed(far, 6)}." if far else f"{text}."
+            far += [f"{word} of {theirs.quantity}"] * (abs(float(value) - end) > NEAR_PUBLISHED * (high - low))
+    text = f"{known - len(far)} of {known} published ends are met within {100 * NEAR_PUBLISHED:.0f} % of the published range"
+    return f"{text}; not {listed_names(far, 6)}." if far else f"{text}."
 
 
 def _beyond_words(frame: pd.DataFrame) -> str:
-    is_test = frame["set"].map(set_colour).eq(TEST)
+    is_test = frame["set"].map(set_colour).eq(TEST_COLOUR)
     tested, seen = (
         part.groupby("quantity", sort=False).agg(low=("min", "min"), high=("max", "max"))
         for part in (frame[is_test], frame[~is_test])
     )
     seen = seen.reindex(tested.index)
     if tested.empty or seen.low.isna().all():
-        return f"{counted(frame.quantity.nunique(), 'input')} in {counted(frame['set'].nunique(), 'set')}."
+        return f"{counted_text(frame.quantity.nunique(), 'input')} in {counted_text(frame['set'].nunique(), 'set')}."
     outside = [str(name) for name in tested.index[(tested.low < seen.low) | (tested.high > seen.high)]]
     if not outside:
-        return f"The test stays inside what the other sets cover in all {counted(len(tested), 'input')}."
-    reach = f"{len(outside)} of {counted(len(tested), 'input')}"
-    return f"The test reaches outside what the other sets cover in {reach}: {listed(outside)}."
+        return f"The test stays inside what the other sets cover in all {counted_text(len(tested), 'input')}."
+    reach = f"{len(outside)} of {counted_text(len(tested), 'input')}"
+    return f"The test reaches outside what the other sets cover in {reach}: {listed_names(outside)}."
 
 
-def envelope_table(content: ReportContent) -> Table | None:
+def input_ranges(content: ReportContent) -> PageTable | None:
     """Smallest, mean and largest value of every input, a row per set; None without rows."""
     frame = content.envelope
     if frame.empty:
         return None
     ranges = {
-        (row["set"], row["quantity"]): Cell(_range_words(row["min"], row["mean"], row["max"]), float(row["mean"]))
+        (row["set"], row["quantity"]): TableCell(_range_words(row["min"], row["mean"], row["max"]), float(row["mean"]))
         for row in frame.to_dict("records")
     }
-    sets = sorted(run_names(frame, "set"), key=lambda name: name == PUBLISHED)
+    sets = sorted(names_in(frame, "set"), key=lambda name: name == PUBLISHED)
     units = dict(zip(frame["quantity"], frame["unit"], strict=True))
     rows = {name: [ranges.get((of, name), word_cell(None)) for of in sets] for name in units}
-    columns = {f"{name} [{unit}]": Column(name, numeric=True) for name, unit in units.items()}
+    columns = {f"{name} [{unit}]": TableColumn(name, numeric=True) for name, unit in units.items()}
     shown = pd.DataFrame({"the set": sets, **rows})
-    return frame_table("envelope-table", "Minimum / mean / maximum", "", shown, {"set": Column("the set"), **columns})
+    return frame_table(
+        "envelope-table", "Minimum / mean / maximum", "", shown, {"set": TableColumn("the set"), **columns}
+    )
 
 
-def repairs_table(content: ReportContent) -> Table | None:
+def repairs_table(content: ReportContent) -> PageTable | None:
     """Return the table of repairs by the importer; None if nothing is recorded. Takes the content of any page."""
     if content.repairs.empty:
         return None
-    kinds = run_names(content.repairs, "kind")
-    takeaway = f"{counted(len(content.repairs), 'repair')}: {listed(kinds)}."
-    return frame_table("repairs", "What the importer repaired", takeaway, content.repairs, REPAIRS)
+    kinds = names_in(content.repairs, "kind")
+    takeaway = f"{counted_text(len(content.repairs), 'repair')}: {listed_names(kinds)}."
+    return frame_table("repairs", "What the importer repaired", takeaway, content.repairs, REPAIR_COLUMNS)
 
 
-DATA = Section(
+THE_DATA = Section(
     "The data",
-    draw=lambda content: (manoeuvres(content), envelope(content), envelope_table(content), repairs_table(content)),
+    draw=lambda content: (
+        tracks_figure(content),
+        envelope_figure(content),
+        input_ranges(content),
+        repairs_table(content),
+    ),
     anchors=("manoeuvres", "envelope", "envelope-table", "repairs"),
 )

@@ -11,34 +11,47 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import Floats, PageContent, Sentence, rows_in, rows_of
-from shipid.report.figure import MUTED, Chip, Figure, Trace, axis, category, chart, line, plot, zero_axis
+from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
+from shipid.report.figure import (
+    MUTED,
+    Chip,
+    PageFigure,
+    Trace,
+    category_colour,
+    make_axis,
+    make_chart,
+    make_line,
+    make_plot,
+    zero_axis,
+)
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.paths import outline_at
 from shipid.report.section import Section
-from shipid.report.tables import Column, Table, frame_table, number_cell, with_cells, word_cell
-from shipid.report.wording import distance, number
+from shipid.report.tables import PageTable, TableColumn, frame_table, number_cell, with_cells, word_cell
+from shipid.report.wording import distance_text, number_text
 
 MOST_ROWS = 2000  # of the log: a line needs no more
 OUTLINES = 12  # ships drawn along the track
-EXECUTE = "execute heading"  # the measure that is drawn beside the heading
-TOGETHER = 120.0  # deg: a heading that stays within this is drawn with the helm
-ROUNDING = 1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
-MEASURES = {
-    "measure": Column("measure"),
-    "value": Column("value", numeric=True),
-    "unit": Column("unit"),
-    "ship lengths": Column("lengths", 2),
-    "why missing": Column("missing"),
+EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
+MOST_HEADING_WITH_HELM = 120.0  # deg: a heading that stays within this is drawn with the helm
+CONSTANT_WITHIN = (
+    1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
+)
+MEASURE_COLUMNS = {
+    "measure": TableColumn("measure"),
+    "value": TableColumn("value", numeric=True),
+    "unit": TableColumn("unit"),
+    "ship lengths": TableColumn("lengths", 2),
+    "why missing": TableColumn("missing"),
 }
-CRITERIA = {
-    "criterion": Column("criterion"),
-    "value": Column("value", 2),
-    "limit": Column("limit", 2),
-    "unit": Column("unit"),
-    "verdict": Column("verdict"),
-    "note": Column("note"),
+CRITERION_COLUMNS = {
+    "criterion": TableColumn("criterion"),
+    "value": TableColumn("value", 2),
+    "limit": TableColumn("limit", 2),
+    "unit": TableColumn("unit"),
+    "verdict": TableColumn("verdict"),
+    "note": TableColumn("note"),
 }
 MANOEUVRE_LINES = {  # key -> name, unit, index of the colour, whether it is held from order to order
     "heading": ("heading", "deg", 0, False),
@@ -69,35 +82,35 @@ class ManoeuvreContent(PageContent):
     measures: pd.DataFrame
     criteria: pd.DataFrame
     outline: Floats
-    levels: pd.DataFrame = field(default_factory=rows_of("helm", "rate"))
+    levels: pd.DataFrame = field(default_factory=empty_frame("helm", "rate"))
 
     @property
-    def answer(self) -> list[Sentence]:
+    def answer(self) -> list[AnswerSentence]:
         """Return sentences: the main measures, and how many criteria are met."""
         known = self.measures[self.measures["measure"].isin(self.first)]
-        measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in rows_in(known)]
-        sentences = [Sentence("; ".join(measures).capitalize() + ".", "measures")]
+        measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in rows_as_tuples(known)]
+        sentences = [AnswerSentence("; ".join(measures).capitalize() + ".", "measures")]
         judged = self.criteria[self.criteria["verdict"] != "not judged"] if len(self.criteria) else self.criteria
         if len(judged):
             met, notes = int((judged["verdict"] == "met").sum()), {str(note) for note in judged["note"]}
             common = f"; {notes.pop()}" if len(notes) == 1 and "" not in notes else ""
             words = f"{met} of {len(judged)} criteria of IMO MSC.137(76) are met{common}."
-            sentences.append(Sentence(words, "criteria"))
+            sentences.append(AnswerSentence(words, "criteria"))
         return sentences
 
 
 def _amount_words(value: float, unit: str) -> str:
-    return f"{number(round(value, 3) + 0.0)} {unit}" if np.isfinite(value) else "not reached"
+    return f"{number_text(round(value, 3) + 0.0)} {unit}" if np.isfinite(value) else "not reached"
 
 
-def measures_table(content: ManoeuvreContent) -> Table:
+def measures_table(content: ManoeuvreContent) -> PageTable:
     """Every measure; one that is missing says why."""
     frame = content.measures
-    values = [number_cell(row.value, _decimals_of_measure(row.value, row.unit)) for row in rows_in(frame)]
+    values = [number_cell(row.value, _decimals_of_measure(row.value, row.unit)) for row in rows_as_tuples(frame)]
     shown = with_cells(frame, value=values)
     if frame["note"].ne("").any():
         shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in frame["note"]])
-    return frame_table("measures", "Measures", "", shown, MEASURES)
+    return frame_table("measures", "Measures", "", shown, MEASURE_COLUMNS)
 
 
 def _decimals_of_measure(value: float, unit: str) -> int:
@@ -107,16 +120,16 @@ def _decimals_of_measure(value: float, unit: str) -> int:
     return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
 
 
-def criteria_table(content: ManoeuvreContent) -> Table | None:
+def criteria_table(content: ManoeuvreContent) -> PageTable | None:
     """Criteria of IMO MSC.137(76) that apply to this kind of manoeuvre; None without."""
     frame = content.criteria
     if frame.empty:
         return None
     shown = with_cells(frame, verdict=[word_cell(verdict, bad=verdict == "not met") for verdict in frame["verdict"]])
-    return frame_table("criteria", "Criteria of IMO MSC.137(76)", "", shown, CRITERIA)
+    return frame_table("criteria", "Criteria of IMO MSC.137(76)", "", shown, CRITERION_COLUMNS)
 
 
-def track(content: ManoeuvreContent) -> Figure:
+def track_figure(content: ManoeuvreContent) -> PageFigure:
     """Path of the ship with its outline to scale, north up, equal axes."""
     log = content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)]
     poses = log[["north", "east", "psi"]].iloc[np.linspace(0, len(log) - 1, OUTLINES).astype(int)]
@@ -124,53 +137,56 @@ def track(content: ManoeuvreContent) -> Figure:
     hulls = [np.vstack([outline_at(content.outline, pose), gap]) for pose in poses.to_numpy()]
     drawn = np.vstack([*hulls, log[["north", "east"]].to_numpy()])
     bounds = [(float(np.nanmin(drawn[:, i])), float(np.nanmax(drawn[:, i]))) for i in (1, 0)]
-    east, north = (distance(high - low) for low, high in bounds)
+    east, north = (distance_text(high - low) for low, high in bounds)
     ships = np.vstack(hulls)
     words = [
         f"t = {row.t:.1f} s<br>{row.east:.1f} m east, {row.north:.1f} m north"
-        for row in rows_in(log[["t", "east", "north"]])
+        for row in rows_as_tuples(log[["t", "east", "north"]])
     ]
-    ink = {"color": category(0), "width": 2.5}
+    ink = {"color": category_colour(0), "width": 2.5}
     traces = [
-        line("ship", ships[:, 1], ships[:, 0], ["ship"], line={"color": MUTED, "width": 1}, hover=""),
-        line("track", log["east"], log["north"], ["track"], line=ink, hover=words),
+        make_line("ship", ships[:, 1], ships[:, 0], ["ship"], line={"color": MUTED, "width": 1}, hover=""),
+        make_line("track", log["east"], log["north"], ["track"], line=ink, hover=words),
     ]
-    return Figure(
+    return PageFigure(
         id="track",
         title="The track",
         takeaway=f"With its outline the ship takes {north} from south to north and {east} from west to east.",
         how="Path of the logged point, north up, equal axes; the outline of the ship is to scale, at even times.",
         alternative="Map of the track.",
         height=460,
-        draw=lambda: [chart(traces, "east [m]", "north [m]", bounds)],
-        chips=[Chip("track", "track", category(0), width=2.5), Chip("ship", "ship", MUTED, width=1)],
+        draw=lambda: [make_chart(traces, "east [m]", "north [m]", bounds)],
+        chips=[Chip("track", "track", category_colour(0), width=2.5), Chip("ship", "ship", MUTED, width=1)],
     )
 
 
-def histories(content: ManoeuvreContent) -> Figure:
+def histories_figure(content: ManoeuvreContent) -> PageFigure:
     """Heading, helm, speeds, yaw rate and shaft over time."""
-    log, executed = content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)], _measure(content, EXECUTE)
+    log, executed = (
+        content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)],
+        _value_of_measure(content, EXECUTE_HEADING),
+    )
     degrees = DEGREES * log[["psi", "helm", "r"]]
     values = log[["u", "v"]].assign(
         heading=degrees["psi"] - degrees["psi"].iloc[0], helm=degrees["helm"], r=degrees["r"], shaft=60 * log["shaft"]
     )
     panels = {"heading, helm [deg]": ["heading", "helm"]}
-    if np.ptp(values["heading"]) >= TOGETHER:
+    if np.ptp(values["heading"]) >= MOST_HEADING_WITH_HELM:
         panels = {"heading [deg]": ["heading"], "helm [deg]": ["helm"]}
     panels |= {"speed [m/s]": ["u", "v"], "yaw rate [deg/s]": ["r"]}
     panels |= {"shaft [rpm]": ["shaft"]} if np.ptp(values["shaft"]) > 0 else {}
-    return Figure(
+    return PageFigure(
         id="histories",
         title="Over time",
-        takeaway=f"Yaw rate from {number(values['r'].min())} to {number(values['r'].max())} deg/s, "
-        f"speed ahead from {number(values['u'].max())} down to {number(values['u'].min())} m/s.",
+        takeaway=f"Yaw rate from {number_text(values['r'].min())} to {number_text(values['r'].max())} deg/s, "
+        f"speed ahead from {number_text(values['u'].max())} down to {number_text(values['u'].min())} m/s.",
         how="Heading counted from that at the start of the log; helm and shaft as ordered, helm above 0 turns the ship "
         "to starboard." + (" Dotted: the execute headings." if np.isfinite(executed) else ""),
         alternative="Heading, helm, speeds and yaw rate over time.",
         height=270,
         draw=lambda: [_draw_history(log["t"], values[keys], title, executed) for title, keys in panels.items()],
         chips=[
-            Chip(key, MANOEUVRE_LINES[key][0], category(MANOEUVRE_LINES[key][2]))
+            Chip(key, MANOEUVRE_LINES[key][0], category_colour(MANOEUVRE_LINES[key][2]))
             for keys in panels.values()
             for key in keys
         ],
@@ -182,39 +198,42 @@ def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, execute
     traces: list[Trace] = []
     for level in (executed, -executed) if "heading" in values and np.isfinite(executed) else ():
         rule = {"color": MUTED, "width": 1, "dash": "dot"}
-        traces.append(line(f"{level:g} deg", [t.iloc[0], t.iloc[-1]], [level] * 2, ["heading"], "deg", line=rule))
+        traces.append(make_line(f"{level:g} deg", [t.iloc[0], t.iloc[-1]], [level] * 2, ["heading"], "deg", line=rule))
     for key in values:
         name, unit, colour, held = MANOEUVRE_LINES[str(key)]
-        ink = {"color": category(colour), "width": 2} | ({"shape": "hv"} if held else {})
-        traces.append(line(name, t, values[key], [str(key)], unit, line=ink))
+        ink = {"color": category_colour(colour), "width": 2} | ({"shape": "hv"} if held else {})
+        traces.append(make_line(name, t, values[key], [str(key)], unit, line=ink))
     drawn = np.concatenate([trace["y"] for trace in traces])
     low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
-    span: dict[str, Any] = {"range": [low - 1, high + 1]} if high - low < ROUNDING else {}
-    return plot(traces, axis("time [s]", nticks=4), zero_axis(title, nticks=6, **span))
+    span: dict[str, Any] = {"range": [low - 1, high + 1]} if high - low < CONSTANT_WITHIN else {}
+    return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6, **span))
 
 
-def _measure(content: ManoeuvreContent, name: str) -> float:
+def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
     """Value of a measure; NaN where it was not measured."""
     values = content.measures.loc[content.measures["measure"] == name, "value"]
     return float(values.iloc[0]) if len(values) else float("nan")
 
 
-def spiral(content: ManoeuvreContent) -> Figure | None:
+def spiral_figure(content: ManoeuvreContent) -> PageFigure | None:
     """Steady yaw rate over helm; None where no level was held."""
     if content.levels.empty:
         return None
     levels = np.rad2deg(content.levels[["helm", "rate"]].astype(float))
-    look: Trace = {"line": {"color": category(3), "width": 2}, "marker": {"color": category(3), "size": 7}}
-    trace = line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", **look)
+    look: Trace = {
+        "line": {"color": category_colour(3), "width": 2},
+        "marker": {"color": category_colour(3), "size": 7},
+    }
+    trace = make_line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", **look)
     axes = zero_axis("helm [deg]", nticks=9), zero_axis("yaw rate [deg/s]", nticks=8)
-    return Figure(
+    return PageFigure(
         id="spiral",
         title="Yaw rate over helm",
-        takeaway=f"The loop is {_amount_words(_measure(content, 'loop width'), 'deg')} of helm wide.",
+        takeaway=f"The loop is {_amount_words(_value_of_measure(content, 'loop width'), 'deg')} of helm wide.",
         how="One point for each level that became steady, joined in the order performed; > 0 is to starboard.",
         alternative="Steady yaw rate over helm angle.",
         height=420,
-        draw=lambda: [plot([trace], *axes)],
+        draw=lambda: [make_plot([trace], *axes)],
     )
 
 
@@ -226,7 +245,7 @@ MANOEUVRE_PAGE = {
     ),
     "motion": Section(
         "What the ship did",
-        lambda content: (track(content), histories(content), spiral(content)),
+        lambda content: (track_figure(content), histories_figure(content), spiral_figure(content)),
         needs=("log",),
         anchors=("track", "histories", "spiral"),
     ),

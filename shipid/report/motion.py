@@ -9,11 +9,22 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.figure import POINTS, Chip, Control, Figure, axis, chart, line, plot, run_names, zero_axis
+from shipid.report.figure import (
+    MOST_LINE_POINTS,
+    Chip,
+    Control,
+    PageFigure,
+    make_axis,
+    make_chart,
+    make_line,
+    make_plot,
+    names_in,
+    zero_axis,
+)
 
-LOG = "measured"
+LOG_SERIES = "measured"
 DEGREES = float(np.rad2deg(1.0))
-MOTIONS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
+MOTION_AXES = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 1.0)} | {
     "r": ("yaw rate, r", "deg/s", DEGREES)
 }
 """Column -> what it is, the unit shown, and how many of those an SI unit is."""
@@ -21,7 +32,7 @@ MOTIONS = {"u": ("speed ahead, u", "m/s", 1.0), "v": ("to starboard, v", "m/s", 
 
 def motion_figure(
     series: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str], **texts: Any
-) -> Figure:
+) -> PageFigure:
     """Panels of a run that a reader picks: u, v, r over time, and the map, north up with equal axes.
 
     Parameters
@@ -31,8 +42,8 @@ def motion_figure(
     framed : models that the map shows whole; the others may leave it.
     texts : of the figure.
     """
-    runs = run_names(series)
-    return Figure(
+    runs = names_in(series)
+    return PageFigure(
         **texts,
         height=290,
         draw=lambda run: _draw_motion(series[series["run"] == run], inks, framed),
@@ -43,25 +54,27 @@ def motion_figure(
 
 def _draw_motion(rows: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str]) -> list[go.Figure]:
     parts = {name: _with_gaps(rows[rows["model"] == name]) for name in inks}
-    looks = {name: {**ink, "width": 1.4 if name == LOG else 2} for name, ink in inks.items()}
+    looks = {name: {**ink, "width": 1.4 if name == LOG_SERIES else 2} for name, ink in inks.items()}
     panels = []
-    for column, (title, unit, factor) in MOTIONS.items():
+    for column, (title, unit, factor) in MOTION_AXES.items():
         traces = [
-            line(name, mine["t"] - rows["t"].min(), factor * mine[column], [name], unit, line=looks[name])
+            make_line(name, mine["t"] - rows["t"].min(), factor * mine[column], [name], unit, line=looks[name])
             for name, mine in parts.items()
         ]
-        panels.append(plot(traces, axis("time in the run [s]", nticks=6), zero_axis(f"{title} [{unit}]", nticks=6)))
-    tracks = [line(name, mine["east"], mine["north"], [name], line=looks[name]) for name, mine in parts.items()]
+        panels.append(
+            make_plot(traces, make_axis("time in the run [s]", nticks=6), zero_axis(f"{title} [{unit}]", nticks=6))
+        )
+    tracks = [make_line(name, mine["east"], mine["north"], [name], line=looks[name]) for name, mine in parts.items()]
     shown = pd.concat([parts[name] for name in framed])
     bounds = [(float(shown[name].min()), float(shown[name].max())) for name in ("east", "north")]
     bounds = [(low, high) if high > low else (low - 1, low + 1) for low, high in bounds]
-    return [*panels, chart(tracks, "east [m]", "north [m]", bounds, nticks=4)]  # the panel is narrow
+    return [*panels, make_chart(tracks, "east [m]", "north [m]", bounds, nticks=4)]  # the panel is narrow
 
 
 def _with_gaps(mine: pd.DataFrame) -> pd.DataFrame:
     """Join the pieces of a line, of no more rows than a line needs, with a gap between them."""
     pieces = mine.groupby("piece", sort=False)
-    kept = mine[(pieces.cumcount() % max(1, len(mine) // POINTS) == 0).to_numpy()]
+    kept = mine[(pieces.cumcount() % max(1, len(mine) // MOST_LINE_POINTS) == 0).to_numpy()]
     gaps = pieces.tail(1).assign(**dict.fromkeys(("north", "east", "u", "v", "r"), np.nan))
     whole = pd.concat([kept, gaps])
     order = {name: i for i, name in enumerate(pd.unique(mine["piece"]))}

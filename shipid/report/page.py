@@ -17,16 +17,16 @@ from markupsafe import Markup
 
 from shipid.errors import ResultError
 from shipid.files import write_text
-from shipid.report.content import ReportContent, Sentence
-from shipid.report.figure import Figure, page_colours
-from shipid.report.glossary import glossed
+from shipid.report.content import AnswerSentence, ReportContent
+from shipid.report.figure import PageFigure, page_colours
+from shipid.report.glossary import mark_short_names
 from shipid.report.paths import window_data
-from shipid.report.section import OF_EVERY_PAGE, Section, declared, drawn
+from shipid.report.section import OF_EVERY_PAGE, Section, declared_anchors, draw_sections
 from shipid.report.sections import SECTIONS
 from shipid.report.tables import cell_html
-from shipid.report.wording import bound, number
+from shipid.report.wording import number_text, set_sentence
 
-LEAD = 3  # sentences of the answer that a reader sees; the others unfold
+FIRST_SENTENCES = 3  # sentences of the answer that a reader sees; the others unfold
 
 
 def render_page(
@@ -48,16 +48,16 @@ def render_page(
 
     Raises ValueError for a sentence that links to a figure which no section declares.
     """
-    parts = drawn(sections, content, say)
+    parts = draw_sections(sections, content, say)
     items = [item for part in parts for item in part.items]
-    figures = [item for item in items if isinstance(item, Figure)]
-    _check_links(content.answer, {item.id for item in items} | set(OF_EVERY_PAGE) | declared(sections))
+    figures = [item for item in items if isinstance(item, PageFigure)]
+    _check_links(content.answer, {item.id for item in items} | set(OF_EVERY_PAGE) | declared_anchors(sections))
     return _template().render(
         content=content,
         kicker=kind,
-        answer=content.answer[:LEAD],
-        details=content.answer[LEAD:],
-        warned=any(sentence.text.startswith("Careful: ") for sentence in content.answer[LEAD:]),
+        answer=content.answer[:FIRST_SENTENCES],
+        details=content.answer[FIRST_SENTENCES:],
+        warned=any(sentence.text.startswith("Careful: ") for sentence in content.answer[FIRST_SENTENCES:]),
         sections=parts,
         titles={name: name.capitalize() for name in OF_EVERY_PAGE} | {item.id: item.title for item in items},
         numbers={figure.id: i for i, figure in enumerate(figures, start=1)},
@@ -70,7 +70,7 @@ def render_page(
     )
 
 
-def _check_links(answer: Sequence[Sentence], known: set[str]) -> None:
+def _check_links(answer: Sequence[AnswerSentence], known: set[str]) -> None:
     for sentence in answer:
         if sentence.figure and sentence.figure not in known:
             raise ValueError(f"no figure is called {sentence.figure!r}; valid: {', '.join(sorted(known))}")
@@ -96,7 +96,7 @@ def write_whole(text: str, file: Path) -> Path:
     return file
 
 
-def _draw_views(figure: Figure) -> dict[str, Any]:
+def _draw_views(figure: PageFigure) -> dict[str, Any]:
     """The panels of a figure for every choice of its controls, packed, and how many there are."""
     views = {}
     for places in product(*(range(len(control.options)) for control in figure.controls)):
@@ -128,7 +128,12 @@ def _plotly() -> dict[str, Markup]:
 @cache
 def _template() -> Template:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"number": number, "bound": bound, "glossed": glossed, "cell": cell_html}
+    environment.filters |= {
+        "number": number_text,
+        "bound": set_sentence,
+        "glossed": mark_short_names,
+        "cell": cell_html,
+    }
     return environment.from_string(_resource("template.html.j2"))
 
 

@@ -14,30 +14,42 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.errors import ShipidError, suggest_name
-from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, Snapshot
+from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, WindowSnapshot
 from shipid.report.errors_over import close_up_chips, line_source, name_of_line
-from shipid.report.figure import MUTED, NAIVE, TRUTH, Chip, Control, Figure, Trace, chart, escaped, even_places, line
+from shipid.report.figure import (
+    MUTED,
+    NAIVE,
+    TRUTH,
+    Chip,
+    Control,
+    PageFigure,
+    Trace,
+    escape_name,
+    even_places,
+    make_chart,
+    make_line,
+)
 from shipid.report.section import Section
 from shipid.report.selection import (
     FEW_RUNS,
     SOURCE_DASHES,
     close_styles,
+    close_up_models,
     data_driven,
     drawn_source,
-    exemplars,
-    families,
     in_words,
-    middles,
-    sizes,
-    spread,
-    thinned,
+    middle_models,
+    models_by_accuracy,
+    shown_sizes,
+    spread_items,
+    thin_lines,
 )
-from shipid.report.wording import counted, listed, metres, number
+from shipid.report.wording import counted_text, listed_names, metres_text, number_text
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_WINDOWS = 600  # in all
+MOST_SHOWN_WINDOWS = 600  # in all
 MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
-PIXELS = 1000  # a window is drawn about half as large
+WINDOW_DETAIL = 1000  # a window is drawn about half as large
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
 HOW_WINDOWS = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
@@ -45,16 +57,16 @@ HOW_WINDOWS = (
 )
 
 
-def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
-    """Sort windows by test run and time; at most `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_WINDOWS` and `MOST_PATHS`."""
-    by_run: dict[str, list[Snapshot]] = {}
+def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
+    """Sort windows by test run and time; at most `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_SHOWN_WINDOWS` and `MOST_PATHS`."""
+    by_run: dict[str, list[WindowSnapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
-    shown = set(exemplars(content))
+    shown = set(close_up_models(content))
     paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
-    windows = min(MOST_WINDOWS, MOST_PATHS // max(1, paths))
+    windows = min(MOST_SHOWN_WINDOWS, MOST_PATHS // max(1, paths))
     result, most = {}, min(MOST_INSTANTS, max(1, windows // max(1, min(FEW_RUNS, len(by_run)))))
-    for run in spread(sorted(by_run), FEW_RUNS):
+    for run in spread_items(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
         result[run] = [ordered[i] for i in even_places(len(ordered), most)]
     return result
@@ -62,19 +74,19 @@ def windows_of(content: ReportContent) -> dict[str, list[Snapshot]]:
 
 def window_sizes(content: ReportContent) -> list[int]:
     """List the N_D a reader can choose from."""
-    return sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
+    return shown_sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
 
 
-def browser(content: ReportContent) -> Figure | None:
+def browser_figure(content: ReportContent) -> PageFigure | None:
     """Pick a test run and an instant; None without windows."""
     runs, counts = windows_of(content), window_sizes(content)
     if not runs:
         return None
-    return Figure(
+    return PageFigure(
         id="browser",
         title="Look at predictions",
         takeaway=_takeaway_windows(content, counts[-1]),
-        how=f"{HOW_WINDOWS}{counted(sum(map(len, runs.values())), 'window')} of {counted(len(runs), 'test run')}; "
+        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of {counted_text(len(runs), 'test run')}; "
         "arrow keys move the slider.",
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
@@ -86,7 +98,7 @@ def browser(content: ReportContent) -> Figure | None:
     )
 
 
-def snapshots(content: ReportContent) -> Figure | None:
+def snapshots_figure(content: ReportContent) -> PageFigure | None:
     """Draw some windows side by side, as in the paper's Fig. 7; None without windows.
 
     With several N_D, one window: a row per model (without physics and one of each of the two largest families) and a
@@ -110,7 +122,7 @@ def snapshots(content: ReportContent) -> Figure | None:
         chosen = "Instants at one, three and five sixths of the run." if len(places) == 3 else ""
         shots = [mine[i] for i in places]
         panels = [(shot, counts[0], "", f"{shot.run}, t = {shot.t:g} s{_wind_words(shot)}") for shot in shots]
-    return Figure(
+    return PageFigure(
         id="snapshots",
         title=title,
         takeaway=_takeaway_models(panels[0][0], models, counts)
@@ -125,7 +137,7 @@ def snapshots(content: ReportContent) -> Figure | None:
                 window,
                 size,
                 [name] if name else None,
-                _spans(window, models or exemplars(content)) if several else (),
+                _spans_of_panels(window, models or close_up_models(content)) if several else (),
             )
             for window, size, name, _ in panels
         ],
@@ -135,7 +147,7 @@ def snapshots(content: ReportContent) -> Figure | None:
     )
 
 
-def _wind_words(window: Snapshot) -> str:
+def _wind_words(window: WindowSnapshot) -> str:
     """The wind of a window as the end of a sentence."""
     if window.wind is None or window.wind[0] < 0.05:
         return "" if window.wind is None else "; no wind"
@@ -145,9 +157,9 @@ def _wind_words(window: Snapshot) -> str:
 def _compared_models(content: ReportContent) -> list[str]:
     """The model without physics and one of each of the two largest families, by A; empty if families are too few."""
     recorded = {model for window in content.snapshots for model, source, _ in window.paths if source == "cooperative"}
-    middle = {family: name for family, name in middles(content).items() if name in recorded}
+    middle = {family: name for family, name in middle_models(content).items() if name in recorded}
     physics = [name for family, name in middle.items() if family != DATA_DRIVEN][:2]
-    order = [str(name) for name in families(content).model]
+    order = [str(name) for name in models_by_accuracy(content).model]
     pure = [middle[DATA_DRIVEN]] if DATA_DRIVEN in middle else []
     return [*pure, *sorted(physics, key=order.index)] if len(physics) > 1 else []
 
@@ -156,18 +168,18 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
     A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one;
-    `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
+    `make_line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
     are metres, angles radians.
     """
     runs, counts = windows_of(content), window_sizes(content)
     lines: dict[tuple[str, str], int] = {}
     shots = [window for windows in runs.values() for window in windows]
-    detail = _detail(shots)
+    detail = _half_pixel(shots)
     # All paths are thinned together: it takes a fifth of the time.
     every = [track for window in shots for track in (window.truth, *window.paths.values(), *window.bands.values())]
     columns = dict(zip(map(id, every), _thinned_columns(every, detail), strict=True))
 
-    def path_of(window: Snapshot, key: PathKey) -> list[Any]:
+    def path_of(window: WindowSnapshot, key: PathKey) -> list[Any]:
         model, source, size = key
         which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
         error = round(_end_error(window, window.paths[key]), 6)
@@ -194,20 +206,20 @@ def window_data(content: ReportContent) -> dict[str, Any]:
         "outline": outline,
         "lines": [_line_style(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
-        "layout": chart([], TO_STARBOARD, AHEAD).layout.to_plotly_json(),
+        "layout": make_chart([], TO_STARBOARD, AHEAD).layout.to_plotly_json(),
     }
 
 
 def _is_drawn(content: ReportContent, key: PathKey, counts: Sequence[int], models: Sequence[str] | None = None) -> bool:
     """Whether windows show a path: constant u, v, r, or a model of the close-up, or of some, at one of some N_D."""
     model, source, size = key
-    shown = exemplars(content) if models is None else models
+    shown = close_up_models(content) if models is None else models
     return source == "naive" or (model in shown and (source != "cooperative" or size in counts))
 
 
 def draw_window(
     content: ReportContent,
-    window: Snapshot,
+    window: WindowSnapshot,
     size: int,
     models: Sequence[str] | None = None,
     spans: Sequence[tuple[float, float]] = (),
@@ -237,14 +249,16 @@ def draw_window(
             keys = [*look["keys"], "band"]
             traces.append(_path_line(look["name"], window.bands[key], keys, hover="", opacity=0.15, **shade))
         traces.append(
-            _path_line(look["name"], window.paths[key], look["keys"], line=look["line"], hover=escaped(look["name"]))
+            _path_line(
+                look["name"], window.paths[key], look["keys"], line=look["line"], hover=escape_name(look["name"])
+            )
         )
-    return chart(traces, TO_STARBOARD, AHEAD, spans)
+    return make_chart(traces, TO_STARBOARD, AHEAD, spans)
 
 
 def _path_line(name: str, path: Floats, keys: Sequence[str], **options: Any) -> Trace:
     """A path (n, 2) of x, y as a plot has it: y to the right, x up."""
-    return line(name, np.asarray(path)[:, 1], np.asarray(path)[:, 0], keys, **options)
+    return make_line(name, np.asarray(path)[:, 1], np.asarray(path)[:, 0], keys, **options)
 
 
 def outline_at(outline: Floats, pose: Floats) -> Floats:
@@ -254,7 +268,7 @@ def outline_at(outline: Floats, pose: Floats) -> Floats:
     return closed
 
 
-def _spans(window: Snapshot, models: Sequence[str]) -> list[tuple[float, float]]:
+def _spans_of_panels(window: WindowSnapshot, models: Sequence[str]) -> list[tuple[float, float]]:
     """Range of y, then of x [m] of the true path, the ship at both of its ends and what was compensated or learned."""
     hulls = [window.outline, outline_at(window.outline, np.append(window.truth[-1], window.psi_end))]
     paths = [path for (model, source, _), path in window.paths.items() if source == "cooperative" and model in models]
@@ -262,7 +276,9 @@ def _spans(window: Snapshot, models: Sequence[str]) -> list[tuple[float, float]]
     return [(float(np.nanmin(column)), float(np.nanmax(column))) for column in (every[:, 1], every[:, 0])]
 
 
-def find_window(content: ReportContent, run: str | None, t: float | None, N_D: int | None) -> tuple[Snapshot, int]:
+def find_window(
+    content: ReportContent, run: str | None, t: float | None, N_D: int | None
+) -> tuple[WindowSnapshot, int]:
     """A window of a test run, and the N_D to draw it with.
 
     Parameters
@@ -298,21 +314,21 @@ def _window_chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
     chips = [Chip("truth", "true path", TRUTH, width=9), *close_up_chips(content, sources)]
     chips += [Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)
-    others = {f"model:{name}" for name in exemplars(content) if only and name not in only}
+    others = {f"model:{name}" for name in close_up_models(content) if only and name not in only}
     return [chip for chip in chips if chip.key not in others]
 
 
-def _detail(windows: Sequence[Snapshot]) -> float:
+def _half_pixel(windows: Sequence[WindowSnapshot]) -> float:
     """Return half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
     extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
-    return float(np.median(extents)) / PIXELS if extents else 0.0
+    return float(np.median(extents)) / WINDOW_DETAIL if extents else 0.0
 
 
 def _thinned_columns(paths: Sequence[Floats], detail: float) -> list[list[list[float | None]]]:
     """Columns x and y of paths (n, 2), of the points that differ by `detail` [m]; one that diverged keeps its gaps."""
     kept = [np.asarray(path, dtype=float) for path in paths]
     sound = [i for i, path in enumerate(kept) if detail > 0 and np.isfinite(path).all()]
-    for i, chosen in zip(sound, thinned([kept[i] for i in sound], detail), strict=True):
+    for i, chosen in zip(sound, thin_lines([kept[i] for i in sound], detail), strict=True):
         kept[i] = kept[i][chosen]
     places = max(0, math.ceil(-math.log10(detail or 0.001)))
     with np.errstate(over="ignore"):  # a path that diverged: its points are left out
@@ -320,11 +336,11 @@ def _thinned_columns(paths: Sequence[Floats], detail: float) -> list[list[list[f
     return [[[value if math.isfinite(value) else None for value in column] for column in pair] for pair in columns]
 
 
-def _end_error(window: Snapshot, points: Floats) -> float:
+def _end_error(window: WindowSnapshot, points: Floats) -> float:
     return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
 
 
-def _middle_window(windows: Sequence[Snapshot]) -> Snapshot:
+def _middle_window(windows: Sequence[WindowSnapshot]) -> WindowSnapshot:
     """The window whose mean physics error at the end is the middle one."""
     errors = [
         np.mean([_end_error(window, path) for (_, kind, _), path in window.paths.items() if kind != "cooperative"] or 0)
@@ -333,14 +349,14 @@ def _middle_window(windows: Sequence[Snapshot]) -> Snapshot:
     return windows[int(np.argsort(errors, kind="stable")[len(errors) // 2])]
 
 
-def _mean_end_error(windows: Sequence[Snapshot], keys: set[PathKey]) -> float:
+def _mean_end_error(windows: Sequence[WindowSnapshot], keys: set[PathKey]) -> float:
     errors = [_end_error(w, points) for w in windows for key, points in w.paths.items() if key in keys]
     return float(np.mean(errors)) if errors else float("nan")
 
 
 def _takeaway_windows(content: ReportContent, size: int) -> str:
     """Mean end errors over all windows, per source."""
-    pure, drawn, windows = data_driven(content), exemplars(content), content.snapshots
+    pure, drawn, windows = data_driven(content), close_up_models(content), content.snapshots
     keys = {key for window in windows for key in window.paths if key[0] in drawn and key[2] in (0, size)}
     called = {key: drawn_source(content, key[0], key[1]) if key[0] != pure else "pure" for key in keys}
     words = {"cooperative": "the compensated paths", "physics": "physics alone", "pure": in_words(pure or "")}
@@ -348,16 +364,16 @@ def _takeaway_windows(content: ReportContent, size: int) -> str:
     for source, word in words.items():
         mine = {key for key, name in called.items() if name == source and (source != "pure" or key[2] == size)}
         value = _mean_end_error(windows, mine)
-        errors += [f"{word} by {metres(value)}"] * bool(np.isfinite(value))
+        errors += [f"{word} by {metres_text(value)}"] * bool(np.isfinite(value))
     where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
-    text = f"In the {counted(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
+    text = f"In the {counted_text(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
     return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
-def _takeaway_row(content: ReportContent, panels: Sequence[tuple[Snapshot, int]]) -> str:
+def _takeaway_row(content: ReportContent, panels: Sequence[tuple[WindowSnapshot, int]]) -> str:
     """How far the compensated paths end from the truth in each panel, or those without physics where there are none."""
     pure = data_driven(content)
-    physics = [name for name in exemplars(content) if name != pure]
+    physics = [name for name in close_up_models(content) if name != pure]
     sets: dict[str, list[str | None]] = {
         "the compensated paths": [name for name in physics if name not in content.alone],
         "the paths of physics alone": [name for name in physics if name in content.alone],
@@ -369,25 +385,25 @@ def _takeaway_row(content: ReportContent, panels: Sequence[tuple[Snapshot, int]]
             keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in models}
             means.append(_mean_end_error([window], keys))
         if np.isfinite(means).any():
-            return f"From panel to panel, {words} end {listed([number(m) for m in means])} m from the true place."
+            return f"From panel to panel, {words} end {listed_names([number_text(m) for m in means])} m from the true place."
     return "No compensated path was recorded for these windows."
 
 
-def _takeaway_models(window: Snapshot, models: Sequence[str], counts: Sequence[int]) -> str:
+def _takeaway_models(window: WindowSnapshot, models: Sequence[str], counts: Sequence[int]) -> str:
     """How far each model ends from the truth, by rising N_D."""
     parts = []
     for name in models:
-        ends = [number(_mean_end_error([window], {(name, "cooperative", size)})) for size in counts]
+        ends = [number_text(_mean_end_error([window], {(name, "cooperative", size)})) for size in counts]
         alone = _mean_end_error([window], {(name, "physics", 0)})
-        physics = f" (physics alone {metres(alone)})" if np.isfinite(alone) else ""
-        parts.append(f"{in_words(name)} {listed(ends)} m{physics}")
-    numbers = listed([str(size) for size in counts])
+        physics = f" (physics alone {metres_text(alone)})" if np.isfinite(alone) else ""
+        parts.append(f"{in_words(name)} {listed_names(ends)} m{physics}")
+    numbers = listed_names([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."
 
 
 PREDICTIONS = Section(
     "The predictions",
-    draw=lambda content: (browser(content), snapshots(content)),
+    draw=lambda content: (browser_figure(content), snapshots_figure(content)),
     needs=("snapshots",),
     anchors=("browser", "snapshots"),
 )

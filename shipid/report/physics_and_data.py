@@ -11,24 +11,24 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_in
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
-    CLEAR,
     INK,
     MUTED,
     NAIVE,
+    TRANSPARENT,
     Chip,
+    ColourScale,
     Control,
-    Figure,
-    Scale,
+    PageFigure,
     Trace,
-    axis,
     colour_level,
-    escaped,
+    escape_name,
     even_places,
-    line,
     log_axis,
-    plot,
+    make_axis,
+    make_line,
+    make_plot,
     row_name,
     spread_apart,
 )
@@ -37,31 +37,31 @@ from shipid.report.selection import (
     FEW_MODELS,
     accuracy_range,
     data_driven,
+    errors_over_seeds,
     in_words,
-    left_out,
     model_chips,
+    model_styles,
     nothing_learns,
-    overview,
+    overview_models,
     same_physics,
-    spread,
-    styles,
-    trained,
+    spread_items,
+    words_on_left_out,
 )
-from shipid.report.wording import CONSTANT, counted, listed, metres, number, shortened
+from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text, shorten_name
 
-HEIGHT, THICK = 580, 26  # of the map and at most of a cell [px]
-MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
+HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
+MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
 NAME_HEIGHT = 13  # of a row [px]
-INSIDE = HEIGHT - MARGIN["t"] - MARGIN["b"]
+INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
 MOST_LEVELS = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
-FEWEST = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
+FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
 NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a level may have
-TICKS = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
-SHORT, LONG = 12, 28  # characters of a name beside a row, and above one
+TICKS_OF_A = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
+MOST_LETTERS_BESIDE, MOST_LETTERS_ABOVE = 12, 28  # characters of a name beside a row, and above one
 DUMBBELL = 46  # height of a model where there is one N_D [px]
-MOST_LINES, FAR = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
-STATISTICS = {  # of the position error -> its columns in the cells, the models and constant u, v, r
+MOST_LINES, FAR_APART = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
+ERROR_STATISTICS = {  # of the position error -> its columns in the cells, the models and constant u, v, r
     "mean": ("H", "A", "mean"),
     "90th percentile": ("H_90", "A_90", "p90"),
     "root mean square": ("rms", "A_rms", "rms"),
@@ -85,14 +85,14 @@ class CellMap(NamedTuple):
     cells: pd.DataFrame
 
 
-def error_map(content: ReportContent) -> Figure | None:
+def map_figure(content: ReportContent) -> PageFigure | None:
     """H over A and N_D; None where `map_lack` says why not, or H is A: nothing learns."""
     shown = map_of_cells(content)
     if shown is None or nothing_learns(content):
         return None
     rows, cells = shown
     lines, bounded = _isolines(shown, content.frame("intervals"))
-    many = [f"{FEWEST * width:.0f}" for width in NEIGHBOURS]
+    many = [f"{FEWEST_RADII * width:.0f}" for width in NEIGHBOURS]
     lined = f" Lines of equal error follow H [m], averaged over neighbouring models where there are {many[0]} or more, "
     lined += f"and over neighbouring N_D where there are {many[1]} or more. No line is drawn beside a cell without a "
     lined += "result."
@@ -100,23 +100,27 @@ def error_map(content: ReportContent) -> Figure | None:
         lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
         lined += "two dotted lines of a level the data do not say on which side of the level H lies; one that is "
         lined += "missing lies beyond the cells."
-    return Figure(
+    return PageFigure(
         id="map",
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown) + _method_of_map(content, rows),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
-        + (f" Hatched: H is not below that of {_rival(rows)} at the same N_D." if cells.worse.any() else "")
+        + (
+            f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
+            if cells.worse.any()
+            else ""
+        )
         + (lined if lines else "")
-        + left_out(content)
+        + words_on_left_out(content)
         + _not_on_map(content)
-        + unplotted(content),
-        alternative=f"Cells of the position error H for {counted(len(rows), 'model')} by A and N_D. The numbers are in "
+        + cells_without_result(content),
+        alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. The numbers are in "
         "the table of cells.",
         height=HEIGHT,
         draw=lambda: [draw_map(shown, lines)],
         chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [])
         + ([Chip("bounds", "ends of the 95 % interval", INK, "dot", 1.5)] if bounded else []),
-        scale=Scale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
+        scale=ColourScale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
     )
 
 
@@ -129,7 +133,7 @@ def map_lack(content: ReportContent) -> str:
         "two N_D or more": cells.N_D.nunique() > 1,
         "two models with physics or more": len(physics) > 1,
         "the column A [m], a number for two models with physics or more": physics.notna().sum() > 1,
-        "cells with a result": not trained(content).merge(_rows_of_map(content)[["model"]]).empty,
+        "cells with a result": not errors_over_seeds(content).merge(_rows_of_map(content)[["model"]]).empty,
     }
     return next((f"it needs {name}" for name, there in needs.items() if not there), "")
 
@@ -139,16 +143,16 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
     if map_lack(content):
         return None
     rows = _rows_of_map(content)
-    half = np.minimum(np.diff(rows.y) / 2, THICK / 2 * 1.04 * rows.y.max() / INSIDE)  # way to the next row
+    half = np.minimum(np.diff(rows.y) / 2, THICKEST_CELL / 2 * 1.04 * rows.y.max() / INSIDE)  # way to the next row
     rows = rows.assign(low=np.insert(half, 0, half[0]), high=np.append(half, half[-1]))
     cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
-    cells = cells.merge(trained(content)[["model", "N_D", "H"]], how="left")
+    cells = cells.merge(errors_over_seeds(content)[["model", "N_D", "H"]], how="left")
     learned = cells.N_D.map(cells[cells.model.eq(data_driven(content) or "")].set_index("N_D").H)
     worse = cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned)
     groups = {key: mine.to_dict("records") for key, mine in content.cells.groupby(["model", "N_D"])}
     words = [
         _cell_words(groups[row.model, row.N_D], row, learned[row.Index] if worse[row.Index] else None)
-        for row in rows_in(cells)
+        for row in rows_as_tuples(cells)
     ]
     return CellMap(rows, cells.assign(worse=worse, words=words))
 
@@ -158,7 +162,7 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
 
     Of several methods on the same physics, which have one place, the first: the one judged, where it is among them.
     """
-    frame = overview(content)
+    frame = overview_models(content)
     frame = frame[~same_physics(frame)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
     strips = top * (1.05 + 0.06 * frame.A.isna().cumsum())
@@ -171,20 +175,20 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
 def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float | None) -> str:
     """Return the lines of the hover box of one model and N_D, of which there are some cells."""
     good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
-    accuracy = f"A {metres(row.A)}, " if math.isfinite(row.A) else ""
-    lines = [f"<b>{escaped(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
+    accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
+    lines = [f"<b>{escape_name(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
     if not good:
         first = cells[0]
-        return "<br>".join([*lines, escaped(f"{first['status']}: {first['sentence']}".rstrip(": "))])
+        return "<br>".join([*lines, escape_name(f"{first['status']}: {first['sentence']}".rstrip(": "))])
     best, worst = good[0], good[-1]
-    lines.append(f"H {metres(row.H)}, H_90 {metres(fmean(one['H_90'] for one in good))}")
+    lines.append(f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}")
     if len(cells) > 1:
-        lines.append(f"{number(best['H'])} to {metres(worst['H'])} over {counted(len(good), 'seed')}")
+        lines.append(f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}")
     if len(good) < len(cells):
-        lines.append(f"{len(cells) - len(good)} of {counted(len(cells), 'seed')} gave no result")
+        lines.append(f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result")
     if learned is not None:
-        lines.append(f"no better than no physics, {metres(learned)}")
-    return "<br>".join([*lines, escaped(best["hyperparameters"])] if best.get("hyperparameters") else lines)
+        lines.append(f"no better than no physics, {metres_text(learned)}")
+    return "<br>".join([*lines, escape_name(best["hyperparameters"])] if best.get("hyperparameters") else lines)
 
 
 def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> go.Figure:
@@ -200,25 +204,25 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> go.Figure:
     shades = [f"var(--heat-{colour_level(value, span)})" for value in good.H]
     box = {"marker": {"color": shades, "line": {"width": 0.5, "color": MUTED}}, "customdata": list(good.words)}
     lattice = {"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16}
-    hatched = {"marker": {"color": CLEAR, "line": {"width": 1.2, "color": INK}, "pattern": lattice}}
+    hatched = {"marker": {"color": TRANSPARENT, "line": {"width": 1.2, "color": INK}, "pattern": lattice}}
     cross = {"symbol": "x-thin", "size": 8, "line": {"width": 2, "color": "var(--bad)"}}
     traces: list[Trace] = [
-        {**_boxes(good, widths), **box, "hovertemplate": "%{customdata}<extra></extra>"},
-        {**_boxes(good[good.worse], widths), **hatched, "hoverinfo": "skip"},
-        line("no result", bad.N_D, bad.y, [], mode="markers", marker=cross, hover=list(bad.words)),
+        {**_cell_bars(good, widths), **box, "hovertemplate": "%{customdata}<extra></extra>"},
+        {**_cell_bars(good[good.worse], widths), **hatched, "hoverinfo": "skip"},
+        make_line("no result", bad.N_D, bad.y, [], mode="markers", marker=cross, hover=list(bad.words)),
     ]
     ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
-    x = axis("manoeuvres, N_D [1]", tickvals=counts.tolist(), range=ends, showgrid=False)
-    y = axis("error of the physics alone, A [m]", range=[0, top], **_ticks_of_map(rows))
+    x = make_axis("manoeuvres, N_D [1]", tickvals=counts.tolist(), range=ends, showgrid=False)
+    y = make_axis("error of the physics alone, A [m]", range=[0, top], **_ticks_of_map(rows))
     edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
     rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
     rules = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}] * bool(rows.A.isna().any())
     above = {f"{side}axis2": {"overlaying": side, "matches": side, "visible": False} for side in "xy" if lines}
-    more = {"annotations": _names_of_rows(rows, top), "margin": MARGIN, "shapes": rules, **above}
-    return plot([*traces, *lines], x, y, barmode="overlay", **more)
+    more = {"annotations": _names_of_rows(rows, top), "margin": MAP_MARGIN, "shapes": rules, **above}
+    return make_plot([*traces, *lines], x, y, barmode="overlay", **more)
 
 
-def _boxes(cells: pd.DataFrame, widths: dict[int, float]) -> Trace:
+def _cell_bars(cells: pd.DataFrame, widths: dict[int, float]) -> Trace:
     """Bars around each cell."""
     size = {"y": (cells.low + cells.high).round(4), "width": cells.N_D.map(widths)}
     columns = {"x": cells.N_D, "base": (cells.y - cells.low).round(4), **size}
@@ -236,7 +240,12 @@ def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
     heights = spread_apart(known.y[some].tolist(), NAME_HEIGHT / INSIDE * top, float(known.y.max()))
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
     return [
-        {**place, "y": height, "text": escaped(shortened(name, SHORT)), "font": {"size": 11, "color": INK}}
+        {
+            **place,
+            "y": height,
+            "text": escape_name(shorten_name(name, MOST_LETTERS_BESIDE)),
+            "font": {"size": 11, "color": INK},
+        }
         for height, name in zip(heights, known.short[some], strict=True)
     ]
 
@@ -247,10 +256,10 @@ def _ticks_of_map(rows: pd.DataFrame) -> dict[str, list[Any]]:
     decade = math.floor(math.log10(max(largest, 1e-6)))
     scale = decade - 1 if decade < 0 else max(decade - 3, 0)  # a model in a basin errs by centimetres
     values = [0.0]
-    for tick in (float(f"{tick}e{scale}") for tick in TICKS):
+    for tick in (float(f"{tick}e{scale}") for tick in TICKS_OF_A):
         apart = all(abs(math.sqrt(tick) - math.sqrt(other)) > 0.06 * rows.y.max() for other in values)
         values += [tick] * (tick <= largest and apart)
-    names = [escaped(shortened(name, SHORT)) for name in strips.short]
+    names = [escape_name(shorten_name(name, MOST_LETTERS_BESIDE)) for name in strips.short]
     return {"tickvals": [*np.sqrt(values), *strips.y], "ticktext": [*(f"{value:g}" for value in values), *names]}
 
 
@@ -263,7 +272,9 @@ def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
 
     def grid(frame: pd.DataFrame, column: str) -> Floats:
         table = frame.pivot(index="model", columns="N_D", values=column)
-        return smoothed(table.reindex(index=physics.model, columns=np.unique(shown.cells.N_D)).to_numpy(), NEIGHBOURS)
+        return smooth_cells(
+            table.reindex(index=physics.model, columns=np.unique(shown.cells.N_D)).to_numpy(), NEIGHBOURS
+        )
 
     mean = grid(shown.cells[shown.cells.model.isin(physics.model)], "H")
     base = {"type": "contour", "x": np.unique(shown.cells.N_D).tolist(), "y": physics.y.tolist(), "hoverinfo": "skip"}
@@ -291,7 +302,7 @@ def nice_levels(values: Floats, most: int) -> list[float]:
     return [inside[i] for i in even_places(len(inside), most)] if inside else []
 
 
-def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
+def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
     """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
 
     Values that are not finite stay so and have no weight. A grid with fewer rows or columns than six radii is not
@@ -301,7 +312,7 @@ def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
     total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
     for side, width in enumerate(radius):
         count = values.shape[side]
-        if count >= FEWEST * width:
+        if count >= FEWEST_RADII * width:
             bell = np.exp(-((np.subtract.outer(np.arange(count), np.arange(count)) / width) ** 2) / 2)
             total, weight = (np.moveaxis(np.tensordot(bell, part, (1, side)), 0, side) for part in (total, weight))
     return np.where(finite, np.exp(total / np.where(weight > 0, weight, 1.0)), np.nan)
@@ -309,47 +320,47 @@ def smoothed(values: Floats, radius: tuple[float, float]) -> Floats:
 
 def _method_of_map(content: ReportContent, rows: pd.DataFrame) -> str:
     """Sentence on the method of the cells on the map, where other methods are not on it; empty if all are."""
-    if not (_not_on_map(content) or left_out(content)):
+    if not (_not_on_map(content) or words_on_left_out(content)):
         return ""
     drawn = content.cells[content.cells.model.isin(rows.model[rows.family.ne(DATA_DRIVEN)])]
     names = sorted({str(name) for name in drawn.method}) if "method" in drawn else []
-    return f" Of several methods, {listed(names) if names else 'the first'} is drawn."
+    return f" Of several methods, {listed_names(names) if names else 'the first'} is drawn."
 
 
 def _not_on_map(content: ReportContent) -> str:
     """Sentence on the methods whose place on the map another has; empty if there are none."""
-    names = list(overview(content).loc[same_physics, "model"])
-    return f" Not on the map, where another method has their place: {listed(names, 6)}." if names else ""
+    names = list(overview_models(content).loc[same_physics, "model"])
+    return f" Not on the map, where another method has their place: {listed_names(names, 6)}." if names else ""
 
 
-def _rival(rows: pd.DataFrame) -> str:
+def _model_without_physics(rows: pd.DataFrame) -> str:
     """The model without physics that others are compared with: by name where there are several."""
     return next(iter(rows.model[rows.family == DATA_DRIVEN]), NO_PHYSICS)
 
 
 def ends_of_map(cells: pd.DataFrame) -> tuple[str, str]:
     """The least and the greatest H, each with its model and N_D."""
-    ends = rows_in(cells.loc[[cells.H.idxmin(), cells.H.idxmax()]])
-    least, greatest = (f"{metres(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
+    ends = rows_as_tuples(cells.loc[[cells.H.idxmin(), cells.H.idxmax()]])
+    least, greatest = (f"{metres_text(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
     return least, greatest
 
 
 def _takeaway_map(shown: CellMap) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
-    good, rival = shown.cells[shown.cells.H.notna()], _rival(shown.rows)
+    good, rival = shown.cells[shown.cells.H.notna()], _model_without_physics(shown.rows)
     text = "H runs from {} to {}".format(*ends_of_map(good))
     pure = good.family.eq(DATA_DRIVEN)
     physics = good[~pure & good.N_D.isin(good.N_D[pure])]
     if physics.empty:
         return f"{text}."
     if not physics.worse.any():
-        return f"{text}; H is below that of {rival} in all {counted(len(physics), 'cell')} with physics."
+        return f"{text}; H is below that of {rival} in all {counted_text(len(physics), 'cell')} with physics."
     limit, bad = float(physics.A[physics.worse].min()), int(physics.worse.sum())
-    text += f"; in {bad} of {counted(len(physics), 'cell')} with physics H is not below that of {rival}"
-    return text + (f", none of them below A = {metres(limit)}." if physics.A.lt(limit).any() else ".")
+    text += f"; in {bad} of {counted_text(len(physics), 'cell')} with physics H is not below that of {rival}"
+    return text + (f", none of them below A = {metres_text(limit)}." if physics.A.lt(limit).any() else ".")
 
 
-def unplotted(content: ReportContent) -> str:
+def cells_without_result(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
     names, by = [], ["model", "N_D"]
     every = content.cells.groupby(by, sort=False).size().to_dict()
@@ -358,14 +369,14 @@ def unplotted(content: ReportContent) -> str:
         count = every[model, size]
         share = f", {len(failed)} of {count} seeds" if len(failed) < count else ""
         names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
-    return f" Not plotted: {listed(names, 6)}; reasons in the table of cells." if names else ""
+    return f" Not plotted: {listed_names(names, 6)}; reasons in the table of cells." if names else ""
 
 
-def gain(content: ReportContent) -> Figure | None:
+def gain_figure(content: ReportContent) -> PageFigure | None:
     """H over N_D, or the dumbbell A -> H when the study has a single N_D; None where `gain_lack` says why not."""
     if gain_lack(content):
         return None
-    means = trained(content).merge(overview(content)[["model"]])
+    means = errors_over_seeds(content).merge(overview_models(content)[["model"]])
     return _gain_over_size(content, means) if content.cells.N_D.nunique() > 1 else _gain_at_one_size(content, means)
 
 
@@ -379,40 +390,42 @@ def gain_lack(content: ReportContent) -> str:
     return ""
 
 
-def _gain_over_size(content: ReportContent, means: pd.DataFrame) -> Figure:
-    looks, span, (order, drawn) = styles(content), accuracy_range(content), _models_with_line(content)
+def _gain_over_size(content: ReportContent, means: pd.DataFrame) -> PageFigure:
+    looks, span, (order, drawn) = model_styles(content), accuracy_range(content), _models_with_line(content)
     heights = means.H[means.model.isin(order) & means.H.gt(0)]
     accuracy = content.cells.groupby("model").A.first()
-    words = {name: f"{name}, A {metres(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
-    return Figure(
+    words = {name: f"{name}, A {metres_text(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
+    return PageFigure(
         id="gain",
         title="What another manoeuvre buys",
         takeaway=_takeaway_sizes(content, means),
         how=HOW_MEASURED.format(seeds="the line joins their means and the pale points are the seeds")
         + (" Colour is A; the" if span else " The")
         + " marker is the family; N_D counts manoeuvres to train and to validate."
-        + left_out(content)
+        + words_on_left_out(content)
         + drawn
-        + unplotted(content),
-        alternative=f"Lines of the position error over the number of manoeuvres for {counted(len(order), 'model')}. "
+        + cells_without_result(content),
+        alternative=f"Lines of the position error over the number of manoeuvres for {counted_text(len(order), 'model')}. "
         "The numbers are in the table of cells.",
         height=460 if len(order) <= 10 else 560,
         draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],
         controls=[
-            Control("Position error", list(STATISTICS)),
-            Control("Axis", ["linear", "logarithmic"], int(len(heights) > 0 and heights.max() > FAR * heights.min())),
+            Control("Position error", list(ERROR_STATISTICS)),
+            Control(
+                "Axis", ["linear", "logarithmic"], int(len(heights) > 0 and heights.max() > FAR_APART * heights.min())
+            ),
         ],
-        chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT, NAIVE, "dash")],
-        scale=Scale("error of the physics alone, A [m]", *span) if span else None,
+        chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT_MOTION, NAIVE, "dash")],
+        scale=ColourScale("error of the physics alone, A [m]", *span) if span else None,
     )
 
 
 def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
     """Models that have a line, by A, and a sentence on those that have none: of many some, or no line is told apart."""
-    frame = overview(content)
+    frame = overview_models(content)
     pure = frame.family.eq(DATA_DRIVEN)
     physics = [str(name) for name in frame.model[~pure]]
-    kept = {*spread(physics, MOST_LINES), content.best, *frame.model[pure]}
+    kept = {*spread_items(physics, MOST_LINES), content.best, *frame.model[pure]}
     order = [str(name) for name in frame.model if name in kept]
     few = len(order) - int(pure.sum())
     if few == len(physics):
@@ -426,7 +439,7 @@ def _draw_sizes(
     content: ReportContent, means: pd.DataFrame, order: Sequence[str], statistic: str, logarithmic: bool
 ) -> go.Figure:
     """Lines over N_D; what has no physics first: it must not cover the others."""
-    column, looks, sizes = STATISTICS[statistic][0], styles(content), sorted(content.cells.N_D.unique())
+    column, looks, sizes = ERROR_STATISTICS[statistic][0], model_styles(content), sorted(content.cells.N_D.unique())
     ended = content.cells[content.cells.status.eq("ok")]
     traces = []
     for name in (name for name in reversed(order) if means.model.eq(name).any()):
@@ -435,21 +448,23 @@ def _draw_sizes(
         # A size whose cells all failed stays NaN: the line has a gap there.
         heights = means[means.model.eq(name)].set_index("N_D")[column].reindex(sizes)
         ink = {"color": look.colour, "width": look.width}
-        traces.append(line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
+        traces.append(make_line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
         if seeds.seed.nunique() > 1:
             faint: Trace = {"mode": "markers", "marker": {**marker, "size": 5}, "opacity": 0.4}
-            traces.append(line(f"{name}, seed", seeds.N_D, seeds[column], keys, **faint))
-    traces.append(_floor(content, statistic, [sizes[0], sizes[-1]]))
+            traces.append(make_line(f"{name}, seed", seeds.N_D, seeds[column], keys, **faint))
+    traces.append(_line_of_constant_motion(content, statistic, [sizes[0], sizes[-1]]))
     title = f"position error, {statistic} [m]"
-    x = axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
-    return plot(traces, x, log_axis(title) if logarithmic else axis(title, rangemode="tozero"))
+    x = make_axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
+    return make_plot(traces, x, log_axis(title) if logarithmic else make_axis(title, rangemode="tozero"))
 
 
-def _floor(content: ReportContent, statistic: str, ends: Sequence[float]) -> Trace:
+def _line_of_constant_motion(content: ReportContent, statistic: str, ends: Sequence[float]) -> Trace:
     """Dashed line of constant u, v, r from one end to the other."""
-    level = content.naive[STATISTICS[statistic][2]]
+    level = content.naive[ERROR_STATISTICS[statistic][2]]
     ink = {"color": NAIVE, "dash": "dash", "width": 1.5}
-    return line(CONSTANT, ends, [level] * 2, ["naive"], line=ink, hover=f"{CONSTANT}: {metres(level)}")
+    return make_line(
+        CONSTANT_MOTION, ends, [level] * 2, ["naive"], line=ink, hover=f"{CONSTANT_MOTION}: {metres_text(level)}"
+    )
 
 
 def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
@@ -459,51 +474,53 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     for size in (means.N_D.min(), means.N_D.max()):
         mine = means[means.N_D.eq(size)].set_index("model").H
         named = [name for name in (content.best, data_driven(content)) if name and name in mine.index]
-        known = " and ".join(f"{in_words(name)} has H = {metres(mine[name])}" for name in named)
-        parts.append(f"t N_D = {size}, {known or f'H runs from {metres(mine.min())} to {metres(mine.max())}'}")
+        known = " and ".join(f"{in_words(name)} has H = {metres_text(mine[name])}" for name in named)
+        parts.append(
+            f"t N_D = {size}, {known or f'H runs from {metres_text(mine.min())} to {metres_text(mine.max())}'}"
+        )
     best = f" {content.best} is the best in validation." if content.best else ""
     return f"A{parts[0]}; a{parts[1]}.{best}"
 
 
-def _gain_at_one_size(content: ReportContent, means: pd.DataFrame) -> Figure:
-    names = [str(name) for name in overview(content).model]
+def _gain_at_one_size(content: ReportContent, means: pd.DataFrame) -> PageFigure:
+    names = [str(name) for name in overview_models(content).model]
     names = list(means.set_index("model").H.reindex(names).sort_values(na_position="last").index)
-    return Figure(
+    return PageFigure(
         id="gain",
         title="What compensation buys",
         takeaway=_takeaway_one_size(content, means),
         how="Open marker: the physics alone; filled: with the compensator trained on N_D = "
         f"{content.cells.N_D.iloc[0]} manoeuvres. "
         + HOW_MEASURED.format(seeds="the filled marker is their mean and the pale points are the seeds")
-        + left_out(content)
-        + unplotted(content),
-        alternative=f"Position error before and after compensation for {counted(len(names), 'model')}. "
+        + words_on_left_out(content)
+        + cells_without_result(content),
+        alternative=f"Position error before and after compensation for {counted_text(len(names), 'model')}. "
         "The numbers are in the tables of models and cells.",
         height=DUMBBELL * len(names) + 90,
         draw=lambda statistic: [_draw_dumbbells(content, means, statistic, names)],
-        controls=[Control("Position error", list(STATISTICS))],
+        controls=[Control("Position error", list(ERROR_STATISTICS))],
         chips=[
             Chip("before", "physics alone", INK, "none", symbol="circle-open"),
             Chip("after", "with compensation (or no physics)", INK, "none", symbol="circle"),
-            Chip("naive", CONSTANT, NAIVE, "dash"),
+            Chip("naive", CONSTANT_MOTION, NAIVE, "dash"),
         ],
     )
 
 
 def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: list[str]) -> go.Figure:
     """A row for each model: the physics alone, with compensation, and a bar between them."""
-    column, alone, _ = STATISTICS[statistic]
+    column, alone, _ = ERROR_STATISTICS[statistic]
     old = content.models.set_index("model")[alone].reindex(names).to_numpy(dtype=float)
     new = means.set_index("model")[column].reindex(names).to_numpy(dtype=float)
-    colours = [styles(content)[name].colour for name in names]
+    colours = [model_styles(content)[name].colour for name in names]
     seeds = content.cells[content.cells.status.eq("ok") & content.cells.model.isin(names)]
     seeds = seeds[seeds.groupby("model").H.transform("size") > 1]
     at = {name: row for row, name in enumerate(names)}
     places = [at[name] for name in seeds.model]
-    floor = _floor(content, statistic, [len(names) - 0.4, -0.6])
+    floor = _line_of_constant_motion(content, statistic, [len(names) - 0.4, -0.6])
     traces = [floor | {"x": floor["y"], "y": floor["x"]}]
     traces += [
-        line(name, [old[i], new[i]], [i, i], ["before", "after"], line={"color": colours[i], "width": 3}, hover="")
+        make_line(name, [old[i], new[i]], [i, i], ["before", "after"], line={"color": colours[i], "width": 3}, hover="")
         for i, name in enumerate(names)
     ]
     for key, what, values, lines, symbol, size in (
@@ -513,17 +530,19 @@ def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str,
     ):
         ink = [colours[i] for i in lines]
         marker = {"symbol": symbol, "size": size, "color": ink, "line": {"width": 2, "color": ink}}
-        words = [f"{escaped(names[i])}, {what}: {metres(value)}" for i, value in zip(lines, values, strict=True)]
+        words = [
+            f"{escape_name(names[i])}, {what}: {metres_text(value)}" for i, value in zip(lines, values, strict=True)
+        ]
         shade = 0.4 if size == 7 else 1.0
-        traces.append(line(what, values, lines, [key], mode="markers", marker=marker, hover=words, opacity=shade))
+        traces.append(make_line(what, values, lines, [key], mode="markers", marker=marker, hover=words, opacity=shade))
     texts = []
     for row, name in enumerate(names):
-        numbers = " → ".join(metres(value) for value in (old[row], new[row]) if np.isfinite(value))
+        numbers = " → ".join(metres_text(value) for value in (old[row], new[row]) if np.isfinite(value))
         numbers += "" if np.isfinite(new[row]) else " → no result"
-        texts.append(row_name(row, f"<b>{escaped(shortened(name, LONG))}</b>  {numbers}"))
-    x = axis(f"position error, {statistic} [m]", rangemode="tozero")
-    y = axis("", range=[len(names) - 0.4, -0.75], showticklabels=False, showgrid=False)
-    return plot(traces, x, y, annotations=texts, margin={"l": 8, "r": 12, "t": 4, "b": 44})
+        texts.append(row_name(row, f"<b>{escape_name(shorten_name(name, MOST_LETTERS_ABOVE))}</b>  {numbers}"))
+    x = make_axis(f"position error, {statistic} [m]", rangemode="tozero")
+    y = make_axis("", range=[len(names) - 0.4, -0.75], showticklabels=False, showgrid=False)
+    return make_plot(traces, x, y, annotations=texts, margin={"l": 8, "r": 12, "t": 4, "b": 44})
 
 
 def _takeaway_one_size(content: ReportContent, means: pd.DataFrame) -> str:
@@ -532,16 +551,16 @@ def _takeaway_one_size(content: ReportContent, means: pd.DataFrame) -> str:
         return "No cell gave a result."
     before = content.models.set_index("model").A.reindex(after.index).dropna()
     better, best, pure = before.index[after[before.index] < before], content.best, data_driven(content)
-    text = f"{best}, best in validation, has H = {metres(after[best])}; c" if best in after.index else "C"
-    text += f"ompensation improves {len(better)} of {counted(len(before), 'physics model')}"
+    text = f"{best}, best in validation, has H = {metres_text(after[best])}; c" if best in after.index else "C"
+    text += f"ompensation improves {len(better)} of {counted_text(len(before), 'physics model')}"
     text = "No physics model has a result with data" if before.empty else text
-    text += f"; {in_words(pure)} has H = {metres(after[pure])}" if pure and pure in after.index else ""
-    return f"{text}; {CONSTANT} {metres(content.naive['mean'])}."
+    text += f"; {in_words(pure)} has H = {metres_text(after[pure])}" if pure and pure in after.index else ""
+    return f"{text}; {CONSTANT_MOTION} {metres_text(content.naive['mean'])}."
 
 
-RESULTS = Section(
+WHAT_PHYSICS_AND_DATA_BUY = Section(
     "What physics and data buy",
-    draw=lambda content: (error_map(content), gain(content)),
+    draw=lambda content: (map_figure(content), gain_figure(content)),
     needs=("cells",),
     anchors=("map", "gain"),
 )

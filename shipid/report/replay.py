@@ -7,22 +7,22 @@ from functools import partial
 
 import pandas as pd
 
-from shipid.report.content import PageContent, Sentence
-from shipid.report.figure import INK, Figure, category
-from shipid.report.motion import DEGREES, LOG, motion_figure
+from shipid.report.content import AnswerSentence, PageContent
+from shipid.report.figure import INK, PageFigure, category_colour
+from shipid.report.motion import DEGREES, LOG_SERIES, motion_figure
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import Column, Table, frame_table
-from shipid.report.wording import number
+from shipid.report.tables import PageTable, TableColumn, frame_table
+from shipid.report.wording import number_text
 
 REPLAYED = "replayed"
-REPLAY_INKS = {LOG: {"color": INK, "dash": "solid"}, REPLAYED: {"color": category(0), "dash": "solid"}}
+REPLAY_INKS = {LOG_SERIES: {"color": INK, "dash": "solid"}, REPLAYED: {"color": category_colour(0), "dash": "solid"}}
 REPLAY_ERRORS = {
-    "run": Column("run"),
-    "u [m/s]": Column("u", 3),
-    "v [m/s]": Column("v", 3),
-    "r [deg/s]": Column("r", 3),
-    "position [m]": Column("position", "digits"),
+    "run": TableColumn("run"),
+    "u [m/s]": TableColumn("u", 3),
+    "v [m/s]": TableColumn("v", 3),
+    "r [deg/s]": TableColumn("r", 3),
+    "position [m]": TableColumn("position", "digits"),
 }
 
 
@@ -44,22 +44,22 @@ class ReplayContent(PageContent):
     ahead: float
 
     @property
-    def answer(self) -> list[Sentence]:
+    def answer(self) -> list[AnswerSentence]:
         """The error over all runs."""
-        error = number(float(self.errors.set_index("run")["position"]["all"]))
-        return [Sentence(f"Position is {error} m off, RMS over all rows, {_length_words(self.ahead)}.", "errors")]
+        error = number_text(float(self.errors.set_index("run")["position"]["all"]))
+        return [AnswerSentence(f"Position is {error} m off, RMS over all rows, {_length_words(self.ahead)}.", "errors")]
 
 
 def _length_words(ahead: float) -> str:
     return f"in simulations of {ahead:g} s" if ahead else "in simulations as long as the runs"
 
 
-def replayed_motion(content: ReplayContent) -> Figure:
+def replayed_motion(content: ReplayContent) -> PageFigure:
     """Measured and replayed motion, one run at a time."""
     return motion_figure(
         content.series,
         REPLAY_INKS,
-        (LOG, REPLAYED),
+        (LOG_SERIES, REPLAYED),
         id="motion",
         title="Recorded and replayed",
         takeaway=content.answer[0].text,
@@ -69,7 +69,7 @@ def replayed_motion(content: ReplayContent) -> Figure:
     )
 
 
-def replay_errors(content: ReplayContent) -> Table:
+def replay_errors(content: ReplayContent) -> PageTable:
     """Root mean square errors, run by run."""
     title = f"Root mean square errors {_length_words(content.ahead)}"
     return frame_table("errors", title, "", content.errors.assign(r=DEGREES * content.errors["r"]), REPLAY_ERRORS)

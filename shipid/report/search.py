@@ -9,58 +9,58 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from shipid.report.content import TRIAL, Floats, ReportContent
+from shipid.report.content import TRIAL_COLUMNS, Floats, ReportContent
 from shipid.report.figure import (
     INK,
     MUTED,
     Chip,
     Control,
-    Figure,
-    axis,
-    category,
-    escaped,
+    PageFigure,
+    category_colour,
+    escape_name,
     even_places,
-    line,
     log_axis,
-    plot,
+    make_axis,
+    make_line,
+    make_plot,
 )
 from shipid.report.section import Section
-from shipid.report.selection import sizes
-from shipid.report.tables import Cell, Column, Table, frame_table, number_cell, with_cells, word_cell
-from shipid.report.wording import counted, duration, fixed, number, short
+from shipid.report.selection import shown_sizes
+from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, number_cell, with_cells, word_cell
+from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, short_text
 
 MOST_DOTS = 1200  # in one panel: more hide each other
 MOST_CHOSEN = 200
-BINS = 9  # of the middle line
-WIDE = 3.0  # largest / smallest value from which an axis is logarithmic
+MEDIAN_BINS = 9  # of the middle line
+WIDE_RANGE = 3.0  # largest / smallest value from which an axis is logarithmic
 MOST_DECADES = 4.0  # with a tick each: more have no room
-CEILING = 4.0  # times the best of the cell: farther off is drawn here
-FAILED = CEILING * 1.25  # where diverged trials lie
+HIGHEST_RATIO = 4.0  # times the best of the cell: farther off is drawn here
+DIVERGED_RATIO = HIGHEST_RATIO * 1.25  # where diverged trials lie
 HYPERPARAMETER_UNITS = {"delays": "s"}  # others have none
 # The kinds of memory that a trial may have, by number.
-MEMORIES = (
+MEMORY_WORDS = (
     "none", "the error of the physics", "that and history", "estimates of the observer", "everything",
     "history", "the error of the physics and estimates of the observer", "history and estimates of the observer",
 )  # fmt: skip
-STATES = {  # what a trial came to -> its name in the legend, marker and colour; all but the first are drawn larger
+STATES_OF_TRIALS = {  # what a trial came to -> its name in the legend, marker and colour; all but the first are drawn larger
     "complete": ("trial", "circle", MUTED),
-    "stopped": ("stopped early", "triangle-up", category(4)),
+    "stopped": ("stopped early", "triangle-up", category_colour(4)),
     "diverged": ("diverged", "x", "var(--bad)"),
-    "chosen": ("chosen", "diamond", category(0)),
+    "chosen": ("chosen", "diamond", category_colour(0)),
 }
 
 
-def search(content: ReportContent) -> Figure | None:
+def search_figure(content: ReportContent) -> PageFigure | None:
     """Error of the trials over each searched hyperparameter; None without trials or without any."""
-    names, frame = searched(content), _with_ratio(content.trials)
+    names, frame = searched_names(content), _with_ratio(content.trials)
     if not names or frame.empty:
         return None
-    counts = sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
+    counts = shown_sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
     early = "triangles are those that a part of the windows judged, and that were not among the best; "
     thinned = f"of many, at most {MOST_DOTS + MOST_CHOSEN:,} are drawn in a panel; "
     tried = sorted({int(kind) for kind in frame.memory.dropna()}) if "memory" in names else []
-    memories = f" Memory: {', '.join(f'{kind} {MEMORIES[kind]}' for kind in tried)}." if tried else ""
-    return Figure(
+    memories = f" Memory: {', '.join(f'{kind} {MEMORY_WORDS[kind]}' for kind in tried)}." if tried else ""
+    return PageFigure(
         id="search",
         title="Trials of the search",
         takeaway=_takeaway_search(frame, names),
@@ -68,7 +68,7 @@ def search(content: ReportContent) -> Figure | None:
         + (thinned if len(frame) > MOST_DOTS + MOST_CHOSEN else "")
         + (early if frame.state.eq("stopped").any() else "")
         + "diamonds are those whose networks the cell uses; those beyond "
-        f"{CEILING:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
+        f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
         "that have a value. Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
         f"what rises or falls throughout, not an optimum in the middle.{memories}",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
@@ -80,27 +80,27 @@ def search(content: ReportContent) -> Figure | None:
         chips=[
             *(
                 Chip(f"state:{state}", word, colour, "none", symbol=symbol)
-                for state, (word, symbol, colour) in STATES.items()
+                for state, (word, symbol, colour) in STATES_OF_TRIALS.items()
                 if state == "chosen" or frame.state.eq(state).any()
             ),
             Chip("median", "median", INK),
         ],
-        captions=[_caption(frame, name) for name in names],
+        captions=[_correlation_words(frame, name) for name in names],
     )
 
 
-def searched(content: ReportContent) -> list[str]:
+def searched_names(content: ReportContent) -> list[str]:
     """Names of the searched hyperparameters: further columns of the trials that take more than one value."""
     frame = content.trials
-    return [str(name) for name in frame.columns if name not in TRIAL and frame[name].nunique() > 1]
+    return [str(name) for name in frame.columns if name not in TRIAL_COLUMNS and frame[name].nunique() > 1]
 
 
-def _title(name: str) -> str:
+def _hyperparameter_title(name: str) -> str:
     """Name of a hyperparameter in words, with its unit; most have none."""
     return f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
 
 
-def importance(frame: pd.DataFrame, name: str) -> float:
+def trial_rank_correlation(frame: pd.DataFrame, name: str) -> float:
     """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
     cells = frame[frame.value.notna() & frame[name].notna() & frame.cell.notna()].groupby("cell")
     cell, counts = cells.ngroup().to_numpy(), cells.size().to_numpy()
@@ -123,43 +123,45 @@ def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.
     others, best = frame[~chosen], frame[chosen]
     others, best = others.iloc[even_places(len(others), MOST_DOTS)], best.iloc[even_places(len(best), MOST_CHOSEN)]
     unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-    for state, (_, symbol, colour) in STATES.items():
+    for state, (_, symbol, colour) in STATES_OF_TRIALS.items():
         mine = best if state == "chosen" else others[others.state == state]
         size, shade = (4, 0.45) if state == "complete" else (6, 0.7)
         marker = {"symbol": symbol, "size": size, "color": colour, "opacity": shade}
         known = "" if state == "diverged" else ", %{y:.2f} times the best of its cell"
-        hover = f"{state}: {escaped(name.replace('_', ' '))} %{{x:.3g}}{unit}{known}"
-        y = mine.ratio.fillna(FAILED).where(mine.ratio.isna(), mine.ratio.clip(upper=CEILING)).round(3)
-        traces.append(line(state, mine[name], y, [f"state:{state}"], mode="markers", marker=marker, hover=hover))
-    middle = _medians(frame[frame.ratio.notna()], name)
+        hover = f"{state}: {escape_name(name.replace('_', ' '))} %{{x:.3g}}{unit}{known}"
+        y = mine.ratio.fillna(DIVERGED_RATIO).where(mine.ratio.isna(), mine.ratio.clip(upper=HIGHEST_RATIO)).round(3)
+        traces.append(make_line(state, mine[name], y, [f"state:{state}"], mode="markers", marker=marker, hover=hover))
+    middle = _median_ratios(frame[frame.ratio.notna()], name)
     ink = {"color": INK, "width": 2.5}
-    traces.insert(3, line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))
-    ticks = {1: "1", 1.5: "1.5", 2: "2", 3: "3", CEILING: f"≥{CEILING:g}", FAILED: "div."}
+    traces.insert(3, make_line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))
+    ticks = {1: "1", 1.5: "1.5", 2: "2", 3: "3", HIGHEST_RATIO: f"≥{HIGHEST_RATIO:g}", DIVERGED_RATIO: "div."}
     y_axis: dict[str, Any] = {
-        "range": [-0.02, math.log10(FAILED) + 0.04],
+        "range": [-0.02, math.log10(DIVERGED_RATIO) + 0.04],
         "tickvals": list(ticks),
         "ticktext": list(ticks.values()),
     }
-    return plot(traces, _axis_of_values(name, every), log_axis("error / best of cell [1]", **y_axis))
+    return make_plot(traces, _axis_of_values(name, every), log_axis("error / best of cell [1]", **y_axis))
 
 
-def _medians(frame: pd.DataFrame, name: str) -> Floats:
-    """Median ratio per value of a hyperparameter, or of `BINS` parts of them where there are many: (n, 2)."""
+def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
+    """Median ratio per value of a hyperparameter, or of `MEDIAN_BINS` parts of them where there are many: (n, 2)."""
     values = frame[name].astype(float)
     if values.nunique() < 2:
         return np.empty((0, 2))
-    groups = values if values.nunique() <= BINS else values.rank(pct=True).mul(BINS).apply(np.ceil)
+    groups = values if values.nunique() <= MEDIAN_BINS else values.rank(pct=True).mul(MEDIAN_BINS).apply(np.ceil)
     medians = pd.DataFrame({"x": values, "y": frame.ratio}).groupby(groups).median().sort_values("x")
-    points: Floats = np.minimum(medians.to_numpy(dtype=float), [np.inf, CEILING])
+    points: Floats = np.minimum(medians.to_numpy(dtype=float), [np.inf, HIGHEST_RATIO])
     return points
 
 
 def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     """Axis of a hyperparameter: yes and no, logarithmic where its values are factors apart, or linear."""
-    low, high, title = float(every.min()), float(every.max()), escaped(_title(name))
+    low, high, title = float(every.min()), float(every.max()), escape_name(_hyperparameter_title(name))
     if _yes_or_no(every):
-        return axis(escaped(name.replace("_", " ")), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"])
-    if low > 0 and high / low > WIDE:
+        return make_axis(
+            escape_name(name.replace("_", " ")), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"]
+        )
+    if low > 0 and high / low > WIDE_RANGE:
         first, last = math.log10(low), math.log10(high)
         room, steps = 0.04 * (last - first), (1,) if last - first > 1.5 else (1, 2, 3, 5)
         x = log_axis(title, steps, range=[first - room, last + room])
@@ -168,12 +170,12 @@ def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     room, counts = 0.04 * (high - low), sorted(set(every.dropna()))
     whole = len(counts) <= 6 and all(count == round(count) for count in counts)
     ticks = {"tickvals": counts} if whole else {"nticks": 6}
-    return axis(title, range=[low - room, high + room], **ticks)
+    return make_axis(title, range=[low - room, high + room], **ticks)
 
 
-def _caption(frame: pd.DataFrame, name: str) -> str:
-    correlation = importance(frame, name)
-    return f"rank correlation {fixed(correlation, 2)}" if math.isfinite(correlation) else "no rank correlation"
+def _correlation_words(frame: pd.DataFrame, name: str) -> str:
+    correlation = trial_rank_correlation(frame, name)
+    return f"rank correlation {fixed_text(correlation, 2)}" if math.isfinite(correlation) else "no rank correlation"
 
 
 def _yes_or_no(values: pd.Series[float]) -> bool:
@@ -183,31 +185,35 @@ def _yes_or_no(values: pd.Series[float]) -> bool:
 def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
     """Return the median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
     if frame.ratio.isna().all():
-        return f"None of {counted(len(frame), 'trial')} ended with a value."
-    text = f"The median error of a trial is {number(float(frame.ratio.median()))} times that of the best of its cell"
-    correlations = {name: value for name in names if math.isfinite(value := importance(frame, name))}
+        return f"None of {counted_text(len(frame), 'trial')} ended with a value."
+    text = (
+        f"The median error of a trial is {number_text(float(frame.ratio.median()))} times that of the best of its cell"
+    )
+    correlations = {name: value for name in names if math.isfinite(value := trial_rank_correlation(frame, name))}
     if correlations:
         most = max(correlations, key=lambda name: abs(correlations[name]))
-        text += f"; the error goes most with {most.replace('_', ' ')}, rank correlation {fixed(correlations[most], 2)}"
+        text += (
+            f"; the error goes most with {most.replace('_', ' ')}, rank correlation {fixed_text(correlations[most], 2)}"
+        )
     return f"{text}."
 
 
-def search_table(content: ReportContent) -> Table:
+def search_table(content: ReportContent) -> PageTable:
     """Sum the trials up by N_D."""
-    frame, names = content.trials, searched(content)
+    frame, names = content.trials, searched_names(content)
     states = pd.crosstab(frame.N_D, frame.state).reindex(columns=["stopped", "diverged"], fill_value=0)
     groups = frame.groupby("N_D", sort=True)
     shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), seconds=groups.seconds.sum())
     shown = shown.assign(epochs=groups.epochs.sum()) if frame.epochs.any() else shown
     columns = {
-        "N_D [1]": Column("N_D", 0),
-        "cells [1]": Column("cells", 0),
-        "trials [1]": Column("trials", 0),
-        "stopped [1]": Column("stopped", 0),
-        "diverged [1]": Column("diverged", 0),
-        "epochs [1]": Column("epochs", 0),
-        "time [s]": Column("seconds", 1),
-        "time per cell [s]": Column("each", 1),
+        "N_D [1]": TableColumn("N_D", 0),
+        "cells [1]": TableColumn("cells", 0),
+        "trials [1]": TableColumn("trials", 0),
+        "stopped [1]": TableColumn("stopped", 0),
+        "diverged [1]": TableColumn("diverged", 0),
+        "epochs [1]": TableColumn("epochs", 0),
+        "time [s]": TableColumn("seconds", 1),
+        "time per cell [s]": TableColumn("each", 1),
     }
     chosen = frame[frame.chosen.astype(bool)]
     tried = []
@@ -215,30 +221,34 @@ def search_table(content: ReportContent) -> Table:
         share = _yes_or_no(frame[name])
         values = [chosen[name][chosen.N_D.eq(size)].astype(float).dropna() for size in shown.index]
         shown = with_cells(shown, **{f"chosen {name}": [_choice_cell(some, share) for some in values]})
-        columns[f"{'share of ' if share else ''}chosen {_title(name)}"] = Column(f"chosen {name}", numeric=True)
+        columns[f"{'share of ' if share else ''}chosen {_hyperparameter_title(name)}"] = TableColumn(
+            f"chosen {name}", numeric=True
+        )
         unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        span = "yes or no" if share else f"{short(frame[name].min())} to {short(frame[name].max())}{unit}"
+        span = "yes or no" if share else f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
         tried.append(f"{name.replace('_', ' ')} {span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
-    takeaway = f"{counted(len(frame), 'trial')} in {counted(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
-    takeaway += f"{diverged} diverged; {duration(float(frame.seconds.sum()))} of training."
+    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
+    takeaway += f"{diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
     takeaway += f" Tried: {', '.join(tried)}." if tried else ""
     shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
 
 
-def _choice_cell(values: pd.Series[float], share: bool) -> Cell:
+def _choice_cell(values: pd.Series[float], share: bool) -> TableCell:
     """Smallest, middle and largest chosen value, or the share of yes."""
     if values.empty:
         return word_cell(None)
     if share:
         return number_cell(values.mean(), 2)
-    return Cell(" / ".join(short(value) for value in values.quantile([0.0, 0.5, 1.0])), float(values.median()))
+    return TableCell(
+        " / ".join(short_text(value) for value in values.quantile([0.0, 0.5, 1.0])), float(values.median())
+    )
 
 
 THE_SEARCH = Section(
     "The search",
-    draw=lambda content: (search(content), search_table(content)),
+    draw=lambda content: (search_figure(content), search_table(content)),
     needs=("trials",),
     anchors=("search", "search-table"),
 )

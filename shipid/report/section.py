@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import dataclass
 from typing import Any
 
-from shipid.report.figure import Figure
-from shipid.report.tables import Table
+from shipid.report.figure import PageFigure
+from shipid.report.tables import PageTable
 
-Item = Figure | Table
+Item = PageFigure | PageTable
 OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
 
 
@@ -33,7 +33,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnSection:
     """A section ready for the page: its id, its heading, its figures and tables."""
 
     id: str
@@ -41,12 +41,14 @@ class Drawn:
     items: Sequence[Item]
 
 
-def declared(sections: Mapping[str, Section]) -> set[str]:
+def declared_anchors(sections: Mapping[str, Section]) -> set[str]:
     """Ids that a sentence of a page with these sections may link to."""
     return {anchor for section in sections.values() for anchor in section.anchors} | set(OF_EVERY_PAGE)
 
 
-def drawn(sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None) -> list[Drawn]:
+def draw_sections(
+    sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None
+) -> list[DrawnSection]:
     """Draw the sections that have something to show, in the order of the registry.
 
     say : called with the heading of each before it is drawn.
@@ -59,7 +61,7 @@ def drawn(sections: Mapping[str, Section], content: object, say: Callable[[str],
             say(f"drawing: {section.title}")
         items = [item for item in section.draw(content) if item is not None]
         if items:
-            result.append(Drawn(name, section.title, items))
+            result.append(DrawnSection(name, section.title, items))
     return result
 
 

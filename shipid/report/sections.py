@@ -6,14 +6,14 @@ from shipid.report import bands, cells, errors_over, factors, logs, memory, meth
 from shipid.report.section import Section
 
 SECTIONS: dict[str, Section] = {
-    "results": physics_and_data.RESULTS,
-    "errors": errors_over.ERRORS,
+    "results": physics_and_data.WHAT_PHYSICS_AND_DATA_BUY,
+    "errors": errors_over.WHERE_ERRORS_GROW,
     "how-far-off": bands.HOW_FAR_OFF,
     "the-methods": methods.THE_METHODS,
     "the-past": memory.THE_PAST,
     "predictions": paths.PREDICTIONS,
     "the-models": factors.THE_MODELS,
-    "data": logs.DATA,
+    "data": logs.THE_DATA,
     "the-search": search.THE_SEARCH,
     "all-cells": cells.THE_CELLS,
 }

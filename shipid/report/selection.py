@@ -9,15 +9,24 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent, rows_in
-from shipid.report.figure import INK, MUTED, OKABE_ITO, SYMBOLS, Chip, category, colour_level
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent, rows_as_tuples
+from shipid.report.figure import INK, MARKERS, MUTED, OKABE_ITO, Chip, category_colour, colour_level
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
 FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
 SOURCE_DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
 # Of the second, third, ... model without physics: all are ink.
-FURTHER = ("cross", "circle-open", "square-open", "diamond-open", "triangle-up-open", "star", "square", "diamond")
+FURTHER_MARKERS = (
+    "cross",
+    "circle-open",
+    "square-open",
+    "diamond-open",
+    "triangle-up-open",
+    "star",
+    "square",
+    "diamond",
+)
 
 
 @dataclass(frozen=True)
@@ -29,7 +38,7 @@ class Style:
     width: float
 
 
-def spread(items: Sequence[str], count: int) -> list[str]:
+def spread_items(items: Sequence[str], count: int) -> list[str]:
     """At most `count` items at even distances, first and last included."""
     if len(items) <= count:
         return list(items)
@@ -37,7 +46,7 @@ def spread(items: Sequence[str], count: int) -> list[str]:
 
 
 @lru_cache(maxsize=4)  # every figure asks for it
-def families(content: ReportContent) -> pd.DataFrame:
+def models_by_accuracy(content: ReportContent) -> pd.DataFrame:
     """One row per model: model, family, A [m] (NaN without physics); physics by rising A, those without last.
 
     The frame is cached and shared: do not change it.
@@ -51,14 +60,14 @@ def families(content: ReportContent) -> pd.DataFrame:
 
 
 def same_physics(frame: pd.DataFrame) -> pd.Series[bool]:
-    """Which rows of `families` have the physics of one before, and another method: the same family and A."""
+    """Which rows of `models_by_accuracy` have the physics of one before, and another method: the same family and A."""
     return frame.A.notna() & frame.duplicated(["family", "A"])
 
 
 @lru_cache(maxsize=4)
 def data_driven(content: ReportContent) -> str | None:
     """Name of the model without physics, if the study has one; the first of several."""
-    frame = families(content)
+    frame = models_by_accuracy(content)
     names = frame.model[frame.family == DATA_DRIVEN]
     return None if names.empty else str(names.iloc[0])
 
@@ -78,9 +87,9 @@ def in_words(model: str) -> str:
     return f'"{model}"' if model.partition(" + ")[0] == NO_PHYSICS else model
 
 
-def middles(content: ReportContent) -> dict[str, str]:
+def middle_models(content: ReportContent) -> dict[str, str]:
     """Per family, the model of middle A; families of many members first, then by rising A."""
-    frame = families(content)
+    frame = models_by_accuracy(content)
     judged = frame.model.isin(content.models.model)
     kept = frame[frame.A.notna() & judged | (frame.family == DATA_DRIVEN)]
     groups = sorted(kept.groupby("family", sort=False), key=lambda group: -len(group[1]))
@@ -90,53 +99,53 @@ def middles(content: ReportContent) -> dict[str, str]:
     }
 
 
-def overview(content: ReportContent) -> pd.DataFrame:
-    """Rows of `families` of the models in figures of all: of many methods the one judged, and all without physics."""
-    frame = families(content)
+def overview_models(content: ReportContent) -> pd.DataFrame:
+    """Rows of `models_by_accuracy` of the models in figures of all: of many methods the one judged, and all without physics."""
+    frame = models_by_accuracy(content)
     frame = frame[frame.model.isin(content.cells.model)]
     if len(frame) > MOST_MODELS:
         frame = frame[frame.model.isin(content.models.model) | (frame.family == DATA_DRIVEN)]
     return frame.reset_index(drop=True)
 
 
-def left_out(content: ReportContent) -> str:
-    """Sentence on the models that `overview` leaves out; empty if there are none."""
-    shown, total = len(overview(content)), content.cells.model.nunique()
+def words_on_left_out(content: ReportContent) -> str:
+    """Sentence on the models that `overview_models` leaves out; empty if there are none."""
+    shown, total = len(overview_models(content)), content.cells.model.nunique()
     words = f" Of {total} models, the {shown} of the method that the study judges by and without physics are drawn."
     return words if shown < total else ""
 
 
 @lru_cache(maxsize=4)
-def exemplars(content: ReportContent) -> list[str]:
+def close_up_models(content: ReportContent) -> list[str]:
     """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation.
 
     The list is shared by all who ask: not to be changed.
     """
-    names = [str(name) for name in families(content).model]
-    middle = {*middles(content).values(), content.best}
+    names = [str(name) for name in models_by_accuracy(content).model]
+    middle = {*middle_models(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
 
 
 def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
     """Smallest and largest A [m] if models are coloured by A; None if there are few and each has a separate colour."""
-    frame = families(content)
+    frame = models_by_accuracy(content)
     physics = frame.A[frame.A.notna() & (frame.family != DATA_DRIVEN)]
     return None if len(frame) <= FEW_MODELS or physics.empty else (float(physics.min()), float(physics.max()))
 
 
 @lru_cache(maxsize=4)  # every figure asks for it
-def styles(content: ReportContent) -> Mapping[str, Style]:
+def model_styles(content: ReportContent) -> Mapping[str, Style]:
     """Style of every model: colour by A for many models, Okabe-Ito for few, thick ink for no physics."""
-    frame, span = families(content), accuracy_range(content)
+    frame, span = models_by_accuracy(content), accuracy_range(content)
     kinds = [kind for kind in pd.unique(frame.family) if kind != DATA_DRIVEN]
     result = _styles_without_physics([str(name) for name in frame.model[frame.family.eq(DATA_DRIVEN)]])
-    for index, (row, again) in enumerate(zip(rows_in(frame), same_physics(frame), strict=True)):
+    for index, (row, again) in enumerate(zip(rows_as_tuples(frame), same_physics(frame), strict=True)):
         if row.family != DATA_DRIVEN:
             # A is unknown where the physics diverged. Of several methods on one model the first marker is filled.
             known = span is not None and np.isfinite(row.A)
             shade = f"var(--scale-{colour_level(row.A, span)})" if known and span else MUTED
-            symbol = SYMBOLS[kinds.index(row.family) % len(SYMBOLS)] + "-open" * bool(span and again)
-            result[str(row.model)] = Style(category(index) if span is None else shade, symbol, 2.0)
+            symbol = MARKERS[kinds.index(row.family) % len(MARKERS)] + "-open" * bool(span and again)
+            result[str(row.model)] = Style(category_colour(index) if span is None else shade, symbol, 2.0)
     return result
 
 
@@ -146,19 +155,19 @@ def close_styles(content: ReportContent) -> Mapping[str, Style]:
 
     When all colours are used, they come again with other markers: 36 models are told apart.
     """
-    of_family = dict(zip(*families(content)[["model", "family"]].to_numpy().T, strict=True))
-    physics = [name for name in exemplars(content) if of_family[name] != DATA_DRIVEN]
-    result = _styles_without_physics([name for name in exemplars(content) if name not in physics])
+    of_family = dict(zip(*models_by_accuracy(content)[["model", "family"]].to_numpy().T, strict=True))
+    physics = [name for name in close_up_models(content) if of_family[name] != DATA_DRIVEN]
+    result = _styles_without_physics([name for name in close_up_models(content) if name not in physics])
     for index, name in enumerate(physics):
-        symbol = SYMBOLS[(index + index // len(OKABE_ITO)) % len(SYMBOLS)]
-        result[name] = Style(category(index), symbol, 2.0)
+        symbol = MARKERS[(index + index // len(OKABE_ITO)) % len(MARKERS)]
+        result[name] = Style(category_colour(index), symbol, 2.0)
     return result
 
 
 def _styles_without_physics(names: Sequence[str]) -> dict[str, Style]:
     """Ink: thick for the first model without physics, thin and with other markers for others."""
-    looks = [Style(INK, "x", 3.0), *(Style(INK, symbol, 1.5) for symbol in FURTHER)]
-    return {name: looks[min(i, 1 + (i - 1) % len(FURTHER))] for i, name in enumerate(names)}
+    looks = [Style(INK, "x", 3.0), *(Style(INK, symbol, 1.5) for symbol in FURTHER_MARKERS)]
+    return {name: looks[min(i, 1 + (i - 1) % len(FURTHER_MARKERS))] for i, name in enumerate(names)}
 
 
 def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping[str, str] | None = None) -> list[Chip]:
@@ -170,10 +179,10 @@ def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping
     ]
 
 
-def sizes(values: pd.Series[int], count: int = 3) -> list[int]:
+def shown_sizes(values: pd.Series[int], count: int = 3) -> list[int]:
     """Small, middle and large N_D among those present; physics alone (N_D = 0) counts only if there is nothing else."""
     present = sorted({int(value) for value in values if value > 0}) or [0]
-    return [int(size) for size in spread([str(size) for size in present], count)]
+    return [int(size) for size in spread_items([str(size) for size in present], count)]
 
 
 def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.DataFrame:
@@ -181,14 +190,14 @@ def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.Data
     return frame.groupby(by, sort=True, as_index=False)[values].mean()
 
 
-def trained(content: ReportContent) -> pd.DataFrame:
+def errors_over_seeds(content: ReportContent) -> pd.DataFrame:
     """Cells that gave a result, by model and N_D: mean over seeds of H, H_90, rms [m] and the number of seeds."""
     good = content.cells[content.cells.status.eq("ok") & content.cells.H.notna()]
     means = over_seeds(good, ["model", "N_D"], ["H", "H_90", "rms"])
     return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
 
 
-def thinned(lines: Sequence[Floats], tolerance: float) -> list[Indices]:
+def thin_lines(lines: Sequence[Floats], tolerance: float) -> list[Indices]:
     """Find the points of each line, by index, that differ visibly on a screen (Ramer 1972; Douglas and Peucker 1973).
 
     Parameters

@@ -10,32 +10,32 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import PageContent, Sentence, rows_in
+from shipid.report.content import AnswerSentence, PageContent, rows_as_tuples
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.tables import (
-    Cell,
-    Column,
-    Table,
+    PageTable,
+    TableCell,
+    TableColumn,
     decimals_for_median,
     frame_table,
     number_cell,
     with_cells,
     word_cell,
 )
-from shipid.report.wording import fixed, listed
+from shipid.report.wording import fixed_text, listed_names
 from shipid.units import digit_decimals
 
 GROUP_ERRORS = {
-    "group": Column("group"),
-    "turning to": Column("side"),
-    "rows": Column("rows", 0),
-    "u [m/s]": Column("u", 3),
-    "v [m/s]": Column("v", 3),
-    "r [deg/s]": Column("r", 3),
-    "turning [%]": Column("turning", 1),
-    "standard error": Column("error", 1),
+    "group": TableColumn("group"),
+    "turning to": TableColumn("side"),
+    "rows": TableColumn("rows", 0),
+    "u [m/s]": TableColumn("u", 3),
+    "v [m/s]": TableColumn("v", 3),
+    "r [deg/s]": TableColumn("r", 3),
+    "turning [%]": TableColumn("turning", 1),
+    "standard error": TableColumn("error", 1),
 }
 
 
@@ -55,33 +55,33 @@ class StructuresContent(PageContent):
     level: float | None
 
     @property
-    def answer(self) -> list[Sentence]:
+    def answer(self) -> list[AnswerSentence]:
         """The structure chosen, and the sentences on it."""
         words = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in self.sentences]
-        return [Sentence(text, "structures" if i == 0 else "") for i, text in enumerate(words)]
+        return [AnswerSentence(text, "structures" if i == 0 else "") for i, text in enumerate(words)]
 
 
-def structures_table(content: StructuresContent) -> Table:
+def structures_table(content: StructuresContent) -> PageTable:
     """Mean errors on runs that the fit has not seen, best first, with paired intervals."""
     frame, places = content.table, decimals_for_median(content.table[["position", "test"]])
     between = [
-        Cell(f"{fixed(row.low, places)} … {fixed(row.high, places)}", row.low)
+        TableCell(f"{fixed_text(row.low, places)} … {fixed_text(row.high, places)}", row.low)
         if np.isfinite(row.low + row.high)
         else number_cell(None, 0)
-        for row in rows_in(frame)
+        for row in rows_as_tuples(frame)
     ]
     columns = {
-        "structure": Column("structure"),
-        "numbers": Column("numbers", 0),
-        "u [m/s]": Column("u", 3),
-        "v [m/s]": Column("v", 3),
-        "r [deg/s]": Column("r", 3),
-        "position [m]": Column("position", places),
-        "above the least [m]": Column("more", places),
-        "95 % interval [m]": Column("between", numeric=True),
-        "test runs [m]": Column("test", places),
-        "not worse": Column("equal"),
-        "why missing": Column("note"),
+        "structure": TableColumn("structure"),
+        "numbers": TableColumn("numbers", 0),
+        "u [m/s]": TableColumn("u", 3),
+        "v [m/s]": TableColumn("v", 3),
+        "r [deg/s]": TableColumn("r", 3),
+        "position [m]": TableColumn("position", places),
+        "above the least [m]": TableColumn("more", places),
+        "95 % interval [m]": TableColumn("between", numeric=True),
+        "test runs [m]": TableColumn("test", places),
+        "not worse": TableColumn("equal"),
+        "why missing": TableColumn("note"),
     }
     equal = frame["equal"].map({True: "yes", False: "no"})
     shown = with_cells(frame.assign(r=DEGREES * frame["r"], equal=equal), between=between)
@@ -91,7 +91,7 @@ def structures_table(content: StructuresContent) -> Table:
     return frame_table("structures", title, takeaway, shown, columns)
 
 
-def runs_table(content: StructuresContent) -> Table:
+def runs_table(content: StructuresContent) -> PageTable:
     """Error of the position, run by run."""
     known = content.errors[content.errors["run"] != "all"]
     names, places = _structures_in(content, known), decimals_for_median(content.errors["position"])
@@ -99,7 +99,9 @@ def runs_table(content: StructuresContent) -> Table:
     order = known[["set", "run"]].drop_duplicates()
     shown = order.merge(wide, how="left")
     shown = shown.assign(set=np.where(shown["set"].eq("test"), "test", "held out"))
-    columns = {"run": Column("run"), "set": Column("set")} | {f"{name} [m]": Column(name, places) for name in names}
+    columns = {"run": TableColumn("run"), "set": TableColumn("set")} | {
+        f"{name} [m]": TableColumn(name, places) for name in names
+    }
     return frame_table("runs", "Position, run by run", "Root mean square errors.", shown, columns)
 
 
@@ -108,7 +110,7 @@ def _structures_in(content: StructuresContent, frame: pd.DataFrame) -> list[str]
     return [str(name) for name in content.table["structure"] if name in set(frame["structure"])]
 
 
-def structure_manoeuvres(content: StructuresContent) -> Table:
+def structure_manoeuvres(content: StructuresContent) -> PageTable:
     """Measures of standard manoeuvres by structure, the spread between structures beside the interval within one."""
     known = content.manoeuvres[content.manoeuvres["measure"] != ""]
     names, place = _structures_in(content, known), ["manoeuvre", "measure"]
@@ -122,24 +124,28 @@ def structure_manoeuvres(content: StructuresContent) -> Table:
     cautions = {
         why: [name for name, own in content.cautions.items() if own == why] for why in content.cautions.values()
     }
-    words = [f"{listed(which, len(which))}: {why}" for why, which in cautions.items() if why]
+    words = [f"{listed_names(which, len(which))}: {why}" for why, which in cautions.items() if why]
     takeaway += f" Intervals may be too narrow. {'; '.join(words)}." if words else ""
-    columns = {name: Column(name) for name in place} | {name: Column(name, numeric=True) for name in names}
-    columns |= {"between structures": Column("spread", 3), "within one": Column("width", 3), "unit": Column("unit")}
+    columns = {name: TableColumn(name) for name in place} | {name: TableColumn(name, numeric=True) for name in names}
+    columns |= {
+        "between structures": TableColumn("spread", 3),
+        "within one": TableColumn("width", 3),
+        "unit": TableColumn("unit"),
+    }
     return frame_table("manoeuvres", "Standard manoeuvres in calm deep water", takeaway, shown, columns)
 
 
-def _measure_cell(row: Mapping[Any, Any]) -> Cell:
+def _measure_cell(row: Mapping[Any, Any]) -> TableCell:
     """A measure with its interval, where there is one."""
     value, low, high = (float(row[name]) for name in ("value", "low", "high"))
     if np.isnan(value):
         return word_cell(None)
     places = digit_decimals(value, 4)
-    ends = "" if np.isnan(low + high) else f" ({fixed(low, places)} … {fixed(high, places)})"
-    return Cell(fixed(value, places) + ends, value)
+    ends = "" if np.isnan(low + high) else f" ({fixed_text(low, places)} … {fixed_text(high, places)})"
+    return TableCell(fixed_text(value, places) + ends, value)
 
 
-def group_errors(frame: pd.DataFrame, takeaway: str) -> Table | None:
+def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable | None:
     """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`; None without rows."""
     if frame.empty:
         return None

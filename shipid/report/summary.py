@@ -7,43 +7,46 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from shipid.report.cells import cells_table
-from shipid.report.content import ReportContent, Sentence
+from shipid.report.content import AnswerSentence, ReportContent
 from shipid.report.errors_over import error_by_kind
 from shipid.report.factors import models_table
-from shipid.report.page import LEAD, write_whole
-from shipid.report.wording import CONSTANT, metres
+from shipid.report.page import FIRST_SENTENCES, write_whole
+from shipid.report.wording import CONSTANT_MOTION, metres_text
 
 
-def summary(content: ReportContent) -> str:
+def summary_text(content: ReportContent) -> str:
     """Answer, findings, errors of constant u, v, r, models, cells and provenance as Markdown."""
-    mean, p90, rms = (metres(content.naive[name]) for name in ("mean", "p90", "rms"))
-    more, findings = content.answer[LEAD:], [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings]
+    mean, p90, rms = (metres_text(content.naive[name]) for name in ("mean", "p90", "rms"))
+    more, findings = (
+        content.answer[FIRST_SENTENCES:],
+        [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings],
+    )
     parts = [
         f"# {_one_line(content.title)}",
-        _bullets(content.answer[:LEAD]),
-        *(["## In detail", _bullets(more)] if more else []),
-        *(["## Findings", _grid(["", "claim", "verdict", "evidence"], findings)] if findings else []),
-        f"## {CONSTANT.capitalize()}",
+        _bullet_list(content.answer[:FIRST_SENTENCES]),
+        *(["## In detail", _bullet_list(more)] if more else []),
+        *(["## Findings", _markdown_table(["", "claim", "verdict", "evidence"], findings)] if findings else []),
+        f"## {CONSTANT_MOTION.capitalize()}",
         f"Mean error {mean}, 90th percentile {p90}, root mean square {rms}.",
     ]
     for table in filter(None, (error_by_kind(content), models_table(content), cells_table(content))):
         rows = [[cell.text for cell in row] for row in table.rows]
-        parts += [f"## {table.title}", _one_line(table.takeaway), _grid(table.columns, rows)]
-    parts += ["## Provenance", _grid(["", ""], content.provenance.items())]
+        parts += [f"## {table.title}", _one_line(table.takeaway), _markdown_table(table.columns, rows)]
+    parts += ["## Provenance", _markdown_table(["", ""], content.provenance.items())]
     parts.append("\n".join(f"    {line}" for line in content.command.splitlines()))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def write_summary(content: ReportContent, file: Path) -> Path:
     """Write the summary as Markdown; returns the file. Raises ResultError if it cannot."""
-    return write_whole(summary(content), file)
+    return write_whole(summary_text(content), file)
 
 
-def _bullets(sentences: Sequence[Sentence]) -> str:
+def _bullet_list(sentences: Sequence[AnswerSentence]) -> str:
     return "\n".join(f"- {_one_line(sentence.text)}" for sentence in sentences)
 
 
-def _grid(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def _markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     lines = [list(map(_one_line, line)) for line in (columns, ["---"] * len(columns), *rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) if len(lines) > 2 else ""
 

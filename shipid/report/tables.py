@@ -11,14 +11,14 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from shipid.report.wording import fixed
+from shipid.report.wording import fixed_text
 
-LONG = 30  # characters that a column shows of a text
+LONG_TEXT = 30  # characters that a column shows of a text
 MISSING = 1e300  # sorts after every number (page.js knows it)
 
 
 @dataclass(frozen=True)
-class Cell:
+class TableCell:
     """Text of a table cell and the key it is sorted by; `bad` marks a cell without a result."""
 
     text: str
@@ -27,7 +27,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """A table of the page; numeric columns are set flush right."""
 
     id: str
@@ -35,11 +35,11 @@ class Table:
     takeaway: str
     columns: Sequence[str]
     numeric: Sequence[bool]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Sequence[TableCell]]
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A column of a table.
 
     Parameters
@@ -56,8 +56,8 @@ class Column:
 
 
 def frame_table(
-    id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, Column], *, like: str = ""
-) -> Table:
+    id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, TableColumn], *, like: str = ""
+) -> PageTable:
     """Make a table of a frame.
 
     Parameters
@@ -67,39 +67,39 @@ def frame_table(
     like : column whose lengths give the decimals of all columns of lengths, if not each its own.
     """
     known = {heading: column for heading, column in columns.items() if column.source in frame}
-    places = {column.source: _places(frame, column, like) for column in known.values()}
+    places = {column.source: _decimals_of_column(frame, column, like) for column in known.values()}
     rows = [
-        [_cell(record[column.source], places[column.source]) for column in known.values()]
+        [_cell_of_value(record[column.source], places[column.source]) for column in known.values()]
         for record in frame.to_dict("records")
     ]
     numeric = [column.decimals is not None if column.numeric is None else column.numeric for column in known.values()]
-    return Table(id, title, takeaway, list(known), numeric, rows)
+    return PageTable(id, title, takeaway, list(known), numeric, rows)
 
 
-def _places(frame: pd.DataFrame, column: Column, like: str) -> int | None:
+def _decimals_of_column(frame: pd.DataFrame, column: TableColumn, like: str) -> int | None:
     if column.decimals == "length":
         return decimals_for_median(frame[like or column.source], 2, 2, 6)
     return decimals_for_median(frame[column.source]) if isinstance(column.decimals, str) else column.decimals
 
 
-def _cell(value: Any, places: int | None) -> Cell:
-    if isinstance(value, Cell):
+def _cell_of_value(value: Any, places: int | None) -> TableCell:
+    if isinstance(value, TableCell):
         return value
     return word_cell(value) if places is None else number_cell(value, places)
 
 
-def with_cells(frame: pd.DataFrame, **cells: Sequence[Cell]) -> pd.DataFrame:
+def with_cells(frame: pd.DataFrame, **cells: Sequence[TableCell]) -> pd.DataFrame:
     """The frame with columns of cells."""
     return frame.assign(**{name: pd.Series(list(some), frame.index, object) for name, some in cells.items()})
 
 
-def cell_html(cell: Cell, numeric: bool, first: bool) -> Markup:
+def cell_html(cell: TableCell, numeric: bool, first: bool) -> Markup:
     """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text.
 
     Of a long text the begin is shown. A long name is shown whole: names of models often differ at the end alone.
     """
-    long = len(cell.text) > LONG
-    name = long and (" + " in cell.text or max(map(len, cell.text.split()), default=0) > LONG)
+    long = len(cell.text) > LONG_TEXT
+    name = long and (" + " in cell.text or max(map(len, cell.text.split()), default=0) > LONG_TEXT)
     classes = " ".join(["words"] * (not numeric) + (["bad"] if cell.bad else ["name" if name else "long"] * long))
     read, key = cell.text.lower(), f"{cell.key:.6g}" if isinstance(cell.key, float | int) else cell.key
     given = {"scope": "row" if first else "", "class": classes, "data-key": "" if key == read else key}
@@ -109,16 +109,16 @@ def cell_html(cell: Cell, numeric: bool, first: bool) -> Markup:
     return Markup(f"<{tag}{attributes}>{escape(cell.text)}</{tag}>")  # all that is not ours is escaped
 
 
-def word_cell(value: object, *, bad: bool = False) -> Cell:
+def word_cell(value: object, *, bad: bool = False) -> TableCell:
     """Make a cell of words; a missing value is a dash."""
     missing = value is None or value is pd.NA or (isinstance(value, float) and math.isnan(value))
-    return Cell("–" if missing else str(value), "" if missing else str(value).lower(), bad)
+    return TableCell("–" if missing else str(value), "" if missing else str(value).lower(), bad)
 
 
-def number_cell(value: object, decimals: int) -> Cell:
+def number_cell(value: object, decimals: int) -> TableCell:
     """Make a cell with a number of fixed decimals, so that points align; NaN is a dash and sorts last."""
     amount = math.nan if value is None or value is pd.NA else float(str(value))
-    return Cell(fixed(amount, decimals), amount) if math.isfinite(amount) else Cell("–", MISSING)
+    return TableCell(fixed_text(amount, decimals), amount) if math.isfinite(amount) else TableCell("–", MISSING)
 
 
 def decimals_for_median(values: pd.DataFrame | pd.Series[Any], digits: int = 3, least: int = 0, most: int = 3) -> int:

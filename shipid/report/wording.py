@@ -9,29 +9,29 @@ from collections.abc import Sequence
 from shipid import units
 from shipid.units import length_decimals, plural_word
 
-CONSTANT = "constant u, v, r"
+CONSTANT_MOTION = "constant u, v, r"
 """Name of the path that no model and no data are needed for: the motion at the instant goes on."""
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def number(value: float) -> str:
+def number_text(value: float) -> str:
     """Three digits, two decimals at most, and two digits below 0.1: 0.0083, 0.83, 12.4, 131; NaN is a dash."""
     if not math.isfinite(value):
         return "–"
-    return fixed(value, _decimals(value))
+    return fixed_text(value, _decimals(value))
 
 
 def _decimals(value: float) -> int:
     return 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else length_decimals(value)
 
 
-def fixed(value: float, decimals: int) -> str:
+def fixed_text(value: float, decimals: int) -> str:
     """Write a finite number with so many decimals, a true minus sign and no minus zero."""
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
-def short(value: float) -> str:
+def short_text(value: float) -> str:
     """Two digits, never with an exponent between 1e-6 and 1e6: 13, 0.51, 0.00001."""
     if not math.isfinite(value) or value == 0:
         return "0" if value == 0 else "–"
@@ -44,7 +44,7 @@ def short(value: float) -> str:
     )
 
 
-def scientific(value: float, digits: int = 4) -> str:
+def scientific_text(value: float, digits: int = 4) -> str:
     """So many digits, with a power of ten where the number is very large or small: 803, 1.175 × 10⁵, 10⁻⁶."""
     text = f"{value:.{digits}g}".replace("-", "−")
     front, _, power = text.partition("e")
@@ -52,59 +52,61 @@ def scientific(value: float, digits: int = 4) -> str:
     return f"{'' if front == '1' else f'{front} × '}10{raised.translate(RAISED)}" if raised else text
 
 
-def shortened(name: str, most: int) -> str:
+def shorten_name(name: str, most: int) -> str:
     """Name of at most so many characters, its middle left out: names that differ mostly do so at an end."""
     return name if len(name) <= most else f"{name[: most // 2 - 1]}…{name[most // 2 - most :]}"
 
 
-def metres(value: float) -> str:
+def metres_text(value: float) -> str:
     """Write a length with its unit."""
-    return f"{number(value)} m"
+    return f"{number_text(value)} m"
 
 
 def difference_text(value: float, low: float, high: float) -> str:
     """Write a difference [m] and its interval with the decimals of the greatest of them: it may be nearly 0."""
     if not math.isfinite(low):
-        return f"{metres(value)}, no interval from fewer than five runs"
+        return f"{metres_text(value)}, no interval from fewer than five runs"
     places = _decimals(max(map(abs, (value, low, high))))
-    return f"{fixed(value, places)} m [{fixed(low, places)}, {fixed(high, places)}]"
+    return f"{fixed_text(value, places)} m [{fixed_text(low, places)}, {fixed_text(high, places)}]"
 
 
-def ends(low: float, high: float) -> str:
+def ends_text(low: float, high: float) -> str:
     """Write two lengths [m] as `low to high`, with the decimals of the greater."""
     places = _decimals(max(abs(low), abs(high)))
-    return f"{fixed(low, places)} to {fixed(high, places)}"
+    return f"{fixed_text(low, places)} to {fixed_text(high, places)}"
 
 
-def distance(value: float) -> str:
+def distance_text(value: float) -> str:
     """Write a distance between places: metres, or kilometres from 1,000 m on."""
     return f"{value / 1000:.1f} km" if value >= 1000 else f"{value:.0f} m"
 
 
-def listed(names: Sequence[str], limit: int = 4) -> str:
+def listed_names(names: Sequence[str], limit: int = 4) -> str:
     """Join as `a, b and c`; what exceeds the limit is counted."""
     shown = [*names] if len(names) <= limit else [*names[: limit - 1], f"{len(names) - limit + 1} more"]
     return units.join_names(shown) or "none"
 
 
-def bound(text: str) -> str:
+def set_sentence(text: str) -> str:
     """Write a sentence as a page sets it: signs, powers of ten, a space before %, none that breaks before a unit."""
-    text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _power, text.replace("+-", "±").replace("->", "→"))
+    text = re.sub(
+        r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _raised_power, text.replace("+-", "±").replace("->", "→")
+    )
     text = re.sub(r"`([^`]+)`", r"“\1”", text)
     text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
     return re.sub(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
 
 
-def _power(match: re.Match[str]) -> str:
+def _raised_power(match: re.Match[str]) -> str:
     return f"{match[1]} × 10{str(int(match[2])).translate(RAISED)}"
 
 
-def counted(count: int, noun: str) -> str:
+def counted_text(count: int, noun: str) -> str:
     """`1 run`, `3 runs`."""
     return f"{count:,} {plural_word(count, noun)}"
 
 
-def duration(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Write a duration [s] as text in s, min or h."""
     if seconds >= 7200:
         return f"{seconds / 3600:.1f} h"

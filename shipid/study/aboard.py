@@ -19,7 +19,7 @@ from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import check_columns, missing_columns
 from shipid.logs.dates import format_span
 from shipid.predictor import Predictor
-from shipid.report.content import Line
+from shipid.report.content import SummaryLine
 from shipid.study.apply import BandSettings, Forecast, instants_along, predict_instants, read_or_import, tables_along
 from shipid.study.store import read_predictor
 from shipid.units import join_names, length_text, level_text, percent_text, plural_word
@@ -162,28 +162,28 @@ def write_replay_points(played: Replay, file: Path) -> None:
     write_table(file, played.points.merge(kept, on=["run", "t"], how="left"))
 
 
-def replay_summary(played: Replay) -> list[Line]:
+def replay_summary(played: Replay) -> list[SummaryLine]:
     """Summary of a replay, as lines that say what they are about."""
     instants, points = played.instants, played.points
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     early = f"{played.skipped} {plural_word(played.skipped, 'instant')} before there was a past"
     many = f"{len(instants)} {plural_word(len(instants), 'prediction')} in {runs} {plural_word(runs, 'run')}"
-    lines = [Line("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
+    lines = [SummaryLine("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
     limits = (
         f"not in the log, taken as 0: {', '.join(played.assumed)}" if played.assumed else "",
         played.coarse,
         f"{played.gaps}: no errors there, and a past over one of them is interpolated" if played.gaps else "",
         "the plan was: orders stay as they are, since at sea later orders are not known" if played.plan else "",
     )
-    lines += [Line("limit", text) for text in limits if text]
+    lines += [SummaryLine("limit", text) for text in limits if text]
     latency = 1e3 * instants["latency"].to_numpy()
     words = f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms"
-    lines.append(Line("detail", words))
+    lines.append(SummaryLine("detail", words))
     share = f"{outside.sum()} of {len(outside)} instants ({percent_text(outside.mean())})"
-    lines.append(Line("alarm", f"alarm: at {share} outside of the training"))
-    lines += [Line("detail", text) for text in _longest_alarms(instants)]
+    lines.append(SummaryLine("alarm", f"alarm: at {share} outside of the training"))
+    lines += [SummaryLine("detail", text) for text in _longest_alarms(instants)]
     for place, text in enumerate(_band_lines(played)):
-        lines.append(Line("detail" if place else "band", text))
+        lines.append(SummaryLine("detail" if place else "band", text))
     table = ["error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"]
     merged = points.merge(instants[["run", "t", "outside"]], on=["run", "t"])
     for moment in _moments_of_summary(points):
@@ -193,7 +193,7 @@ def replay_summary(played: Replay) -> list[Line]:
             median, most, worst = map(length_text, (np.median(error), np.quantile(error, 0.9), error.max()))
             inside = length_text(np.median(error[alarm])) if alarm.any() else "-"
             table.append(f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}")
-    return [*lines, *(Line("detail", text) for text in table)]
+    return [*lines, *(SummaryLine("detail", text) for text in table)]
 
 
 def _band_lines(played: Replay) -> list[str]:

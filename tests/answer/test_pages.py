@@ -13,9 +13,9 @@ import pytest
 from shipid.answer import pages
 from shipid.answer.pages import report_content, write_pages
 from shipid.report import errors_over
-from shipid.report.figure import Figure
+from shipid.report.figure import PageFigure
 from shipid.report.paths import window_data
-from shipid.report.section import drawn
+from shipid.report.section import draw_sections
 from shipid.report.sections import SECTIONS
 from shipid.study import seals
 from shipid.study.plan import build_plan
@@ -42,7 +42,7 @@ def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
         run_here(plan, folder)
     content = report_content(read_results(folder))
     assert set(content.models["model"]) == {"right", "wrong-1", "wrong-2"}
-    assert "no physics" not in [chip.label for chip in errors_over.error_over_horizon(content).chips]
+    assert "no physics" not in [chip.label for chip in errors_over.horizon_figure(content).chips]
 
 
 def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,8 +102,8 @@ def test_a_study_of_physics_alone_has_a_page_and_says_so(tmp_path: Path) -> None
     assert (folder / "report.html").stat().st_size > 1e5
     content = report_content(read_results(folder))
     assert content.alone == set(cells["model"])
-    shown = [item for section in drawn(SECTIONS, content) for item in section.items]
-    figures = [item for item in shown if isinstance(item, Figure)]
+    shown = [item for section in draw_sections(SECTIONS, content) for item in section.items]
+    figures = [item for item in shown if isinstance(item, PageFigure)]
     assert {"horizon", "over-time", "browser"} <= {figure.id for figure in figures}
     assert not {"map", "gain"} & {figure.id for figure in figures}, "H is A everywhere"
     words = [text for item in shown for text in (item.title, item.takeaway, getattr(item, "how", ""))]

@@ -35,7 +35,7 @@ from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.settings import Identify, free_factors
 from shipid.identification.solve import Solution, identify
 from shipid.identification.statistics import LinearFit, fit_statistics
-from shipid.report.identification import estimates
+from shipid.report.identification import estimates_figure
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials
 
@@ -590,7 +590,7 @@ def test_factors_on_a_scale_are_not_said_to_be_on_the_base_value() -> None:
     reasons = dict(zip(found.estimates["name"], found.estimates["reason"], strict=True))
     assert reasons["N_ur"].endswith("% of its scale")
     assert reasons["N_uv"].endswith("% of its base value")
-    figure = estimates(identification_content(found, "log.parquet"))
+    figure = estimates_figure(identification_content(found, "log.parquet"))
     assert "The base has 0 for N_ur: there factors are on the scale" in figure.how
 
 

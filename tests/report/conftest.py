@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report import Finding, ReportContent, Sentence, Snapshot
-from shipid.report.section import Drawn, drawn
+from shipid.report import AnswerSentence, ReportContent, ReportFinding, WindowSnapshot
+from shipid.report.section import DrawnSection, draw_sections
 from shipid.report.sections import SECTIONS
 
 NASTY = "<script>alert('x')</script>"
@@ -87,7 +87,9 @@ def _errors(models: list[Model], sizes: list[int], axis: pd.DataFrame, growth: n
     return pd.concat(parts, ignore_index=True)
 
 
-def _snapshots(models: list[Model], sizes: list[int], runs: list[str], times: np.ndarray, ahead: int) -> list[Snapshot]:
+def _snapshots(
+    models: list[Model], sizes: list[int], runs: list[str], times: np.ndarray, ahead: int
+) -> list[WindowSnapshot]:
     steps, result = np.arange(ahead + 1.0), []
     for number, run in enumerate(runs):
         for t in times:
@@ -105,7 +107,7 @@ def _snapshots(models: list[Model], sizes: list[int], runs: list[str], times: np
                         left = model.gain * (sizes[0] / size) ** 0.4
                         paths[model.name, "cooperative", size] = truth - 2.5 * left * drift
             wind = (5.3, 2.2) if len(sizes) > 1 else None
-            result.append(Snapshot(run, float(t), OUTLINE, float(psi[-1]), truth, paths, wind))
+            result.append(WindowSnapshot(run, float(t), OUTLINE, float(psi[-1]), truth, paths, wind))
     return result
 
 
@@ -192,14 +194,22 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
         title="How much does the cooperative model gain from physics and from data?",
         name="simulation" if len(sizes) > 1 else f"full-scale {NASTY}",
         answer=[
-            Sentence("With 30 manoeuvres, a model of 3 m accuracy predicts with 0.6 m mean error [0.5, 0.7].", "gain"),
-            Sentence("The error grows with the horizon, least for compensated models.", "horizon"),
-            Sentence("These data say nothing about waves."),
+            AnswerSentence(
+                "With 30 manoeuvres, a model of 3 m accuracy predicts with 0.6 m mean error [0.5, 0.7].", "gain"
+            ),
+            AnswerSentence("The error grows with the horizon, least for compensated models.", "horizon"),
+            AnswerSentence("These data say nothing about waves."),
         ],
         findings=[
-            Finding("R1", "Cooperative beats its physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."),
-            Finding("R2", "Inaccurate and compensated is as good as accurate alone.", "undecided", "2.05 m, 2.10 m."),
-            Finding("R4", "Pure data-driven is worst over the whole horizon.", "refuted", "Not in the first 2 s."),
+            ReportFinding(
+                "R1", "Cooperative beats its physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."
+            ),
+            ReportFinding(
+                "R2", "Inaccurate and compensated is as good as accurate alone.", "undecided", "2.05 m, 2.10 m."
+            ),
+            ReportFinding(
+                "R4", "Pure data-driven is worst over the whole horizon.", "refuted", "Not in the first 2 s."
+            ),
         ],
         cells=cells,
         factors=_factors(models, generator),
@@ -273,18 +283,18 @@ def content(request: pytest.FixtureRequest) -> ReportContent:
 
 
 @pytest.fixture(scope="session")
-def simulation_drawn(simulation: ReportContent) -> list[Drawn]:
+def simulation_drawn(simulation: ReportContent) -> list[DrawnSection]:
     """Every section of the simulation, drawn once; not to be changed."""
-    return drawn(SECTIONS, simulation)
+    return draw_sections(SECTIONS, simulation)
 
 
 @pytest.fixture(scope="session")
-def full_scale_drawn(full_scale: ReportContent) -> list[Drawn]:
+def full_scale_drawn(full_scale: ReportContent) -> list[DrawnSection]:
     """Every section of the full scale, drawn once; not to be changed."""
-    return drawn(SECTIONS, full_scale)
+    return draw_sections(SECTIONS, full_scale)
 
 
 @pytest.fixture(params=["simulation_drawn", "full_scale_drawn"])
-def sections(request: pytest.FixtureRequest) -> list[Drawn]:
+def sections(request: pytest.FixtureRequest) -> list[DrawnSection]:
     """The sections of each study in turn."""
     return request.getfixturevalue(request.param)

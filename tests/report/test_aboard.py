@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.aboard import ABOARD_PAGE, AboardContent, along_run, band_outline, seen, write_aboard
-from shipid.report.content import Line
-from shipid.report.section import drawn
+from shipid.report.aboard import ABOARD_PAGE, AboardContent, along_run_figure, band_outline, paths_figure, write_aboard
+from shipid.report.content import SummaryLine
+from shipid.report.section import draw_sections
 from tests.report.views import views
 
 NASTY = "<b>run</b>"
@@ -29,9 +29,9 @@ def content(banded: bool = True, physics: bool = True) -> AboardContent:
     instants["error"] = np.where(times < 36, 1.0 + times / 10, np.nan)
     track = pd.DataFrame({"run": NASTY, "t": times, "north": 5 * times, "east": 0.0})
     lines = [
-        Line("predictions", "10 predictions in 1 run, 5 s ahead; 0 instants before there was a past"),
-        Line("alarm", "alarm: at 4 of 10 instants"),
-        Line("detail", "latency: 10 ms"),
+        SummaryLine("predictions", "10 predictions in 1 run, 5 s ahead; 0 instants before there was a past"),
+        SummaryLine("alarm", "alarm: at 4 of 10 instants"),
+        SummaryLine("detail", "latency: 10 ms"),
     ]
     return AboardContent(title="played", name="cell", lines=lines, instants=instants, points=points, track=track)
 
@@ -53,11 +53,11 @@ def test_the_outline_of_a_band_is_its_ellipse() -> None:
 @pytest.mark.parametrize("physics", [True, False])
 def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None:
     here = content(banded, physics)
-    names = [trace.name for trace in views(seen(here))["0"][0].data]
+    names = [trace.name for trace in views(paths_figure(here))["0"][0].data]
     assert names.count("predicted path") == 6
     assert names.count("physics alone") == 6 * physics
     assert names.count("band") == 6 * banded
-    history = views(along_run(here))["0"][0].data
+    history = views(along_run_figure(here))["0"][0].data
     assert len(history) == 2 + 2 * banded
     np.testing.assert_allclose(history[-1].x, here.instants["t"][here.instants["outside"]])
     text = write_aboard(here, tmp_path / "seen.html").read_text()
@@ -68,15 +68,20 @@ def test_it_draws_what_was_played(banded: bool, physics: bool, tmp_path) -> None
 
 def test_what_limits_the_promise_is_on_the_page() -> None:
     """That bands do not hold, that wind was taken as 0 and times without rows were said in the terminal alone."""
-    limits = [Line("limit", "not in the log, taken as 0: V_w"), Line("limit", "1 time without rows: no errors there")]
-    broken = Line("band", "it held 40 % of the 20 whole paths; that is fewer than 90 % by more than chance")
+    limits = [
+        SummaryLine("limit", "not in the log, taken as 0: V_w"),
+        SummaryLine("limit", "1 time without rows: no errors there"),
+    ]
+    broken = SummaryLine("band", "it held 40 % of the 20 whole paths; that is fewer than 90 % by more than chance")
     here = content()
-    here = replace(here, lines=[here.lines[0], *limits, *here.lines[1:], Line("detail", "  b: from 1 to 2 s"), broken])
+    here = replace(
+        here, lines=[here.lines[0], *limits, *here.lines[1:], SummaryLine("detail", "  b: from 1 to 2 s"), broken]
+    )
     said = [one.text for one in here.answer]
     texts = [line.text for line in (here.lines[0], here.lines[3], broken, *limits)]
     assert said == [f"{text[0].upper()}{text[1:]}." for text in texts], "by kind, whatever the words"
-    assert seen(here).takeaway == said[2]
-    assert seen(content(banded=False)).takeaway == said[0], "the figure shows paths, no alarm"
+    assert paths_figure(here).takeaway == said[2]
+    assert paths_figure(content(banded=False)).takeaway == said[0], "the figure shows paths, no alarm"
 
 
 def test_of_many_runs_the_worst_is_among_those_to_choose_from() -> None:
@@ -89,7 +94,7 @@ def test_of_many_runs_the_worst_is_among_those_to_choose_from() -> None:
     rows = frames["instants"]
     frames["instants"] = rows.assign(error=rows["error"].where(rows["run"].ne("run 31") | rows["t"].ne(4.0), 55.0))
     many = replace(here, **frames)
-    figure = along_run(many)
+    figure = along_run_figure(many)
     assert "the largest, 55.0 m, is in run 31." in figure.takeaway
     assert figure.controls[0].options[figure.controls[0].start] == "run 31"
     drawn_errors = views(figure)[str(figure.controls[0].start)][0].data[0]["y"]
@@ -108,13 +113,13 @@ def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
                 part.assign(t=part["t"] + 1e6, **({"error": worse * part["error"]} if "error" in part else {}))
             )
     three = replace(here, **{key: pd.concat(parts, ignore_index=True) for key, parts in frames.items()})
-    for figure in (seen(three), along_run(three)):
+    for figure in (paths_figure(three), along_run_figure(three)):
         assert list(figure.controls[0].options) == ["a", "b", "c"]
         assert figure.controls[0].start == 1
     late = replace(three, instants=three.instants[three.instants["t"] >= 1e6 + 8], points=three.points)
-    (error, *_) = views(along_run(late))["1"][0].data
+    (error, *_) = views(along_run_figure(late))["1"][0].data
     assert error["x"][0] == 8, "the run began with its track, before there was a prediction"
-    lines = {str(trace["name"]): trace for trace in views(along_run(three))["1"][0].data}
+    lines = {str(trace["name"]): trace for trace in views(along_run_figure(three))["1"][0].data}
     np.testing.assert_allclose(lines["error"]["x"], here.instants["t"])
     np.testing.assert_allclose(lines["error"]["y"], 3.0 * here.instants["error"], rtol=1e-6)
     np.testing.assert_allclose(lines["band along"]["y"], 5.0)
@@ -122,5 +127,5 @@ def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
 
 
 def test_every_item_is_declared() -> None:
-    for one in drawn(ABOARD_PAGE, content()):
+    for one in draw_sections(ABOARD_PAGE, content()):
         assert [item.id for item in one.items] == list(ABOARD_PAGE[one.id].anchors)

@@ -9,7 +9,7 @@ import pytest
 
 from shipid.report import ReportContent, bands
 from shipid.report.page import render_page
-from shipid.report.section import drawn
+from shipid.report.section import draw_sections
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 
@@ -50,7 +50,7 @@ def banded(simulation: ReportContent) -> ReportContent:
 
 
 def test_it_says_what_was_held(banded: ReportContent) -> None:
-    figure = bands.coverage(banded)
+    figure = bands.coverage_figure(banded)
     assert figure is not None
     assert "bands of 90 % hold 89 % of the test paths" in figure.takeaway
     assert len(views(figure)) == 3
@@ -86,7 +86,7 @@ def test_a_band_for_one_kind_is_named_where_there_is_one(
 
 def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) -> None:
     """Colours by A of two models of like accuracy cannot be told apart."""
-    figure = bands.coverage(banded)
+    figure = bands.coverage_figure(banded)
     assert figure is not None
     looks = {(chip.colour, chip.symbol) for chip in figure.chips}
     assert len(looks) == len(figure.chips)
@@ -100,13 +100,13 @@ def test_the_coverage_says_which_models_are_drawn(banded: ReportContent) -> None
     frame = banded.frames["coverage"]
     other = frame.assign(model=frame.model + " + other")
     both = replace(banded, frames={**banded.frames, "coverage": pd.concat([frame, other], ignore_index=True)})
-    figure = bands.coverage(both)
+    figure = bands.coverage_figure(both)
     assert figure is not None
     names = [chip.label for chip in figure.chips]
     assert all(name in figure.how.partition(f" Of {2 * frame.model.nunique()} models, ")[2] for name in names)
     assert "drawn; the table has all." in figure.how
     alone = replace(banded, frames={**banded.frames, "coverage": other})
-    assert bands.coverage(alone) is None
+    assert bands.coverage_figure(alone) is None
     assert bands.coverage_table(alone) is not None
 
 
@@ -123,7 +123,7 @@ def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
 
 
 def test_the_map_of_the_width(banded: ReportContent) -> None:
-    figure = bands.width_map(banded)
+    figure = bands.width_figure(banded)
     assert figure is not None
     assert figure.takeaway.startswith("The mean radius of the band goes from ")
     least, most = banded.cells.groupby(["model", "N_D"]).width.mean().agg(["min", "max"])
@@ -135,7 +135,7 @@ def test_the_map_of_the_width_speaks_of_hatching_where_there_is_some(banded: Rep
     pure = banded.cells.family.eq("none")
     for factor, told in ((100.0, False), (0.01, True)):
         cells = banded.cells.assign(width=banded.cells.width.where(~pure, factor * banded.cells.width.mean()))
-        figure = bands.width_map(replace(banded, cells=cells))
+        figure = bands.width_figure(replace(banded, cells=cells))
         assert figure is not None
         assert ("Hatched: not narrower than the band of no physics" in figure.how) == told
 
@@ -146,11 +146,11 @@ def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:
     text = render_page("study", only, replace(banded, snapshots=[], answer=[], findings=[], **none))
     assert "How far off it may be" in text
     assert NASTY not in text
-    (section,) = drawn(only, banded)
+    (section,) = draw_sections(only, banded)
     assert [item.id for item in section.items] == list(bands.HOW_FAR_OFF.anchors)
 
 
 def test_without_bands_nothing_is_drawn(simulation: ReportContent) -> None:
-    assert bands.coverage(simulation) is None
-    assert bands.width_map(simulation) is None
-    assert drawn({"how-far-off": SECTIONS["how-far-off"]}, simulation) == []
+    assert bands.coverage_figure(simulation) is None
+    assert bands.width_figure(simulation) is None
+    assert draw_sections({"how-far-off": SECTIONS["how-far-off"]}, simulation) == []

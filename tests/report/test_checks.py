@@ -5,7 +5,7 @@ import pytest
 
 from shipid.errors import ResultError
 from shipid.report.checks import CheckContent, write_checks
-from shipid.report.wording import bound
+from shipid.report.wording import set_sentence
 from tests.report.test_page import NASTY, Page
 
 CHECKS = pd.DataFrame(
@@ -37,7 +37,9 @@ def test_page_of_checks(tmp_path):
     assert not re.search(r'(src|href)="https?:', text.partition("* plotly.js (")[0])
     cells = [text for attributes, text in page.all("td") if "bad" in str(attributes.get("class")).split()]
     assert cells[0] == "failed"
-    assert cells[1:] == [bound(sentence) for sentence in CHECKS.sentence[~CHECKS.ok]], "shown whole, not cut at its end"
+    assert cells[1:] == [set_sentence(sentence) for sentence in CHECKS.sentence[~CHECKS.ok]], (
+        "shown whole, not cut at its end"
+    )
     sentences = [text for _, text in page.all("li")]
     assert any("1 of 2 checks failed, in 1 of 2 runs." in sentence for sentence in sentences)
     assert "shipid data check" in text

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.errors_over import error_over_horizon as horizon
-from shipid.report.errors_over import error_over_time as over_time
+from shipid.report.errors_over import horizon_figure as horizon
+from shipid.report.errors_over import time_figure as over_time
 from tests.report.test_page import render
 from tests.report.views import views
 

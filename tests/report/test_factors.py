@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.factors import factors
+from shipid.report.factors import factors_figure
 from tests.report.views import views
 
 
 def test_one_dot_per_number_at_its_factor(simulation):
-    figure = factors(simulation)
+    figure = factors_figure(simulation)
     plot = views(figure)[""][0]
     assert [trace.name for trace in plot.data] == ["hull", "inertia", "added mass", "thruster"]
     assert [chip.label for chip in figure.chips] == [trace.name for trace in plot.data]
@@ -26,10 +26,10 @@ def test_one_dot_per_number_at_its_factor(simulation):
 
 
 def test_the_row_tells_where_the_error_comes_from(simulation):
-    texts = [note.text for note in views(factors(simulation))[""][0].layout.annotations]
+    texts = [note.text for note in views(factors_figure(simulation))[""][0].layout.annotations]
     assert texts[1] == "<b>moderate-2</b>  A 3.10 m: 2.17 along, 1.86 across"
     bare = replace(simulation, models=simulation.models.drop(columns=["A_along", "A_across"]))
-    assert views(factors(bare))[""][0].layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
+    assert views(factors_figure(bare))[""][0].layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
 
 
 def test_a_long_name_leaves_room_for_the_errors_of_its_row(simulation):
@@ -39,7 +39,7 @@ def test_a_long_name_leaves_room_for_the_errors_of_its_row(simulation):
         part: getattr(simulation, part).assign(model=getattr(simulation, part).model.replace(long))
         for part in ("cells", "models", "factors")
     }
-    texts = [note.text for note in views(factors(replace(simulation, **renamed)))[""][0].layout.annotations]
+    texts = [note.text for note in views(factors_figure(replace(simulation, **renamed)))[""][0].layout.annotations]
     (mine,) = [text for text in texts if text.startswith("<b>a-fa")]
     assert "7.50 m: 5.25 along, 4.50 across" in mine
     small = "  A 0.0016 m: 0.0073 along, 0.0014 across"  # of a model ship: these were cut off
@@ -49,7 +49,7 @@ def test_a_long_name_leaves_room_for_the_errors_of_its_row(simulation):
 def test_takeaway_counts_and_finds_the_farthest(simulation):
     squared = np.log(simulation.factors.factor) ** 2
     away = np.exp(np.sqrt(squared.groupby(simulation.factors.model).mean()))
-    text = factors(simulation).takeaway
+    text = factors_figure(simulation).takeaway
     assert text.startswith(f"{len(simulation.factors)} numbers in 5 models, times factors from ")
     assert f"{away.idxmax()} is farthest from its base, by a factor of {away.max():.2f}" in text
 
@@ -60,18 +60,18 @@ def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
     frame = pd.DataFrame(
         [{**row, "path": path, "factor": factor} for path, factor in zip("abc", (0.0, 0.6, 0.7), strict=True)]
     )
-    assert factors(replace(full_scale, factors=frame)).takeaway == (
+    assert factors_figure(replace(full_scale, factors=frame)).takeaway == (
         "2 numbers in 1 model, times factors from 0.60 to 0.70; 1 term removed."
     )
-    same = factors(replace(full_scale, factors=frame.assign(factor=0.6))).takeaway
+    same = factors_figure(replace(full_scale, factors=frame.assign(factor=0.6))).takeaway
     assert same == "3 numbers in 1 model, times 0.60."
     gone = frame.assign(factor=0.0)
-    assert factors(replace(full_scale, factors=gone)).takeaway == "1 model changed; 3 terms removed."
+    assert factors_figure(replace(full_scale, factors=gone)).takeaway == "1 model changed; 3 terms removed."
 
 
 @pytest.mark.parametrize(("factor", "word"), [(0.0, "0"), (-0.5, "≤ 0")])
 def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
-    figure = factors(replace(full_scale, factors=full_scale.factors.assign(factor=[factor, 1.2])))
+    figure = factors_figure(replace(full_scale, factors=full_scale.factors.assign(factor=[factor, 1.2])))
     plot = views(figure)[""][0]
     assert plot.layout.xaxis.ticktext[-1] == word
     assert plot.data[0].x[0] == pytest.approx(plot.layout.xaxis.tickvals[-1])
@@ -81,9 +81,9 @@ def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
 
 def test_another_method_on_a_model_is_not_called_unperturbed(simulation):
     others = simulation.cells[simulation.cells.model.eq("high-1")].assign(model="high-1 + alone")
-    figure = factors(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
+    figure = factors_figure(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
     assert "Not perturbed: nominal." in figure.how, "what has no physics is no model that was spared"
 
 
 def test_no_rows_no_figure(simulation):
-    assert factors(replace(simulation, factors=simulation.factors.iloc[:0])) is None
+    assert factors_figure(replace(simulation, factors=simulation.factors.iloc[:0])) is None

@@ -9,26 +9,26 @@ from shipid.errors import ShipidError
 from shipid.report.figure import (
     Chip,
     Control,
-    Figure,
-    axis,
-    chart,
+    PageFigure,
     draw_alone,
-    escaped,
-    line,
+    escape_name,
     log_axis,
+    make_axis,
+    make_chart,
+    make_line,
+    make_plot,
     page_colours,
-    plot,
     spread_apart,
 )
 
 
 def test_names_of_the_user_are_text_for_plotly():
-    assert escaped("<b>a & b</b>") == "&lt;b&gt;a &amp; b&lt;/b&gt;"
-    assert line("<b>", [0.0], [1.0], [])["name"] == "&lt;b&gt;"
+    assert escape_name("<b>a & b</b>") == "&lt;b&gt;a &amp; b&lt;/b&gt;"
+    assert make_line("<b>", [0.0], [1.0], [])["name"] == "&lt;b&gt;"
 
 
 def test_a_line_is_in_single_precision_and_keeps_its_gaps():
-    drawn = line("a", [0.0, 1.0, 2.0], [1.0, np.nan, 2.0], ["model:a"])
+    drawn = make_line("a", [0.0, 1.0, 2.0], [1.0, np.nan, 2.0], ["model:a"])
     assert drawn["y"].dtype == np.float32
     assert drawn["connectgaps"] is False
     assert drawn["meta"] == ["model:a"]
@@ -51,7 +51,7 @@ def test_names_moved_apart_keep_their_order_and_their_distance(places, gap):
 
 def test_a_map_has_equal_axes_and_room_for_its_ticks():
     """ "−8000" has five signs of 8 px; a gap of 8 px and a line of 15 px follow."""
-    made = chart([], "y [m]", "x [m]", [(0.0, 100.0), (-5.0, 5.0)]).layout
+    made = make_chart([], "y [m]", "x [m]", [(0.0, 100.0), (-5.0, 5.0)]).layout
     assert (made.xaxis.scaleanchor, made.xaxis.scaleratio) == ("y", 1)
     assert (made.xaxis.range, made.yaxis.range) == ((-4.0, 104.0), (-9.0, 9.0))
     assert made.margin.l >= 5 * 8 + 8 + 15 + 4
@@ -60,11 +60,11 @@ def test_a_map_has_equal_axes_and_room_for_its_ticks():
 
 def test_panels_become_one_figure_of_plotly_with_legend_and_real_colours():
     def panels(option):
-        trace = line("a", [1.0, 2.0], [option, option], ["a"], line={"color": "var(--ink)"})
-        return [plot([trace], axis("t [s]"), axis(name)) for name in ("u [m/s]", "v [m/s]")]
+        trace = make_line("a", [1.0, 2.0], [option, option], ["a"], line={"color": "var(--ink)"})
+        return [make_plot([trace], make_axis("t [s]"), make_axis(name)) for name in ("u [m/s]", "v [m/s]")]
 
     texts = {"id": "a", "title": "<A>", "takeaway": "Both.", "how": "", "alternative": ""}
-    figure = Figure(
+    figure = PageFigure(
         **texts, height=200, draw=panels, controls=[Control("N", [3, 5])], chips=[Chip("a", "a", "var(--ink)")]
     )
     made = draw_alone(figure, ["5"], dark=True)

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from shipid.report.glossary import MEANINGS, glossed
+from shipid.report.glossary import MEANINGS, mark_short_names
 
 
 def plain(text: str) -> str:
@@ -15,15 +15,15 @@ def plain(text: str) -> str:
 
 @pytest.mark.parametrize("name", MEANINGS)
 def test_every_short_name_is_explained(name: str) -> None:
-    assert f">{name}</abbr>" in glossed(f"its {name} = 3")
+    assert f">{name}</abbr>" in mark_short_names(f"its {name} = 3")
 
 
 def test_words_are_left_alone() -> None:
-    assert glossed("A model and H-shaped bars at N_Dx") == "A model and H-shaped bars at N_Dx"
-    assert glossed("A model of 3 m").count("abbr") == 0
+    assert mark_short_names("A model and H-shaped bars at N_Dx") == "A model and H-shaped bars at N_Dx"
+    assert mark_short_names("A model of 3 m").count("abbr") == 0
 
 
 def test_no_text_becomes_a_tag() -> None:
-    markup = glossed('<b onclick="x">H_90</b> & more')
+    markup = mark_short_names('<b onclick="x">H_90</b> & more')
     assert "<b" not in markup
     assert plain(markup) == "&lt;b onclick=&#34;x&#34;&gt;H_90&lt;/b&gt; &amp; more"

@@ -11,7 +11,7 @@ import pytest
 
 from shipid.report import identification
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent, write_identification
-from shipid.report.section import declared
+from shipid.report.section import declared_anchors
 from tests.report.test_page import Page
 from tests.report.views import views
 
@@ -90,7 +90,7 @@ def test_the_page_fetches_nothing_and_every_link_leads_somewhere(held_out: tuple
     assert "<b>ship" not in text
     assert "T <1>" not in text
     anchors = {attributes.get("id") for _, attributes, _ in page.elements}
-    assert declared(IDENTIFICATION_PAGE) <= anchors | {"findings"}
+    assert declared_anchors(IDENTIFICATION_PAGE) <= anchors | {"findings"}
     for tag, attributes, _ in page.elements:
         assert "src" not in attributes
         assert tag not in ("link", "iframe", "object", "img")
@@ -109,7 +109,7 @@ def test_the_answer_counts_compares_and_warns() -> None:
 
 
 def test_what_is_not_identified_is_hollow_and_its_bar_is_cut() -> None:
-    figure = views(identification.estimates(content()))[""][0]
+    figure = views(identification.estimates_figure(content()))[""][0]
     bars = {trace.meta[0]: trace for trace in figure.data if trace.name == "interval"}
     dots = {trace.meta[0]: trace for trace in figure.data if trace.name == "estimate"}
     assert dots["identified"].marker.symbol == "circle"
@@ -124,7 +124,7 @@ def test_what_is_not_identified_is_hollow_and_its_bar_is_cut() -> None:
 
 def test_the_figure_of_residuals_holds_every_line() -> None:
     colours = pd.DataFrame({"signal": "v", "lag": [0.0, 1.0, 2.0], "correlation": [1.0, 0.95, -0.93]})
-    figure = identification.residuals(replace(content(), colours=colours))
+    figure = identification.residuals_figure(replace(content(), colours=colours))
     assert figure is not None
     low, high = views(figure)[""][0].layout.yaxis.range
     assert low < -0.93
@@ -136,14 +136,14 @@ def test_the_figure_of_residuals_holds_every_line() -> None:
 def test_names_of_many_estimates_do_not_cover_each_other(count: int, named: bool) -> None:
     one = content()
     rows = one.estimates.iloc[[0] * count].assign(name=[f"N_{k}" for k in range(count)])
-    figure = identification.correlations(replace(one, estimates=rows, correlations=np.eye(count)))
+    figure = identification.correlations_figure(replace(one, estimates=rows, correlations=np.eye(count)))
     assert figure is not None
     assert views(figure)[""][0].layout.xaxis.showticklabels is named
     assert ("Columns are in the order of the rows." in figure.how) is not named
 
 
 def test_pieces_are_not_joined_and_time_starts_at_zero() -> None:
-    panels = views(identification.free_runs(content()))["0"]
+    panels = views(identification.free_runs_figure(content()))["0"]
     speed = next(trace for trace in panels[0].data if trace.name == "measured")
     gaps = np.flatnonzero(np.isnan(speed.y))
     assert gaps.tolist() == [30, 61]
@@ -157,7 +157,7 @@ def test_a_base_that_diverges_leaves_the_map_whole() -> None:
     page = content()
     series = page.series.copy()
     series.loc[series["model"] == "before", ["north", "east", "u", "v", "r"]] = np.nan
-    figure = views(identification.free_runs(replace(page, series=series)))["0"][3]
+    figure = views(identification.free_runs_figure(replace(page, series=series)))["0"][3]
     assert np.isfinite(figure.layout.xaxis.range).all()
 
 
@@ -176,7 +176,7 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
 
 def test_what_was_not_asked_for_is_left_out(tmp_path: Path) -> None:
     bare = replace(content(), profiles=pd.DataFrame(), programme=pd.DataFrame(), unseen=[])
-    assert identification.profiles(bare) is None
+    assert identification.profiles_figure(bare) is None
     assert identification.programme_table(bare) is None
     assert identification.unseen_table(bare) is None
     page = Page(write_identification(bare, tmp_path / "page.html").read_text())

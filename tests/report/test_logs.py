@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from shipid.report.logs import _takeaway_envelope, envelope, manoeuvres
+from shipid.report.logs import _takeaway_envelope, envelope_figure, tracks_figure
 from tests.report.views import views
 
 
 def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content, away):
-    figure = manoeuvres(content)
+    figure = tracks_figure(content)
     plot = views(figure)[""][0]
     assert plot.layout.xaxis.scaleanchor == "y"
     assert plot.layout.xaxis.scaleratio == 1
@@ -22,7 +22,7 @@ def test_tracks_are_thinned_below_a_pixel_on_equal_axes(content, away):
 
 
 def test_the_test_lies_on_top_in_another_colour(simulation):
-    plot = views(manoeuvres(simulation))[""][0]
+    plot = views(tracks_figure(simulation))[""][0]
     colours = [trace.line.color for trace in plot.data]
     assert set(colours[-4:]) == {"var(--category-1)"}
     assert "var(--category-1)" not in colours[:-4]
@@ -30,9 +30,9 @@ def test_the_test_lies_on_top_in_another_colour(simulation):
 
 def test_the_names_of_the_sets_are_explained(simulation):
     explained = "D_ and a number: so many runs, to train and to validate."
-    assert explained in envelope(simulation).how
+    assert explained in envelope_figure(simulation).how
     named = simulation.envelope.assign(set=simulation.envelope["set"].str.replace("D_", "train "))
-    assert explained not in envelope(replace(simulation, envelope=named)).how
+    assert explained not in envelope_figure(replace(simulation, envelope=named)).how
 
 
 def test_what_the_test_asks_beyond_training_is_named():
@@ -68,15 +68,15 @@ def test_the_published_ranges_are_compared_and_not_counted_as_data():
 
 
 def test_the_published_range_is_the_last_row_and_open(simulation):
-    figure = views(envelope(simulation))[""][0]
+    figure = views(envelope_figure(simulation))[""][0]
     assert list(figure.layout.yaxis.ticktext) == ["D_10", "D_30", "D_100", "test", "published"]
     assert len(figure.data[-2].x) == 5
     assert figure.data[-1].marker.symbol == "circle-open"
-    assert "not data of this study" in envelope(simulation).how
+    assert "not data of this study" in envelope_figure(simulation).how
 
 
 def test_ranges_run_from_smallest_to_largest(full_scale):
-    panels = views(envelope(full_scale))[""]
+    panels = views(envelope_figure(full_scale))[""]
     frame = full_scale.envelope
     assert len(panels) == frame.quantity.nunique()
     bar, dot = panels[1].data[2:4]  # sway speed of the test
@@ -85,5 +85,5 @@ def test_ranges_run_from_smallest_to_largest(full_scale):
 
 
 def test_no_rows_no_figure(full_scale):
-    assert manoeuvres(replace(full_scale, tracks=full_scale.tracks.iloc[:0])) is None
-    assert envelope(replace(full_scale, envelope=full_scale.envelope.iloc[:0])) is None
+    assert tracks_figure(replace(full_scale, tracks=full_scale.tracks.iloc[:0])) is None
+    assert envelope_figure(replace(full_scale, envelope=full_scale.envelope.iloc[:0])) is None

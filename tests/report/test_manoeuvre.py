@@ -107,7 +107,7 @@ def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: 
     shown = content("zigzag")
     psi = shown.log["psi"].to_numpy()
     wide = shown.log.assign(psi=2.0 + (psi - psi[0]) * np.deg2rad(span) / np.ptp(psi))
-    panels = views(manoeuvre.histories(replace(shown, log=wide)))[""]
+    panels = views(manoeuvre.histories_figure(replace(shown, log=wide)))[""]
     lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.data} for panel in panels]
     assert np.ptp(lines[0]["heading"]) == pytest.approx(span, rel=1e-3)
     assert ("helm" in lines[0]) == together
@@ -122,7 +122,7 @@ def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: 
 def test_rounding_is_not_drawn() -> None:
     """A stop on a straight course: a yaw rate of 1e-25 filled its panel."""
     made = content("stop")
-    figure = manoeuvre.histories(replace(made, log=made.log.assign(r=np.linspace(0, 3e-25, len(made.log)))))
+    figure = manoeuvre.histories_figure(replace(made, log=made.log.assign(r=np.linspace(0, 3e-25, len(made.log)))))
     (panel,) = (one for one in views(figure)[""] if one.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
     low, high = panel.layout["yaxis"]["range"]
     assert high - low >= 1
@@ -145,7 +145,7 @@ def test_ships_are_drawn_to_scale_where_they_were() -> None:
 def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     shown = content(kind)
     shown = replace(shown, log=shown.log.assign(psi=shown.log["psi"] + 1.0, shaft=np.linspace(-1, 2, len(shown.log))))
-    panels = views(manoeuvre.histories(shown))[""]
+    panels = views(manoeuvre.histories_figure(shown))[""]
     lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.data}
     log = shown.log
     expected = {"heading": np.degrees(log["psi"] - log["psi"].iloc[0]), "helm": np.degrees(log["helm"])}
@@ -153,7 +153,7 @@ def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     for name, values in {**expected, "shaft": 60 * log["shaft"]}.items():
         np.testing.assert_allclose(lines[name], values, rtol=1e-5, atol=1e-5, err_msg=name)
     if kind == "spiral":
-        figure = manoeuvre.spiral(shown)
+        figure = manoeuvre.spiral_figure(shown)
         assert figure is not None
         (trace,) = views(figure)[""][0].data
         for axis, column in (("x", "helm"), ("y", "rate")):

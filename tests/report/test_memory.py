@@ -10,7 +10,7 @@ import pytest
 
 from shipid.report import ReportContent, memory
 from shipid.report.page import render_page
-from shipid.report.section import drawn
+from shipid.report.section import draw_sections
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 
@@ -62,7 +62,7 @@ def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent)
     text = render_page("study", ONLY, little)
     assert "What the past shows" in text
     assert NASTY not in text
-    (section,) = drawn(ONLY, little)
+    (section,) = draw_sections(ONLY, little)
     assert [item.id for item in section.items] == list(SECTIONS["the-past"].anchors)
 
 
@@ -76,7 +76,7 @@ def test_an_observer_alone_is_shown(past: ReportContent) -> None:
 
 
 def test_the_observer_says_its_numbers(past: ReportContent) -> None:
-    figure = memory.observer(past)
+    figure = memory.observer_figure(past)
     assert figure is not None
     moved = 100 * np.sqrt(np.mean((0.2 * np.sin(np.arange(50.0))) ** 2))
     assert f"{moved:.2g} cm/s" in figure.takeaway
@@ -98,13 +98,13 @@ def test_the_observer_says_its_numbers(past: ReportContent) -> None:
     ("fade", "words"), [(0.0, "fades immediately"), (np.inf, "does not fade"), (2e6, "does not fade")]
 )
 def test_the_ends_of_the_fade_are_named(past: ReportContent, fade: float, words: str) -> None:
-    figure = memory.observer(replace(past, frames={"observer": along(fade=fade)}))
+    figure = memory.observer_figure(replace(past, frames={"observer": along(fade=fade)}))
     assert figure is not None
     assert words in figure.how
 
 
 def test_no_row_for_a_current_that_nobody_looked_for(past: ReportContent) -> None:
-    figure = memory.observer(replace(past, frames={"observer": along(current=0.0)}))
+    figure = memory.observer_figure(replace(past, frames={"observer": along(current=0.0)}))
     assert figure is not None
     assert "current" not in figure.takeaway
     assert not any("towards" in trace.name for trace in views(figure)["0"][0].data)

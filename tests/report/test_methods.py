@@ -10,7 +10,7 @@ import pytest
 
 from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS
 from shipid.report.comparison import write_comparison
-from shipid.report.methods import MethodsContent, methods, methods_table, verdicts
+from shipid.report.methods import MethodsContent, methods_figure, methods_table, sentences_on_methods
 from tests.report.views import views
 
 
@@ -42,7 +42,7 @@ def content(rows: pd.DataFrame) -> MethodsContent:
 
 def test_the_sentences_name_the_least_error_among_methods_that_never_failed() -> None:
     rows = frame(1)
-    for sentence, condition in zip(verdicts(rows), ("calm", "rough"), strict=True):
+    for sentence, condition in zip(sentences_on_methods(rows), ("calm", "rough"), strict=True):
         assert sentence.startswith(f"{condition.capitalize()}: with N_D = 3 ")
         for N_D in (3, 30):
             mine = rows[
@@ -56,7 +56,7 @@ def test_a_method_that_does_not_run_on_every_model_is_not_the_best() -> None:
     """Its mean is over other cells: on the best model alone any method errs little."""
     rows = frame(1, ("",), failing=False)
     rows.loc[rows.method.eq("b"), ["cells", "missing", "H"]] = [1, 3, 0.01]
-    (sentence,) = verdicts(rows)
+    (sentence,) = sentences_on_methods(rows)
     assert "b errs least" not in sentence
     assert sentence.count(" (left out: b, not on every model)") == 2
 
@@ -66,7 +66,7 @@ def three(H: tuple[float, float, float], **more: list[object]) -> str:
     rows = frame(1, ("",), failing=False)
     rows = rows[rows.family.eq(WITH_PHYSICS) & rows.N_D.eq(3)].assign(H=H, difference=np.array(H) - H[0], **more)
     rows = rows.assign(low=rows.difference - 0.5, high=rows.difference + 0.5)
-    (sentence,) = verdicts(rows)
+    (sentence,) = sentences_on_methods(rows)
     return sentence
 
 
@@ -94,7 +94,7 @@ def test_a_method_that_lacks_a_cell_and_errs_less_elsewhere_is_named() -> None:
 @pytest.mark.parametrize("conditions", [("",), ("calm", "rough")])
 def test_every_number_is_in_the_table_and_every_view_in_the_figure(conditions: tuple[str, ...]) -> None:
     rows = frame(2, conditions)
-    drawn, printed = methods(content(rows)), methods_table(content(rows))
+    drawn, printed = methods_figure(content(rows)), methods_table(content(rows))
     assert drawn is not None
     assert printed is not None
     assert len(views(drawn)) == len(conditions) * 2
@@ -133,7 +133,7 @@ def test_methods_are_in_the_order_that_the_page_says() -> None:
     rows.loc[rows.family.eq("none") & rows.method.eq("b"), "H"] = 99.0
     rival = rows[rows.method.eq("a") & rows.family.eq("none")]
     rivals = [rival.assign(method=name, H=H) for name, H in (("r", 2.0), ("s", 4.0))]
-    drawn = methods(content(pd.concat([rows, *rivals], ignore_index=True)))
+    drawn = methods_figure(content(pd.concat([rows, *rivals], ignore_index=True)))
     assert drawn is not None
     ticks = views(drawn)["0"][0].layout["yaxis"]["ticktext"]
     assert list(ticks) == ["lost", "c", "s", "a", "r", "b"]
@@ -143,7 +143,7 @@ def test_methods_are_in_the_order_that_the_page_says() -> None:
 @pytest.mark.parametrize("ends", [(0.17, 6.7), (0.0012, 9.0), (1.1, 1.9), (0.4, 11.0)])
 def test_the_axis_of_errors_has_two_ticks_at_least(ends: tuple[float, float]) -> None:
     rows = frame(0, ("",))
-    drawn = methods(content(rows.assign(H=np.resize(ends, len(rows)))))
+    drawn = methods_figure(content(rows.assign(H=np.resize(ends, len(rows)))))
     assert drawn is not None
     for panels in views(drawn).values():
         plot = panels[0]
@@ -156,7 +156,7 @@ def test_long_names_leave_room_for_the_points() -> None:
     names = [f"a-method-with-a-name-that-leaves-no-room-{number}" for number in (1, 2, 3)]
     rows = frame(2, ("",), failing=False)
     rows["method"] = rows.method.map(dict(zip(("a", "b", "c"), names, strict=True)))
-    drawn = methods(content(rows))
+    drawn = methods_figure(content(rows))
     assert drawn is not None
     ticks = views(drawn)["0"][0].layout["yaxis"]["ticktext"]
     assert max(map(len, ticks)) <= 20

@@ -14,13 +14,13 @@ import pytest
 from plotly.offline import get_plotlyjs_version
 
 from shipid.errors import ResultError
-from shipid.report import ReportContent, Sentence, write_report
-from shipid.report.figure import Figure, axis, line, plot
+from shipid.report import AnswerSentence, ReportContent, write_report
+from shipid.report.figure import PageFigure, make_axis, make_line, make_plot
 from shipid.report.page import render_page
 from shipid.report.paths import window_data
-from shipid.report.section import Section, declared
+from shipid.report.section import Section, declared_anchors
 from shipid.report.sections import SECTIONS
-from shipid.report.selection import close_styles, styles
+from shipid.report.selection import close_styles, model_styles
 from tests.report.views import views
 
 NASTY = "<script>alert('x')</script>"
@@ -57,7 +57,7 @@ def render(content: ReportContent) -> str:
 
 
 def every_panel(item):
-    return [panel for panels in views(item).values() for panel in panels] if isinstance(item, Figure) else []
+    return [panel for panels in views(item).values() for panel in panels] if isinstance(item, PageFigure) else []
 
 
 def unpacked(data: str) -> str:
@@ -131,7 +131,7 @@ def test_names_of_the_user_stay_text(page, simulation, simulation_drawn, full_sc
     sections = simulation_drawn if content is simulation else full_scale_drawn
     assert NASTY not in text
     # A name that became an element would be one script more.
-    with_views = [s for s in sections for i in s.items if isinstance(i, Figure) and not i.browser]
+    with_views = [s for s in sections for i in s.items if isinstance(i, PageFigure) and not i.browser]
     assert len(parsed.all("script")) == len(with_views) + 3
     packed = [(a, data) for a, data in parsed.all("script") if a.get("type") == "text/plain"]
     assert len(packed) == len(with_views) + 2, "all but the script of the page"
@@ -174,7 +174,7 @@ def test_sentences_link_to_what_is_there(page):
     # A map needs several N_D; no item of the past is drawn without a memory, and a section not without what it needs.
     able = {name: one for name, one in SECTIONS.items() if set(one.needs) <= {*vars(content), *content.frames}}
     lacking = SECTIONS["the-past"].anchors
-    assert declared(able) - set(ids) - set(lacking) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
+    assert declared_anchors(able) - set(ids) - set(lacking) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
 
 
 def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):
@@ -183,7 +183,7 @@ def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):
         (["One.", "Two.", "Three.", "Four."], '<details class="more">\n<summary>In detail (1 more sentence)'),
         (["One.", "Two.", "Three.", "Careful: x."], '<details class="more" open>'),
     ):
-        header = render(replace(plain, answer=[Sentence(text) for text in texts])).partition("<nav")[0]
+        header = render(replace(plain, answer=[AnswerSentence(text) for text in texts])).partition("<nav")[0]
         lead, _, rest = header.partition("<details")
         assert [text in lead for text in texts] == [i < 3 for i in range(len(texts))]
         assert all(text in header for text in texts)
@@ -192,12 +192,12 @@ def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):
 
 
 def test_a_link_to_a_figure_without_data_is_left_out(plain):
-    linked = replace(plain, answer=[Sentence("Errors grow.", "horizon")])
+    linked = replace(plain, answer=[AnswerSentence("Errors grow.", "horizon")])
     assert "#horizon" in [a["href"] for a, _ in Page(render(linked)).all("a")]
     bare = replace(linked, horizon=linked.horizon.iloc[:0])
     assert "#horizon" not in [a["href"] for a, _ in Page(render(bare)).all("a")]
     with pytest.raises(ValueError, match=r"no figure is called 'horizons'; valid: .*\bbrowser, cells, "):
-        render(replace(plain, answer=[Sentence("Nothing.", "horizons")]))
+        render(replace(plain, answer=[AnswerSentence("Nothing.", "horizons")]))
 
 
 def test_structure_for_those_who_listen(page):
@@ -222,7 +222,7 @@ def test_structure_for_those_who_listen(page):
 def test_every_figure_speaks(sections):
     for section in sections:
         for item in section.items:
-            if isinstance(item, Figure):
+            if isinstance(item, PageFigure):
                 assert re.search(r"\d.*\.$", item.takeaway), item.id
                 assert re.fullmatch(r"(\S+ )+\S+\.", item.how), item.id
 
@@ -275,7 +275,7 @@ def test_a_line_of_a_model_has_one_colour_in_overviews_and_one_in_close_ups(sect
     assert len(colours_of) >= 4
     allowed: dict[str, set[str]] = {key: colours for key, colours in colours_of.items() if len(colours) == 1}
     if sections is simulation_drawn:
-        looks, close = styles(simulation), close_styles(simulation)
+        looks, close = model_styles(simulation), close_styles(simulation)
         allowed = {
             f"model:{name}": {style.colour, close[name].colour if name in close else style.colour}
             for name, style in looks.items()
@@ -288,9 +288,9 @@ def test_a_section_added_at_run_time_is_on_the_page(plain, monkeypatch):
 
     def toy(content):
         frame = content.frames["tides"]
-        tide = plot([line("tide", frame.t, frame.height, [])], axis("time [h]"), axis("height [m]"))
+        tide = make_plot([make_line("tide", frame.t, frame.height, [])], make_axis("time [h]"), make_axis("height [m]"))
         return [
-            Figure(
+            PageFigure(
                 id="tide",
                 title="The tide",
                 takeaway=f"The tide rises by {frame.height.max():g} m.",
@@ -303,7 +303,7 @@ def test_a_section_added_at_run_time_is_on_the_page(plain, monkeypatch):
         ]
 
     monkeypatch.setitem(SECTIONS, "tides", Section("Tides", toy, needs=("tides",), anchors=("tide",)))
-    linked = replace(plain, answer=[Sentence("There is a tide.", "tide")])
+    linked = replace(plain, answer=[AnswerSentence("There is a tide.", "tide")])
     tides = pd.DataFrame({"t": [0.0, 1.0, 2.0], "height": [0.0, 1.25, 0.5]})
     page = Page(render(replace(linked, frames={"tides": tides})))
     ids = [attributes.get("id") for _, attributes, _ in page.elements]

@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.report.figure import colour_level, page_colours
-from shipid.report.selection import accuracy_range, close_styles, styles
+from shipid.report.selection import accuracy_range, close_styles, model_styles
 
 
 def luminance(colour: str) -> float:
@@ -46,9 +46,9 @@ def test_named_colours_are_distinct_and_the_first_has_most_contrast():
 def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
     assert accuracy_range(full_scale) is None
     assert accuracy_range(simulation) == (0.9, 13.0)
-    colours = [style.colour for style in styles(full_scale).values()]
+    colours = [style.colour for style in model_styles(full_scale).values()]
     assert len(set(colours)) == len(colours)
-    symbols = {name.split("-")[0]: style.symbol for name, style in styles(simulation).items()}
+    symbols = {name.split("-")[0]: style.symbol for name, style in model_styles(simulation).items()}
     assert len(set(symbols.values())) == len(symbols)
 
 
@@ -68,7 +68,7 @@ def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_o
     cells, pure = simulation.cells, simulation.cells.model.eq("no physics")
     more = [cells[cells.model.eq("high-1")].assign(model="high-1 + alone")]
     more += [cells[pure].assign(model=f"none + {name}") for name in ("plain", "forest", "step")]
-    looks = styles(replace(simulation, cells=pd.concat([cells, *more], ignore_index=True)))
+    looks = model_styles(replace(simulation, cells=pd.concat([cells, *more], ignore_index=True)))
     drawn = [(look.colour, look.symbol) for name, look in looks.items() if name.startswith(("high-1", "no"))]
     assert len(drawn) == 1 + 6  # nominal
     assert len(set(drawn)) == len(drawn)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from shipid.report import paths
-from shipid.report.paths import browser, windows_of
+from shipid.report.paths import browser_figure, windows_of
 from shipid.report.selection import FEW_RUNS
-from shipid.report.wording import number
+from shipid.report.wording import number_text
 from tests.report.views import views
 
 window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
-snapshots = lru_cache(maxsize=2)(paths.snapshots)
+snapshots = lru_cache(maxsize=2)(paths.snapshots_figure)
 
 
 def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
@@ -79,7 +79,7 @@ def test_a_diverged_path_becomes_gaps(full_scale):
 def test_where_nothing_has_physics_the_panels_are_of_what_has_none(full_scale):
     """Paths were drawn below the sentence that none was recorded."""
     first = full_scale.snapshots[0]
-    error = number(float(np.hypot(*(first.paths["no physics", "cooperative", 15] - first.truth)[-1])))
+    error = number_text(float(np.hypot(*(first.paths["no physics", "cooperative", 15] - first.truth)[-1])))
     pure = {key: path for key, path in first.paths.items() if key[0] == "no physics" or key[1] != "cooperative"}
     figure = snapshots(replace(full_scale, snapshots=[replace(first, paths=pure)]))
     assert figure.takeaway == f"From panel to panel, the paths without physics end {error} m from the true place."
@@ -91,14 +91,14 @@ def test_takeaway_is_the_mean_end_error(full_scale):
         for (model, source, _), path in snapshot.paths.items():
             if model != "no physics":
                 ends[source].append(np.linalg.norm(path[-1] - snapshot.truth[-1]))
-    text = browser(full_scale).takeaway
+    text = browser_figure(full_scale).takeaway
     assert f"compensated paths by {np.mean(ends['cooperative']):.2f} m" in text
     assert f"physics alone by {np.mean(ends['physics']):.1f} m" in text
 
 
 def test_no_windows_no_browser(full_scale):
     empty = replace(full_scale, snapshots=[])
-    assert browser(empty) is None
+    assert browser_figure(empty) is None
     assert snapshots(empty) is None
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.figure import Figure
-from shipid.report.physics_and_data import error_map, gain, gain_lack, map_lack, nice_levels, smoothed
+from shipid.report.figure import PageFigure
+from shipid.report.physics_and_data import gain_figure, gain_lack, map_figure, map_lack, nice_levels, smooth_cells
 from tests.report.views import first_panel, views
 
 
@@ -22,7 +22,7 @@ def failing(simulation):
 
 
 def flat(content):
-    return first_panel(error_map(content))
+    return first_panel(map_figure(content))
 
 
 def test_every_cell_lies_at_its_accuracy_and_size(simulation):
@@ -60,7 +60,7 @@ def test_what_is_no_better_than_data_driven_is_hatched(simulation):
     assert hatched.marker.pattern.shape == "/"
     assert (
         f"in {worse} of 18 cells with physics H is not below that of no physics, none of them below A = "
-        in error_map(simulation).takeaway
+        in map_figure(simulation).takeaway
     )
 
 
@@ -84,7 +84,7 @@ def test_a_failed_cell_is_a_cross_and_no_line_passes_it(failing):
     lines = [trace for trace in figure.data if trace.type == "contour"]
     assert lines
     assert all(np.isnan(trace.z[5, 0]) and np.isfinite(trace.z[5, 1:]).all() for trace in lines)
-    assert "high-2 at N_D = 10 (diverged)" in error_map(failing).how
+    assert "high-2 at N_D = 10 (diverged)" in map_figure(failing).how
 
 
 def test_every_row_with_an_A_has_its_name_and_no_name_covers_another(simulation):
@@ -115,7 +115,7 @@ def test_names_of_many_rows_are_beside_their_cells(simulation):
 def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     names = simulation.cells.model.isin(["moderate-1", "moderate-2"])
     others = simulation.cells[names].assign(model=lambda cells: cells.model + " + alone", H=1.7)
-    figure = error_map(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
+    figure = map_figure(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
     bars = first_panel(figure).data[0]
     assert len(bars.x) == 7 * 3
     assert min(bars.y) > 0.05
@@ -124,10 +124,10 @@ def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
         "Not on the map, where another method has their place: moderate-1 + alone and moderate-2 + alone." in figure.how
     )
     assert figure.takeaway.endswith(" Of several methods, the first is drawn.")
-    assert "another method" not in error_map(simulation).how
-    assert "Of several methods" not in error_map(simulation).takeaway
+    assert "another method" not in map_figure(simulation).how
+    assert "Of several methods" not in map_figure(simulation).takeaway
     both = pd.concat([simulation.cells.assign(method="learned"), others.assign(method="alone")], ignore_index=True)
-    assert error_map(replace(simulation, cells=both)).takeaway.endswith(" Of several methods, learned is drawn.")
+    assert map_figure(replace(simulation, cells=both)).takeaway.endswith(" Of several methods, learned is drawn.")
 
 
 def test_rows_of_one_method_alone_are_named_without_it(simulation):
@@ -152,7 +152,7 @@ def test_rows_of_one_method_alone_are_named_without_it(simulation):
 def test_what_a_map_lacks_is_named(simulation, kept, needs):
     """Every one of them was said to be `no rows`."""
     content = replace(simulation, cells=kept(simulation.cells))
-    assert error_map(content) is None
+    assert map_figure(content) is None
     assert re.match(f"it needs {needs}", map_lack(content))
     assert map_lack(simulation) == ""
 
@@ -171,14 +171,14 @@ def test_axes_have_ticks_at_any_size_of_error(simulation, factor):
 def test_of_several_models_without_physics_the_rival_has_its_name(simulation):
     """Another may err less than all models with physics: H is not below that of every no physics model."""
     better = simulation.cells[simulation.cells.model.eq("no physics")].assign(model="none + plain", H=0.01)
-    figure = error_map(replace(simulation, cells=pd.concat([simulation.cells, better], ignore_index=True)))
+    figure = map_figure(replace(simulation, cells=pd.concat([simulation.cells, better], ignore_index=True)))
     assert "H is not below that of no physics" in figure.takeaway
     assert "Hatched: H is not below that of no physics at the same N_D." in figure.how
 
 
 def test_a_map_of_physics_alone_speaks_of_no_rival_and_no_training(simulation):
     models, cells = (frame[frame.model.ne("no physics")] for frame in (simulation.models, simulation.cells))
-    figure = error_map(replace(simulation, models=models, cells=cells))
+    figure = map_figure(replace(simulation, models=models, cells=cells))
     assert "Hatched" not in figure.how
     assert "trained" not in figure.how
 
@@ -210,7 +210,7 @@ def test_too_few_test_manoeuvres_give_no_band(simulation):
     means = simulation.cells.groupby(["model", "N_D"], as_index=False).H.mean()
     blank = replace(simulation, frames={"intervals": means.assign(low=np.nan, high=np.nan)})
     assert not [trace for trace in flat(blank).data if trace.meta == ("bounds",)]
-    assert "95 % interval" not in error_map(blank).how
+    assert "95 % interval" not in map_figure(blank).how
 
 
 def test_levels_are_round_and_inside_the_values():
@@ -224,19 +224,19 @@ def test_levels_are_round_and_inside_the_values():
 def test_smoothing_keeps_a_level_and_gaps_and_small_grids():
     values = np.full((20, 8), 3.0)
     values[4, 2] = np.nan
-    smooth = smoothed(values, (2.0, 1.0))
+    smooth = smooth_cells(values, (2.0, 1.0))
     assert np.isnan(smooth[4, 2])
     np.testing.assert_allclose(smooth[np.isfinite(smooth)], 3.0)
     few = np.exp(np.random.default_rng(0).normal(size=(5, 3)))
-    np.testing.assert_allclose(smoothed(few, (2.0, 1.0)), few)
+    np.testing.assert_allclose(smooth_cells(few, (2.0, 1.0)), few)
     rough = np.exp(np.random.default_rng(0).normal(size=(30, 3)))
-    assert np.log(smoothed(rough, (2.0, 1.0))).std() < 0.6 * np.log(rough).std()
+    assert np.log(smooth_cells(rough, (2.0, 1.0))).std() < 0.6 * np.log(rough).std()
 
 
 LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
-def traces(figure: Figure, view: str) -> dict[str, list]:
+def traces(figure: PageFigure, view: str) -> dict[str, list]:
     """Traces of a view by name."""
     by_name: dict[str, list] = {}
     for trace in views(figure)[view][0].data:
@@ -246,7 +246,7 @@ def traces(figure: Figure, view: str) -> dict[str, list]:
 
 @pytest.mark.parametrize(("view", "column", "floor"), [("0-0", "H", 5.01), ("1-0", "H_90", 11.2), ("2-1", "rms", 6.3)])
 def test_lines_are_means_over_seeds(simulation, view, column, floor):
-    drawn = traces(gain(simulation), view)
+    drawn = traces(gain_figure(simulation), view)
     cells = simulation.cells
     for model in cells.model.unique():
         (line,) = drawn[model]
@@ -263,7 +263,7 @@ def test_a_failed_size_leaves_a_gap(simulation):
     failed = (cells.model == "high-1") & (cells.N_D == 30)
     cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
     cells.loc[failed, "status"] = "diverged"
-    figure = gain(replace(simulation, cells=cells))
+    figure = gain_figure(replace(simulation, cells=cells))
     (line,) = traces(figure, "0-0")["high-1"]
     assert list(np.isfinite(line.y)) == [True, False, True]
     assert line.connectgaps is False
@@ -275,11 +275,11 @@ def test_a_seed_that_failed_is_distinguished_from_a_cell_that_failed(simulation)
     failed = cells.model.eq("high-1") & cells.N_D.eq(30) & cells.seed.eq(1)
     cells.loc[failed, ["H", "H_90", "rms"]] = np.nan
     cells.loc[failed, "status"] = "diverged"
-    assert "high-1 at N_D = 30 (diverged, 1 of 2 seeds)" in gain(replace(simulation, cells=cells)).how
+    assert "high-1 at N_D = 30 (diverged, 1 of 2 seeds)" in gain_figure(replace(simulation, cells=cells)).how
 
 
 def test_a_logarithmic_axis_is_offered(simulation):
-    figure = gain(simulation)
+    figure = gain_figure(simulation)
     kinds = [views(figure)[view][0].layout.yaxis.type for view in ("0-0", "0-1")]
     assert kinds == [None, "log"]
     ticks = views(figure)["0-1"][0].layout.yaxis
@@ -295,7 +295,7 @@ def test_of_many_models_some_have_a_line(simulation):
     many = [pd.concat([one.assign(model=n, family=n, A=1.0 + k) for k, n in enumerate(names)]) for one in mine]
     pure = [frame[frame.model.eq("no physics")] for frame in (simulation.models, simulation.cells)]
     models, cells = (pd.concat(pair, ignore_index=True) for pair in zip(many, pure, strict=True))
-    figure = gain(replace(simulation, models=models, cells=cells, best="f02"))
+    figure = gain_figure(replace(simulation, models=models, cells=cells, best="f02"))
     drawn = [name for name in traces(figure, "0-0") if name.startswith("f") and "seed" not in name]
     assert len(drawn) == 13
     assert {"f00", "f02", "f40"} <= set(drawn)
@@ -304,27 +304,27 @@ def test_of_many_models_some_have_a_line(simulation):
         "Of 41 models with physics, 13 have a line: some spread over A and the best in validation; the others are in"
     )
     assert words in figure.how
-    assert "have a line" not in gain(simulation).how
+    assert "have a line" not in gain_figure(simulation).how
 
 
 def test_errors_far_apart_begin_on_a_logarithmic_axis(simulation):
     cells = simulation.cells
     far = cells.assign(H=cells.H.where(cells.model.ne("no physics"), 50.0))
-    starts = [gain(replace(simulation, cells=one)).controls[1].start for one in (cells, far)]
+    starts = [gain_figure(replace(simulation, cells=one)).controls[1].start for one in (cells, far)]
     assert starts == [0, 1]
 
 
 def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
     cells = simulation.cells
     means = cells[cells.N_D == 10].groupby("model").H.mean()
-    text = gain(simulation).takeaway
+    text = gain_figure(simulation).takeaway
     assert f'At N_D = 10, nominal has H = {means["nominal"]:.2f} m and "no physics" has H = ' in text
     assert f"has H = {means['no physics']:.2f} m; at N_D = 100, " in text
     assert text.endswith("nominal is the best in validation.")
 
 
 def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
-    drawn = {name: lines[0] for name, lines in traces(gain(simulation), "0-0").items()}
+    drawn = {name: lines[0] for name, lines in traces(gain_figure(simulation), "0-0").items()}
     assert drawn["no physics"].line.color == "var(--ink)"
     assert drawn["no physics"].line.width > drawn["nominal"].line.width
     models = ["nominal", "moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
@@ -335,7 +335,7 @@ def test_data_driven_is_thick_ink_and_accuracy_is_ordered_colour(simulation):
 
 
 def test_one_size_is_a_dumbbell(full_scale):
-    figure = gain(full_scale)
+    figure = gain_figure(full_scale)
     drawn = traces(figure, "0")
     (bar,), (before,), (after,) = (drawn[name] for name in ("inaccurate", "physics alone", "with compensation"))
     np.testing.assert_allclose(bar.x, [5.2, 2.05], rtol=1e-6)
@@ -354,12 +354,12 @@ def test_without_a_result_of_physics_nothing_is_counted(full_scale):
     lost = cells.family.ne("none")
     cells.loc[lost, ["H", "H_90", "rms"]] = np.nan
     cells.loc[lost, "status"] = "failed"
-    text = gain(replace(full_scale, cells=cells, best="")).takeaway
+    text = gain_figure(replace(full_scale, cells=cells, best="")).takeaway
     assert text.startswith('No physics model has a result with data; "no physics" has H = 4.30 m;')
 
 
 def test_a_failed_model_keeps_its_physics_and_shows_no_result(full_scale):
-    figure = gain(full_scale)
+    figure = gain_figure(full_scale)
     plot = views(figure)["0"][0]
     drawn = [t for t in plot.data if t.name.startswith("bare hull")]
     assert [np.isfinite(np.asarray(t.x)).tolist() for t in drawn] == [[True, False]]
@@ -378,8 +378,8 @@ def test_why_nothing_is_drawn_is_named(simulation):
     moving = replace(still, cells=alike.assign(H=alike.A + alike.N_D))  # as of physics that each cell identifies
     reasons = {"it needs rows of cells": replace(simulation, cells=physics[:0]), "no method learns from data": still}
     for reason, content in reasons.items():
-        assert gain(content) is None
+        assert gain_figure(content) is None
         assert gain_lack(content).startswith(reason)
     for content in (simulation, moving):
-        assert gain(content) is not None
+        assert gain_figure(content) is not None
         assert gain_lack(content) == ""

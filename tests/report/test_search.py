@@ -7,9 +7,16 @@ import pytest
 from scipy.stats import spearmanr
 
 from shipid.hybrid.path_drawn import MEMORIES as KINDS_BY_NUMBER
-from shipid.report.search import CEILING, FAILED, MEMORIES, importance, search_table, searched
-from shipid.report.search import search as drawn_anew
-from shipid.report.wording import short
+from shipid.report.search import (
+    DIVERGED_RATIO,
+    HIGHEST_RATIO,
+    MEMORY_WORDS,
+    search_table,
+    searched_names,
+    trial_rank_correlation,
+)
+from shipid.report.search import search_figure as drawn_anew
+from shipid.report.wording import short_text
 from tests.report.views import views
 
 search = lru_cache(maxsize=2)(drawn_anew)  # the same content is drawn once
@@ -25,7 +32,7 @@ def dots(panel):
 
 def test_a_panel_per_hyperparameter_that_varies(simulation):
     fixed = replace(simulation, trials=simulation.trials.assign(units=64.0))
-    assert searched(simulation) == ["learning_rate", "weight_decay", "units"]
+    assert searched_names(simulation) == ["learning_rate", "weight_decay", "units"]
     assert list(panels(fixed)) == ["learning rate", "weight decay"]
     assert panels(simulation)["learning rate"].layout.xaxis.type == "log"
     dropped = replace(simulation, trials=simulation.trials.assign(hidden_dropout=simulation.trials.number / 20))
@@ -46,12 +53,12 @@ def test_dots_are_relative_to_the_best_of_their_cell(simulation):
     trials = simulation.trials
     drawn = dots(panels(simulation)["learning rate"])
     assert sum(len(drawn[name].x) for name in ("complete", "stopped", "diverged", "chosen")) == len(trials)
-    assert (np.asarray(drawn["diverged"].y) == np.float32(FAILED)).all()
+    assert (np.asarray(drawn["diverged"].y) == np.float32(DIVERGED_RATIO)).all()
     assert len(drawn["diverged"].x) == trials.state.eq("diverged").sum()
     ended = trials.value.where(trials.state.eq("complete"))
     best = np.sqrt(trials.value / ended.groupby(trials.cell).transform("min"))
     stopped = trials.state.eq("stopped")
-    np.testing.assert_allclose(drawn["stopped"].y, best[stopped].clip(upper=CEILING), atol=1e-3)
+    np.testing.assert_allclose(drawn["stopped"].y, best[stopped].clip(upper=HIGHEST_RATIO), atol=1e-3)
     np.testing.assert_allclose(drawn["chosen"].x, trials.learning_rate[trials.chosen], rtol=1e-5)
 
 
@@ -77,9 +84,9 @@ def test_the_rank_correlation_is_within_cells():
     rate = np.tile([1.0, 2, 3, 4, 5], 2)
     # Within a cell the error falls; between cells it would seem to rise.
     trials = pd.DataFrame({"cell": cell, "rate": rate + 10 * (cell == "b"), "value": 9 - rate + 20 * (cell == "b")})
-    assert importance(trials, "rate") == pytest.approx(-1)
-    assert importance(trials.assign(value=[5, 1, 4, 2, 3] * 2), "rate") == pytest.approx(-0.3)
-    assert np.isnan(importance(trials.assign(value=np.nan), "rate"))
+    assert trial_rank_correlation(trials, "rate") == pytest.approx(-1)
+    assert trial_rank_correlation(trials.assign(value=[5, 1, 4, 2, 3] * 2), "rate") == pytest.approx(-0.3)
+    assert np.isnan(trial_rank_correlation(trials.assign(value=np.nan), "rate"))
 
 
 def test_the_rank_correlation_is_scipys_mean_over_cells():
@@ -92,12 +99,12 @@ def test_the_rank_correlation_is_scipys_mean_over_cells():
         parts = [part for _, part in trials.dropna().groupby("cell")]
         parts = [part for part in parts if len(part) > 2 and part.rate.nunique() > 1 and part.value.nunique() > 1]
         expected = np.mean([spearmanr(part.rate, part.value).statistic for part in parts])
-        assert importance(trials, "rate") == pytest.approx(expected)
-        assert importance(trials.astype({"rate": "Int64"}), "rate") == pytest.approx(expected)
+        assert trial_rank_correlation(trials, "rate") == pytest.approx(expected)
+        assert trial_rank_correlation(trials.astype({"rate": "Int64"}), "rate") == pytest.approx(expected)
 
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
-    correlation = importance(simulation.trials, "learning_rate")
+    correlation = trial_rank_correlation(simulation.trials, "learning_rate")
     text = f"the error goes most with learning rate, rank correlation {correlation:.2f}.".replace("-", "−")
     assert text in search(simulation).takeaway
 
@@ -114,7 +121,9 @@ def test_the_table_sums_up_by_size(simulation):
     assert rows[30]["diverged [1]"].key == mine.state.eq("diverged").sum()
     assert rows[30]["time per cell [s]"].key == pytest.approx(mine.seconds.sum() / 14)
     chosen = mine.units[mine.chosen]
-    assert rows[30]["chosen units [1]"].text == " / ".join(map(short, (chosen.min(), chosen.median(), chosen.max())))
+    assert rows[30]["chosen units [1]"].text == " / ".join(
+        map(short_text, (chosen.min(), chosen.median(), chosen.max()))
+    )
 
 
 def test_a_search_in_closed_form_says_what_there_was(simulation):
@@ -157,9 +166,9 @@ def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
 
 def test_every_kind_of_memory_has_its_words():
     """The words of what a trial takes name its kinds, and a page those that were tried."""
-    assert len(MEMORIES) == len(KINDS_BY_NUMBER) == len(set(KINDS_BY_NUMBER))
+    assert len(MEMORY_WORDS) == len(KINDS_BY_NUMBER) == len(set(KINDS_BY_NUMBER))
     names = {"history": "history", "error": "the error of the physics", "observer": "estimates of the observer"}
-    for kinds, words in zip(KINDS_BY_NUMBER, MEMORIES, strict=True):
+    for kinds, words in zip(KINDS_BY_NUMBER, MEMORY_WORDS, strict=True):
         everything = words.replace("that", names["error"]) if len(kinds) < len(names) else " ".join(names.values())
         assert {kind for kind, name in names.items() if name in everything} == set(kinds), words
 

@@ -3,28 +3,28 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from shipid.report.section import Section, declared, drawn
-from shipid.report.tables import Table
+from shipid.report.section import Section, declared_anchors, draw_sections
+from shipid.report.tables import PageTable
 
 EMPTY = pd.DataFrame()
 FULL = pd.DataFrame({"a": [1.0]})
 
 
-def table(name: str) -> Table:
-    return Table(name, name, "", ["a"], [True], [])
+def table(name: str) -> PageTable:
+    return PageTable(name, name, "", ["a"], [True], [])
 
 
 @pytest.mark.parametrize(("need", "shown"), [("full", True), ("empty", False), ("absent", False), ("number", True)])
 def test_a_section_needs_its_parts(need, shown):
     content = SimpleNamespace(full=FULL, empty=EMPTY, number=0.0)
     section = Section("A", lambda _: [table("a")], needs=("full", need))
-    assert [one.id for one in drawn({"a": section}, content)] == ["a"] * shown
+    assert [one.id for one in draw_sections({"a": section}, content)] == ["a"] * shown
 
 
 def test_it_says_which_section_is_drawn():
     said = []
     sections = {"a": Section("First", lambda _: [table("a")]), "b": Section("Second", lambda _: [], needs=("absent",))}
-    drawn(sections, SimpleNamespace(), said.append)
+    draw_sections(sections, SimpleNamespace(), said.append)
     assert said == ["drawing: First"]
 
 
@@ -32,7 +32,7 @@ def test_nothing_is_drawn_of_a_section_that_is_left_out():
     def fails(_):
         raise AssertionError
 
-    assert drawn({"a": Section("A", fails, needs=("absent",))}, SimpleNamespace()) == []
+    assert draw_sections({"a": Section("A", fails, needs=("absent",))}, SimpleNamespace()) == []
 
 
 def test_order_and_gaps():
@@ -41,7 +41,7 @@ def test_order_and_gaps():
         "none": Section("Nothing", lambda _: [None]),
         "a": Section("A", lambda _: (table("a"),)),
     }
-    assert [(one.id, one.title, [i.id for i in one.items]) for one in drawn(sections, None)] == [
+    assert [(one.id, one.title, [i.id for i in one.items]) for one in draw_sections(sections, None)] == [
         ("b", "B", ["b"]),
         ("a", "A", ["a"]),
     ]
@@ -49,4 +49,4 @@ def test_order_and_gaps():
 
 def test_declared_anchors():
     sections = {"a": Section("A", lambda _: [], anchors=("x", "y")), "b": Section("B", lambda _: [], anchors=("z",))}
-    assert declared(sections) == {"x", "y", "z", "findings", "provenance"}
+    assert declared_anchors(sections) == {"x", "y", "z", "findings", "provenance"}

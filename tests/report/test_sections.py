@@ -7,7 +7,7 @@ import pytest
 from shipid.answer.pages import REPORT_FRAMES
 from shipid.report import ReportContent, checks, identification, manoeuvre
 from shipid.report.page import render_page
-from shipid.report.section import OF_EVERY_PAGE, Section, drawn
+from shipid.report.section import OF_EVERY_PAGE, Section, draw_sections
 from shipid.report.sections import SECTIONS
 from tests.documented import module
 from tests.report import test_checks, test_identification, test_manoeuvre
@@ -25,7 +25,7 @@ def test_every_item_drawn_is_declared_and_no_id_twice(page, simulation_drawn):
     """What a section draws, its anchors name: a sentence may link to it."""
     sections, make = PAGES[page]
     seen = []
-    for one in drawn(sections, make()) if make else simulation_drawn:
+    for one in draw_sections(sections, make()) if make else simulation_drawn:
         ids = [item.id for item in one.items]
         assert set(ids) <= set(sections[one.id].anchors), one.id
         seen += ids
@@ -45,7 +45,7 @@ def test_no_id_is_declared_twice(page):
 def test_the_section_of_the_page_on_adding_is_drawn(simulation, monkeypatch):
     """The code of docs/extending.md: a section, and a frame of what a study holds."""
     slow = module("A section of the report", "slow_of_the_page", monkeypatch)
-    (section,) = drawn({"time": slow.SECTION}, simulation)
+    (section,) = draw_sections({"time": slow.SECTION}, simulation)
     (table,) = section.items
     longest = sorted(simulation.cells["seconds"], reverse=True)[:5]
     assert [row[1].text for row in table.rows] == [f"{seconds:.0f} s" for seconds in longest]

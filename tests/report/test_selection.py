@@ -5,29 +5,37 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipid.report.selection import exemplars, families, middles, sizes, spread, thinned, trained
+from shipid.report.selection import (
+    close_up_models,
+    errors_over_seeds,
+    middle_models,
+    models_by_accuracy,
+    shown_sizes,
+    spread_items,
+    thin_lines,
+)
 
 
 def test_few_models_are_all_drawn_many_by_their_middle(simulation, full_scale):
-    assert exemplars(full_scale) == list(families(full_scale).model)
-    assert exemplars(simulation) == ["nominal", "moderate-2", "high-2", "no physics"]
-    assert list(families(simulation).model)[-1] == "no physics"
+    assert close_up_models(full_scale) == list(models_by_accuracy(full_scale).model)
+    assert close_up_models(simulation) == ["nominal", "moderate-2", "high-2", "no physics"]
+    assert list(models_by_accuracy(simulation).model)[-1] == "no physics"
 
 
 def test_the_largest_families_come_first(simulation):
-    assert list(middles(simulation).items())[:2] == [("moderate", "moderate-2"), ("high", "high-2")]
+    assert list(middle_models(simulation).items())[:2] == [("moderate", "moderate-2"), ("high", "high-2")]
 
 
 def test_sizes_are_ends_and_middle():
-    assert sizes(pd.Series([0, 30, 10, 100, 50, 10])) in ([10, 30, 100], [10, 50, 100])
-    assert sizes(pd.Series([0, 30, 10, 100])) == [10, 30, 100]
-    assert sizes(pd.Series([15, 15])) == [15]
-    assert sizes(pd.Series([0, 0])) == [0]
-    assert spread(["a", "b"], 3) == ["a", "b"]
+    assert shown_sizes(pd.Series([0, 30, 10, 100, 50, 10])) in ([10, 30, 100], [10, 50, 100])
+    assert shown_sizes(pd.Series([0, 30, 10, 100])) == [10, 30, 100]
+    assert shown_sizes(pd.Series([15, 15])) == [15]
+    assert shown_sizes(pd.Series([0, 0])) == [0]
+    assert spread_items(["a", "b"], 3) == ["a", "b"]
 
 
 def test_cells_without_result_do_not_enter_the_mean(full_scale):
-    means = trained(full_scale)
+    means = errors_over_seeds(full_scale)
     assert len(means) == 3
     assert means.H.notna().all()
     assert (means.seeds == 1).all()
@@ -36,7 +44,7 @@ def test_cells_without_result_do_not_enter_the_mean(full_scale):
 @given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=2, max_size=40), st.floats(0.01, 5))
 def test_no_dropped_point_is_farther_than_the_tolerance(points, tolerance):
     line = np.asarray(points)
-    (kept,) = thinned([line], tolerance)
+    (kept,) = thin_lines([line], tolerance)
     assert kept[0] == 0
     assert kept[-1] == len(line) - 1
     for first, last in itertools.pairwise(kept):
@@ -49,12 +57,12 @@ def test_no_dropped_point_is_farther_than_the_tolerance(points, tolerance):
 
 def test_a_straight_line_needs_two_points_and_a_loop_more():
     straight = np.column_stack([np.arange(100.0), 2 * np.arange(100.0)])
-    assert list(thinned([straight], 0.1)[0]) == [0, 99]
+    assert list(thin_lines([straight], 0.1)[0]) == [0, 99]
     angle = np.linspace(0, 2 * np.pi, 200)
     loop = np.column_stack([np.cos(angle), np.sin(angle)])
-    assert 10 < len(thinned([loop], 0.01)[0]) < 60
-    together = thinned([straight, loop, straight[:1]], 0.1)
-    alone = [thinned([line], 0.1)[0] for line in (straight, loop, straight[:1])]
+    assert 10 < len(thin_lines([loop], 0.01)[0]) < 60
+    together = thin_lines([straight, loop, straight[:1]], 0.1)
+    alone = [thin_lines([line], 0.1)[0] for line in (straight, loop, straight[:1])]
     for one, other in zip(together, alone, strict=True):
         np.testing.assert_array_equal(one, other)
-    assert thinned([], 0.1) == []
+    assert thin_lines([], 0.1) == []

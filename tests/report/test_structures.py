@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from shipid.report.section import declared
+from shipid.report.section import declared_anchors
 from shipid.report.structures import STRUCTURES_PAGE, StructuresContent, group_errors, write_structures
 
 ROW = {"numbers": 18, "u": 0.01, "v": 0.01, "r": 0.001, "position": 0.1, "test": float("nan"), "note": ""}
@@ -41,5 +41,5 @@ def test_the_page_shows_all_and_escapes_names(tmp_path: Path) -> None:
 
 
 def test_every_link_leads_somewhere() -> None:
-    assert {sentence.figure for sentence in content().answer} - {"", None} <= declared(STRUCTURES_PAGE)
+    assert {sentence.figure for sentence in content().answer} - {"", None} <= declared_anchors(STRUCTURES_PAGE)
     assert group_errors(pd.DataFrame(), "") is None

@@ -1,5 +1,5 @@
 from shipid.report import write_summary
-from shipid.report.summary import summary
+from shipid.report.summary import summary_text
 
 
 def test_summary_holds_answer_numbers_and_provenance(tmp_path, full_scale):
@@ -12,7 +12,7 @@ def test_summary_holds_answer_numbers_and_provenance(tmp_path, full_scale):
 
 
 def test_names_are_text_and_rows_stay_rows(full_scale):
-    text = summary(full_scale)
+    text = summary_text(full_scale)
     assert "<script>" not in text
     tables = [line for line in text.splitlines() if line.startswith("|")]
     row = next(line for line in tables if "diverged" in line)

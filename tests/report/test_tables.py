@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from shipid.report.cells import cells_table as cells
 from shipid.report.factors import models_table as models
-from shipid.report.logs import envelope_table as envelope
+from shipid.report.logs import input_ranges as envelope
 from shipid.report.logs import repairs_table as repairs
-from shipid.report.tables import Cell, cell_html, number_cell, word_cell
+from shipid.report.tables import TableCell, cell_html, number_cell, word_cell
 
 
 def test_numbers_align_and_what_is_missing_sorts_last():
@@ -77,7 +77,7 @@ WORDS = st.text(alphabet="aB é–1.<>&\"'", max_size=40)
 @given(WORDS, st.floats(allow_nan=False) | WORDS, st.booleans(), st.booleans())
 def test_a_cell_is_read_back_from_its_element(words, key, numeric, first):
     """Text and key survive HTML; a key that is left out is the text in small letters, as page.js reads it."""
-    root = ElementTree.fromstring(cell_html(Cell(words, key), numeric, first))
+    root = ElementTree.fromstring(cell_html(TableCell(words, key), numeric, first))
     assert (root.text or "") == words
     read = root.get("data-key", words.lower())
     expected = f"{key:.6g}" if isinstance(key, float) else key

@@ -6,10 +6,10 @@ from itertools import product
 
 import plotly.graph_objects as go
 
-from shipid.report.figure import Figure
+from shipid.report.figure import PageFigure
 
 
-def views(figure: Figure) -> dict[str, list[go.Figure]]:
+def views(figure: PageFigure) -> dict[str, list[go.Figure]]:
     """Indices of the options of the controls, joined by `-` -> panels; one view of the key "" without controls."""
     result = {}
     for places in product(*(range(len(control.options)) for control in figure.controls)):
@@ -18,6 +18,6 @@ def views(figure: Figure) -> dict[str, list[go.Figure]]:
     return result
 
 
-def first_panel(figure: Figure, view: str | None = None) -> go.Figure:
+def first_panel(figure: PageFigure, view: str | None = None) -> go.Figure:
     """The first panel of a view; default: the one that a reader sees first."""
     return views(figure)["-".join(str(control.start) for control in figure.controls) if view is None else view][0]
