@@ -31,7 +31,7 @@ from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import constant_motion, obtain_runs, partition, path_source, window_memory
-from shipid.study.results import judged_cells, read_results
+from shipid.study.results import read_results
 from shipid.vessel.load import load_vessel
 from tests.logs.judged_raw import judge_raw
 from tests.strangers_raw import RawStranger, raw_stranger
@@ -196,7 +196,7 @@ def _studied(ship: RawStranger, desk: Desk, times: int, stage: str) -> dict[str,
 def figures_of(ship: RawStranger, plan: Plan, folder: Path) -> dict[str, Any]:
     """Errors over that of constant u, v, r, on the test runs."""
     results = read_results(folder)
-    cells, imported = judged_cells(results), results.dataset
+    cells, imported = results.judged_cells, results.dataset
     _, test, _ = partition(plan, imported)
     constant = float(position_error(constant_motion(test), test.future).mean())
     with_physics = cells[cells["family"] != "none"]

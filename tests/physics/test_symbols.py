@@ -11,7 +11,9 @@ from shipid.physics.symbols import argument_types
 
 
 @pytest.mark.parametrize(
-    "function", {one for term in TERMS.values() for one in term.functions}, ids=lambda f: f.__name__
+    "function",
+    sorted({one for term in TERMS.values() for one in term.functions}, key=lambda f: f.__name__),
+    ids=lambda f: f.__name__,
 )
 def test_types_of_every_function_of_shipid_are_read_without_casadi(function: Callable[..., Any]) -> None:
     """Only the type of symbols is another: units, marks and defaults are the same."""
