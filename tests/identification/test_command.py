@@ -17,6 +17,7 @@ from shipid.cli import identify as command
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
 from shipid.identification import outcome
+from shipid.identification.design import candidate_manoeuvres
 from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of
 from tests.identification.trials import trials
@@ -40,6 +41,7 @@ def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome.design, "candidates", lambda *_: candidate_manoeuvres(SHIP, [3.0])[8:])
     text = output_of(
         *("identify", "gunnerus-28.9", file, "--parameters", f"{ONE}, hull.derivatives.N_uv"),
         *("--prior", "hull.*[order >= 2]=0.5", "--bounds", f"{ONE}=[0.5, 2]", "--horizon", 0, "--test", "*3"),
@@ -70,23 +72,6 @@ def test_settings_of_a_file_give_way_to_options(file: Path, monkeypatch: pytest.
     text = Path("a.toml").read_text()
     assert "horizon = 20" in text
     assert 'method = "euler"' in text
-
-
-def test_spaces_after_commas_and_around_equals_signs_are_no_part_of_a_path(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """--together and --prior refused them, and asked for the same path."""
-    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    monkeypatch.setattr(command, "_look_first", lambda *_: None)
-    both = f"{ONE}, hull.derivatives.N_uv"
-    output_of(
-        *("identify", "gunnerus-28.9", file, "--parameters", both, "--together", both, "--prior", "hull.* = 0.5"),
-        *("--set", "weights.u = 0.05", "--horizon", 20, "--out", "a.toml"),
-    )
-    given = tomllib.loads(Path("a.toml").read_text())["provenance"]["settings"]
-    assert given["together"] == [[ONE, "hull.derivatives.N_uv"]]
-    assert given["prior"] == {"hull.*": 0.5}
-    assert given["weights"]["u"] == 0.05
 
 
 def test_programs_get_how_the_fit_ended_and_whose_errors_it_has(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,15 +156,6 @@ def test_a_vessel_that_does_not_fit_is_one_line(vessel: str, parameters: str, me
     with pytest.raises(ShipidError, match=message):
         output_of("identify", vessel, file, "--parameters", parameters)
     assert [one.name for one in Path().iterdir()] == [file.name]
-
-
-def test_the_shell_sees_one_line_and_exit_status_1(tmp_path: Path) -> None:
-    (tmp_path / "log.parquet").write_text("no")
-    log = tmp_path / "log.parquet"
-    status, out, err = ended("identify", "gunnerus-28.9", log, "--parameters", ONE, "--out", tmp_path / "a.toml")
-    assert (status, out) == (1, "")
-    assert err.count("\n") == 1
-    assert "not a Parquet file" in err
 
 
 def test_ctrl_c_is_one_line_and_writes_nothing(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

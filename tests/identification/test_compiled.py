@@ -14,18 +14,6 @@ from shipid.vessel.load import load_vessel
 SHIP = load_vessel("gunnerus-28.9")
 
 
-def test_packing_groups_predictions_and_repeats_the_last() -> None:
-    lanes = compiler_target().lanes
-    count = lanes + 1
-    array = np.arange(count * 6, dtype=float).reshape(count, 3, 2)
-    packed = pack_lanes(array)
-    assert packed.shape == (2, 3, 2, lanes)
-    assert packed.flags.c_contiguous
-    back = np.moveaxis(packed, -1, 1).reshape(-1, 3, 2)
-    assert np.array_equal(back[:count], array)
-    assert (back[count:] == array[-1]).all()
-
-
 @pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 def test_compiled_outputs_are_those_of_the_virtual_machine() -> None:
     layout = FitLayout(vessel_dynamics(SHIP), (("inertia.m",),), ("u", "r"), (), (), 0, 0.5, "euler")

@@ -9,13 +9,10 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.identification.design import (
-    Candidate,
     Informed,
     Limits,
-    _cut_predictions,
     candidate_manoeuvres,
     information_of_candidates,
     information_where_possible,
@@ -33,11 +30,8 @@ from shipid.simulation.manoeuvre import (
     TurningCircle,
     Zigzag,
 )
-from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.standard import define_standard
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import Particulars, first_guess
-from tests.conftest import variety
 
 SHIP = load_vessel("gunnerus-28.9")
 WEIGHTS = {"u": 0.1, "v": 0.1, "r": 0.0035}
@@ -91,31 +85,6 @@ def test_information_adds() -> None:
     assert (then["gain"] < table["gain"].reindex(then.index)).all()
 
 
-def test_ranks_do_not_depend_on_scales_of_factors() -> None:
-    """Gains are ratios of determinants: with the present information scaled alike, they are the same."""
-    scale, there = np.diag([1e3, 1.0, 1e-2, 5.0]), np.diag([4.0, 25.0, 9.0, 1e4])
-    scaled = [Informed(one.candidate, scale @ one.information @ scale) for one in informed_choice()]
-    one = rank_candidates(informed_choice(), PATHS, there - np.eye(4))
-    other = rank_candidates(scaled, PATHS, scale @ there @ scale - np.eye(4))
-    assert list(one["manoeuvre"]) == list(other["manoeuvre"])
-    np.testing.assert_allclose(one["gain"], other["gain"], rtol=1e-6)
-
-
-def test_twice_the_value_is_twice_the_sensitivity() -> None:
-    """The unknown is a factor on `scale`: information goes with its square."""
-    double = information_of_candidates(
-        SHIP, CHOICE[:1], GROUPS, scale=[[2 * SHIP.parameters[path]] for path in PATHS], weights=WEIGHTS
-    )  # fmt: skip
-    np.testing.assert_allclose(double[0].information, 4 * informed_choice()[0].information, rtol=1e-2)
-
-
-def test_the_gain_of_one_factor_is_what_its_standard_error_shrinks_by() -> None:
-    single = [Informed(one.candidate, one.information[:1, :1]) for one in informed_choice()]
-    table = rank_candidates(single, PATHS[:1])
-    np.testing.assert_allclose(table["gain"], np.log2(table["before"] / table["after"]), rtol=1e-6)
-    assert table["per_hour"].is_monotonic_decreasing
-
-
 def test_sensitivities_are_those_of_the_trajectory() -> None:
     """Free starts cost information; half the standard deviation brings four times as much; longer predictions more."""
     short = information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights=WEIGHTS, horizon=5.0)[0].information
@@ -143,15 +112,6 @@ def test_what_the_ship_cannot_perform_is_left_out_and_the_others_are_as_they_wer
         )
 
 
-def test_limits_of_the_actuators_hold() -> None:
-    weak = candidate_manoeuvres(SHIP, [3.0], Limits(angle_deg=15.0, n_rpm=120.0))
-    angles = [getattr(one.manoeuvre, "angle_deg", 0.0) for one in weak]
-    time = np.linspace(0, 100, 200)
-    assert max(angles) <= 15.0
-    assert max(np.abs(one.manoeuvre.shaft(time)).max() for one in weak) <= 2.0 + 1e-9
-    assert len(weak) < len(CHOICE)
-
-
 @pytest.mark.parametrize(
     ("manoeuvre", "helm", "rpm"),
     [
@@ -174,43 +134,11 @@ def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, hel
     assert np.abs(manoeuvre.shaft(time)).max() <= rpm / 60 + 1e-9
 
 
-@pytest.mark.parametrize("name", ["gunnerus-33.9", "roll", "six"])
-def test_predictions_go_on_as_the_run_was_logged(name: str) -> None:
-    """Their starts are along the ship's axes, the velocities of a log are horizontal: the next start is met."""
-    ship = variety()[name]
-    one = TurningCircle(n_rpm=180, approach="rest", duration=60)
-    log = perform_manoeuvres(ship, [one], step=0.2, environment={})
-    cut = _cut_predictions(ship, log, 50, 5)
-    how = {"step": 0.2, "num_steps": 50, "method": "rk4", "memory": cut.memory or None}
-    path = rollout(ship, cut.start, cut.commands, cut.environment, **how)  # type: ignore[arg-type]
-    for state in ("u", "v", "r"):
-        np.testing.assert_allclose(path[state][-1, 0, :-1], cut.start[state][1:], rtol=1e-5, atol=1e-7)
-
-
-def test_position_and_heading_and_whole_runs_count() -> None:
-    more = {**WEIGHTS, "psi": 0.01, "position": 1.0}
-    zigzag = Candidate("zigzag", define_standard(SHIP, "zigzag", (10.0, 10.0), speed=3.0, duration=60.0).manoeuvre)
-    one = information_of_candidates(SHIP, [zigzag], GROUPS, weights=WEIGHTS, horizon=0.0)[0].information
-    all_ = information_of_candidates(SHIP, [zigzag], GROUPS, weights=more, horizon=0.0)[0].information
-    assert np.linalg.eigvalsh(all_ - one).min() > -1e-6 * np.trace(one)
-    assert all_[2, 2] > 1.1 * one[2, 2]
-
-
 def test_mistakes_are_reported() -> None:
     with pytest.raises(ShipidError, match="position"):
         information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
     with pytest.raises(ShipidError, match="within the limits"):
         information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
-
-
-def test_a_zigzag_is_replayed_as_logged() -> None:
-    """Copies get the orders of the log: the helmsman would answer each copy differently, at whole steps."""
-    zigzag = Candidate("zigzag", Zigzag(n_rpm=120, angle_deg=20, execute_heading_deg=20, duration=90))
-    fine, coarse = (
-        information_of_candidates(SHIP, [zigzag], GROUPS, weights=WEIGHTS, step=step)[0].information
-        for step in (0.1, 0.2)
-    )
-    np.testing.assert_allclose(np.diag(fine), np.diag(coarse), rtol=0.05)
 
 
 def test_recorded_limits_are_those_of_the_shafts_that_drive_the_ship() -> None:

@@ -8,31 +8,26 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shipid.data.dataset import Dataset
 from shipid.identification import fit
 from shipid.identification.fit import Point, _Evaluation, evaluate_factors, huber_loss, initial_point, search_factors
 from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.settings import Identify
-from shipid.simulation.manoeuvre import Zigzag
-from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import load_vessel
-from tests.identification.trials import changed, trials
+from tests.identification.trials import noisy, trials
 
 SHIP = load_vessel("gunnerus-28.9")
 PATHS = ["hull.derivatives.Y_uv", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
 
 
 def problem(**more: object) -> Problem:
-    data, rng = trials(SHIP, runs=3, steps=30), np.random.default_rng(4)
-    noisy = changed(
-        data, **{k: data.frame[k] + rng.normal(0, s, len(data.frame)) for k, s in (("u", 0.05), ("r", 3e-3))}
-    )
+    log = noisy(trials(SHIP, runs=3, steps=30), {"u": 0.05, "r": 3e-3}, 4)
     settings = Identify(**{"parameters": PATHS, "horizon": 0, "weights": {"u": 0.05, "v": 0.05, "r": 0.003}, **more})
-    return build_problem(SHIP, noisy, noisy.runs, settings)
+    return build_problem(SHIP, log, log.runs, settings)
 
 
-@pytest.mark.parametrize("loss_kind", ["squared", "huber"])
-@pytest.mark.parametrize("nuisance", [[], ["initial_state"], ["velocity_bias", "current"]])
+@pytest.mark.parametrize(
+    ("nuisance", "loss_kind"), [(["initial_state"], "squared"), (["velocity_bias", "current"], "huber")]
+)
 def test_the_gradient_is_that_of_the_objective(nuisance: list[str], loss_kind: str) -> None:
     """With the unknowns of the runs eliminated anew at each place, priors of the factors included."""
     task = problem(nuisance=nuisance, loss=loss_kind, prior={"hull.*": 0.5})
@@ -60,28 +55,6 @@ def test_the_unknowns_of_the_runs_are_where_they_are_best() -> None:
         moved = task.whole, rng.normal(0, 0.05, best.at.nuisances.shape), rng.normal(0, 0.05, best.at.away.shape)
         again = evaluate_factors(task, factors, Point(best.at.nuisances + moved[1], best.at.away + moved[2]))
         assert again.objective == pytest.approx(best.objective, rel=1e-8)
-
-
-@pytest.mark.parametrize("growing", [-1.0, -2.0, -3.0])
-def test_a_straight_run_of_a_ship_whose_yaw_would_grow_has_a_best_start(growing: float) -> None:
-    """Nothing disturbs it, but the derivatives to its initial yaw rate grow beyond 10^9."""
-    data = trials(SHIP, runs=1, steps=120)
-    still = np.zeros(len(data.frame))
-    straight = changed(data, u=still + 3.0, **dict.fromkeys(("v", "r", "port.alpha", "starboard.alpha"), still))
-    task = build_problem(
-        SHIP, straight, straight.runs, Identify(parameters=PATHS, horizon=0, nuisance=["initial_state"])
-    )
-    costs = [
-        evaluate_factors(task, np.array([1.0, 1.0, factor]), initial_point(task)).objective for factor in (1.0, growing)
-    ]
-    assert costs[1] == pytest.approx(costs[0], rel=1e-6)
-
-
-def test_rows_that_scipy_sees_do_not_grow_with_the_log() -> None:
-    task = problem()
-    value = evaluate_factors(task, np.ones(3), initial_point(task))
-    assert value.f.shape == (3 * 4,)  # of each run one row a factor and one for what is left
-    assert value.objective == pytest.approx(float((value.at.r**2).sum()), rel=1e-12)
 
 
 def test_the_loss_is_linear_beyond_its_threshold() -> None:
@@ -112,14 +85,13 @@ def test_it_ends_where_whoever_looks_on_asks() -> None:
     assert (none.status, none.iterations, none.factors.tolist()) == ("stopped", 0, begin.tolist())
 
 
-@pytest.mark.parametrize("slope", [1.0, 10.0, 100.0])
-def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """(1 + slope |y - x|)^2 + (x - 3)^2 / 9 is least at (3, 3); from (0, 0) every step of one side's slope goes up."""
+def test_a_search_goes_on_along_a_kink(monkeypatch: pytest.MonkeyPatch) -> None:
+    """(1 + 10 |y - x|)^2 + (x - 3)^2 / 9 is least at (3, 3); from (0, 0) every step of one side's slope goes up."""
 
     def kinked(_: object, at: np.ndarray, __: object) -> _Evaluation:
         side = 1.0 if at[1] >= at[0] else -1.0
-        f = np.array([1 + slope * side * (at[1] - at[0]), (at[0] - 3) / 3])
-        J = np.array([[-slope * side, slope * side], [1 / 3, 0.0]])
+        f = np.array([1 + 10.0 * side * (at[1] - at[0]), (at[0] - 3) / 3])
+        J = np.array([[-10.0 * side, 10.0 * side], [1 / 3, 0.0]])
         return _Evaluation(at, SimpleNamespace(nuisances=None, away=None), f, J)  # type: ignore[arg-type]
 
     monkeypatch.setattr(fit, "evaluate_factors", kinked)
@@ -128,27 +100,3 @@ def test_a_search_goes_on_along_a_kink(slope: float, monkeypatch: pytest.MonkeyP
     assert end.status == "ok"
     assert end.objective < 1.05
     np.testing.assert_allclose(end.factors, 3, atol=0.7)
-
-
-@pytest.mark.slow
-def test_a_search_does_not_end_where_a_gauss_newton_step_still_goes_down() -> None:
-    """Zigzags stepped ten times as finely, fitted from wild factors: kinks of |v| and |r| stop short steps."""
-    runs = [Zigzag(name=side, n_rpm=145, side=side, angle_deg=20, duration=60) for side in ("starboard", "port")]
-    log = perform_manoeuvres(SHIP, runs, step=0.1, interval=1.0)
-    data = Dataset(log[[name for name in log if not name.startswith("actual.")]], {"clock": "run", "flags": []})
-    settings = Identify(parameters=["hull.derivatives.*"], weights={"u": 0.05, "v": 0.05, "r": 0.002}, horizon=0)
-    here = build_problem(SHIP, data, data.runs, settings)
-    ended = 0
-    for seed in range(3):
-        factors = np.random.default_rng(seed).uniform(0, 2, here.num_factors)
-        result = search_factors(here, factors, initial_point(here))
-        if result.status != "ok":
-            continue
-        ended += 1
-        point = Point(result.at.nuisances, result.at.away)
-        best = evaluate_factors(here, result.factors, point)
-        scale = np.maximum(np.linalg.norm(best.J, axis=0), 1e-300)
-        step = np.linalg.lstsq(best.J / scale, best.f, rcond=1e-9)[0] / scale
-        trials = [evaluate_factors(here, result.factors - 0.5**k * step, point).objective for k in range(8)]
-        assert min(trials) >= best.objective * (1 - 1e-5), seed
-    assert ended

@@ -7,7 +7,7 @@ import numpy as np
 from shipid.data.dataset import Dataset
 from shipid.identification.late import CONSIDERABLE, held_over_steps, interpolate_commands, late_commands
 from shipid.vessel.dynamics import vessel_dynamics
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import load_vessel
 from tests.conftest import variety
 from tests.identification.trials import trials
 
@@ -35,11 +35,6 @@ def test_orders_that_never_change_are_not_late() -> None:
     steering = [name for name in DATA.commands if name.endswith(".alpha")]
     held = Dataset(DATA.frame.assign(**dict.fromkeys(steering, 0.1)), DATA.metadata)
     assert late_commands(SHIP, held, held.runs) is None
-
-
-def test_a_vessel_without_a_length_is_not_judged() -> None:
-    ship = Vessel({key: value for key, value in SHIP.document.items() if key != "particulars"}, SHIP.file)
-    assert late_commands(ship, at(1.0), DATA.runs) is None
 
 
 def test_at_the_rows_and_in_the_middle_between_them() -> None:

@@ -9,7 +9,7 @@ from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.identification import residuals
 from shipid.identification.residuals import Predictions, build_problem, predict_residuals
-from shipid.identification.settings import NUISANCES, Identify
+from shipid.identification.settings import Identify
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED, variety
@@ -108,17 +108,3 @@ def test_what_no_signal_feels_is_left_out() -> None:
     assert plain.model.node == ("u", "v", "r")
     wanted = Identify(parameters=["hull.derivatives.*"], horizon=0, weights={"position": 1.0})
     assert build_problem(vessel, dataset, dataset.runs, wanted).model.node == ("north", "east", "psi", "u", "v", "r")
-
-
-@pytest.mark.parametrize("name", NUISANCES)
-def test_every_nuisance_may_stand_alone(name: str) -> None:
-    """One unknown per run, of any kind, and finite slopes of each."""
-    vessel = load_vessel("gunnerus-28.9")
-    dataset = trials(vessel, runs=2, steps=24)
-    wanted = Identify(parameters=["hull.derivatives.N_ur"], weights=EVERY, nuisance=[name], horizon=0)
-    fit = build_problem(vessel, dataset, dataset.runs, wanted)
-    here = predict_residuals(fit, np.ones(1), np.full((2, len(fit.names)), 0.1))
-    assert here.by_nuisance.shape == (len(here.r), len(fit.names))
-    assert np.isfinite(here.by_nuisance).all()
-    assert len(fit.names) == len(NUISANCES[name])
-    assert not fit.names or np.abs(here.by_nuisance).max() > 0

@@ -7,7 +7,7 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.residuals import Predictions, build_problem, predict_residuals
+from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.segments import cut_segments, too_short
 from shipid.identification.settings import Identify
 from shipid.vessel.dynamics import vessel_dynamics
@@ -19,7 +19,7 @@ SHIP = load_vessel("gunnerus-28.9")
 DATA = trials(SHIP, runs=2, steps=50)
 
 
-@pytest.mark.parametrize("step", [1.0, 0.5, 2.0])
+@pytest.mark.parametrize("step", [1.0, 0.5])
 def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one(step: float) -> None:
     for horizon, lengths in ((0.0, [50]), (20.0, [20, 20, 10]), (30.0, [30, 20]), (22.0, [22, 22]), (80.0, [50])):
         segments = cut_segments(SHIP, DATA, DATA.runs, step, horizon)
@@ -29,7 +29,7 @@ def test_a_run_is_cut_into_horizons_and_its_end_counts_from_half_of_one(step: fl
     assert too_short(DATA, DATA.runs, step, 104.0) == list(DATA.runs)
 
 
-@pytest.mark.parametrize("begin", range(0, 20, 3))
+@pytest.mark.parametrize("begin", [0, 9])
 def test_a_run_has_as_many_steps_in_seconds_since_1970(begin: int) -> None:
     """Twenty rows a second: the last of them ends a step, though such times are rounded to some 1e-7 s."""
     rows = DATA.frame[DATA.frame["t"] < 50]
@@ -73,22 +73,6 @@ def test_a_break_parts_a_run() -> None:
     assert [(one.t[0], one.num_steps) for one in segments] == [(0.0, 19), (20.0, 30)]
 
 
-def test_what_was_not_measured_does_not_count() -> None:
-    frame = DATA.frame[DATA.frame["t"] % 5 == 0].reset_index(drop=True)
-    sparse = Dataset(frame, DATA.metadata)
-    fit = build_problem(SHIP, sparse, sparse.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=0))
-    at = predict_residuals(fit, np.ones(1), np.zeros((2, 0)))
-    assert sorted(set(at.time)) == [5.0 * i for i in range(1, 11)]
-    assert np.abs(at.r).max() < 1e-9  # orders are held over ten steps: nothing is lost with the rows
-
-
-def test_a_shorter_segment_is_padded_without_weight() -> None:
-    fit = build_problem(SHIP, DATA, DATA.runs, Identify(parameters=["hull.derivatives.N_ur"], horizon=30))
-    side_by_side = Predictions(fit)
-    assert side_by_side.weight.shape == (4, 30, 3)  # 30 + 20 steps, twice
-    assert (side_by_side.weight > 0).all(axis=2).sum(axis=1).tolist() == [30, 20] * 2
-
-
 def test_wind_that_was_logged_is_felt() -> None:
     V_w, beta_w = np.array([8.0, 4.0]), np.array([0.5, 2.5])
     windy = trials(SHIP, runs=2, steps=30, weather={"V_w": V_w, "beta_w": beta_w})
@@ -109,10 +93,9 @@ def test_a_command_that_was_not_logged_is_reported() -> None:
         cut_segments(SHIP, without, without.runs, 1.0, 0.0)
 
 
-@pytest.mark.parametrize("name", ["roll", "six"])
-def test_a_ship_that_heels_is_seen_in_the_horizontal_plane(name: str) -> None:
+def test_a_ship_that_heels_is_seen_in_the_horizontal_plane() -> None:
     """u, v and r of a log are horizontal; the states of a ship with 4 or 6 degrees of freedom are along its axes."""
-    vessel = variety()[name]
+    vessel = variety()["six"]
     data = trials(vessel, runs=2, steps=40)
     assert np.abs(data.frame["phi"]).max() > 0.02
     wanted = Identify(parameters=["hull.derivatives.N_uv"], horizon=10, weights={"u": 1e-3, "v": 1e-3, "r": 1e-4})
@@ -137,17 +120,6 @@ def test_actuators_lag_as_in_each_run() -> None:
     assert max(worst[2:]) < 1e-6
 
 
-def test_no_segment_begins_between_far_rows() -> None:
-    """A state between the two rows at the ends of a time without rows is no initial state."""
-    data = trials(SHIP, runs=1, steps=60)
-    t = data.frame["t"]
-    gap = Dataset(data.frame[(t < 20.5) | (t > 45.5)], data.metadata)
-    whole, cut = (cut_segments(SHIP, one, one.runs, 1.0, 20.0) for one in (data, gap))
-    assert [(one.t[0], one.t[-1]) for one in whole] == [(0.0, 20.0), (20.0, 40.0), (40.0, 60.0)]
-    assert [(one.t[0], one.t[-1]) for one in cut] == [(0.0, 20.0), (20.0, 40.0), (46.0, 60.0)]
-    assert all(one.measured[0] for one in cut)
-
-
 def test_every_segment_begins_at_a_row_and_no_row_is_left_out() -> None:
     """A state interpolated between two rows is wrong by what happened there: at the true numbers nothing is left."""
     coarse = Dataset(DATA.frame[DATA.frame["t"] % 5 == 0], DATA.metadata)
@@ -159,17 +131,3 @@ def test_every_segment_begins_at_a_row_and_no_row_is_left_out() -> None:
     assert np.abs(at.r).max() < 1e-9
     with pytest.raises(DataError, match=r"rows of 'M01' are so far apart that no prediction of 4 s holds two of them"):
         cut_segments(SHIP, coarse, coarse.runs, 1.0, 4.0)
-
-
-def test_an_order_within_a_step_counts_in_that_step() -> None:
-    """A clock that is some hundredths of a second late must not make orders late by a whole step."""
-    lag = {"kind": "first_order", "T": 2.0}
-    ship = SHIP.with_values({"thruster.port.actuator": {"n": lag}})
-    late = changed(DATA, t=DATA.frame["t"].to_numpy() + 0.02 * (DATA.frame["t"].to_numpy() > 0))
-    (one,) = cut_segments(ship, late, late.runs[:1], 1.0, 0.0)
-    (exact,) = cut_segments(ship, DATA, DATA.runs[:1], 1.0, 0.0)
-    there = {name: (one.columns[name][1:-1], exact.columns[name]) for name in DATA.commands}
-    np.testing.assert_array_equal(there["port.n"][0], there["port.n"][1][1 : len(there["port.n"][0]) + 1])
-    alpha, orders = there["port.alpha"]
-    count = len(alpha)
-    np.testing.assert_allclose(alpha, 0.98 * orders[1 : count + 1] + 0.02 * orders[:count], atol=1e-9)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
-from shipid.engine.rollout import rollout
-from shipid.identification.sensitivities import FitLayout, build_variation, is_thrust, run_machine
+from shipid.identification.sensitivities import FitLayout, build_variation, is_thrust
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.drawn_ships import drawn_ship
@@ -28,8 +26,10 @@ def test_thrust_coefficients_are_recognised() -> None:
     assert not is_thrust("hull.mmg.R_0")
 
 
-@pytest.mark.parametrize("kind", ["azimuth", "propeller", "controllable_pitch", "four_quadrant", "quadratic"])
-@pytest.mark.parametrize("sense", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("kind", "sense"),
+    [("azimuth", 1.0), ("propeller", -1.0), ("controllable_pitch", 1.0), ("four_quadrant", -1.0), ("quadratic", 1.0)],
+)
 def test_thrust_of_every_kind_is_linear_in_its_coefficients(kind: str, sense: float) -> None:
     ships = (drawn_ship(seed) for seed in range(100))
     ship, name = next((one, name) for one in ships for name, block in thrusters(one) if block["kind"] == kind)
@@ -61,37 +61,3 @@ def test_nuisances_that_change_the_motion_are_columns() -> None:
     one = layout(nuisances=("current_north", "current_east", "heading_bias"))
     assert one.num_moving == 2
     assert build_variation(one).num_columns == len(build_variation(one).node) + 1 + 2
-
-
-def test_one_layout_is_built_once() -> None:
-    assert build_variation(layout()) is build_variation(layout())
-
-
-def test_outputs_of_a_step_are_those_of_a_rollout() -> None:
-    model, nx = build_variation(layout()), 3
-    start = {"north": 0.0, "east": 0.0, "psi": 0.3, "u": 4.0, "v": 0.1, "r": 0.01}
-    commands = {name: 2.0 if name.endswith(".n") else 0.2 for name in model.layout.model.commands}
-    factor, base = 1.1, np.array(list(SHIP.parameters.values()))
-    x = np.zeros((1, model.size))
-    x[0, :nx] = [start[name] for name in model.states]
-    x[0, nx : nx + nx * nx] = np.eye(nx).ravel()
-    fixed = np.concatenate([[factor], base, [SHIP.parameters[PATH]]])[None]
-    given = [commands[name] for name in model.layout.model.commands]
-    given += [commands[name] for name in model.layout.model.memory]
-    seen = np.concatenate([np.zeros(3), np.ones(3)])[None, None]
-    record = run_machine(layout(), x, fixed, np.array(given)[None, None], seen)[0, 0, 0]
-
-    def simulated(value: float) -> np.ndarray:
-        path = rollout(
-            SHIP.with_values({PATH: value * SHIP.parameters[PATH]}),
-            {name: np.array([number]) for name, number in start.items()},
-            {name: np.array([number]) for name, number in commands.items()},
-            {name: np.zeros(1) for name in model.layout.model.environment},
-            step=0.5, num_steps=1, method="rk4", engine="casadi",
-        )  # fmt: skip
-        return np.array([path[name][1, 0, 0] for name in ("u", "v", "r")])
-
-    assert np.allclose(record[:3], simulated(factor), rtol=0, atol=1e-12)
-    slope = (simulated(factor + 1e-4) - simulated(factor - 1e-4)) / 2e-4
-    assert np.abs(slope).max() > 1e-6
-    assert np.allclose(record[3 + 3 * nx :], slope, rtol=1e-6, atol=1e-12)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
 from shipid.identification.settings import (
-    NUISANCES,
     POSITIVE,
-    UNITS_OF_NUISANCES,
     WIDE,
     Identify,
     free_factors,
@@ -111,25 +107,6 @@ def test_a_pattern_selects_no_constant_and_no_dimension() -> None:
         free_factors(otter, Identify(parameters=["hull.crossflow.x_*"]))
 
 
-@pytest.mark.parametrize("path", ["hull.derivatives.N_v", "inertia.z_G"])
-def test_what_the_vessel_leaves_out_is_free_once_it_is_written(path: str, tmp_path: Path) -> None:
-    """The message says how, and that works."""
-    block, _, name = path.rpartition(".")
-    settings = Identify(parameters=[path], scale={path: 1.0})
-    with pytest.raises(DocumentError, match=re.escape(f"write it in [{block}] of a file that extends her")):
-        free_factors(SHIP, settings)
-    file = tmp_path / "ship.toml"
-    file.write_text(f'extends = "gunnerus-28.9"\n[{block}]\n{name} = 0.0\n')
-    assert free_factors(load_vessel(file), settings).paths == (path,)
-    with pytest.raises(DocumentError) as error:
-        free_factors(SHIP, Identify(parameters=["hull.derivatives.Q_q"]))
-    assert "extends" not in str(error.value)
-
-
 def test_the_time_constant_of_an_actuator_is_no_draught() -> None:
     paths = free_factors(load_vessel("otter"), Identify(parameters=["thruster.*.actuator.*"])).paths
     assert {"thruster.port.actuator.n.T", "thruster.starboard.actuator.n.T"} <= set(paths)
-
-
-def test_every_scalar_of_a_nuisance_has_a_unit() -> None:
-    assert set(UNITS_OF_NUISANCES) == {name for scalars in NUISANCES.values() for name in scalars}

@@ -11,7 +11,6 @@ from scipy import stats
 
 from shipid.errors import ShipidError
 from shipid.identification.statistics import (
-    WHITE,
     LinearFit,
     _Basis,
     _Drift,
@@ -24,7 +23,7 @@ from shipid.identification.statistics import (
     pooled_autocorrelation,
     residual_whiteness,
 )
-from tests.identification.linear import LEVELS, SIGNALS, design, fitted, labels, noise
+from tests.identification.linear import SIGNALS, design, fitted, labels, noise
 
 RUNS, SAMPLES, COUNT = 20, 80, 6
 JACOBIAN = design(RUNS, SAMPLES, COUNT)
@@ -36,7 +35,7 @@ def one(phi: float = 0.0, seed: int = 3, **more: object) -> LinearFit:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("runs", "samples", "phi"), [(20, 40, 0.0), (8, 60, 0.8), (4, 200, 0.8), (1, 150, 0.8)])
+@pytest.mark.parametrize(("runs", "samples", "phi"), [(20, 40, 0.0), (4, 200, 0.8)])
 def test_intervals_cover_in_white_and_coloured_noise(runs: int, samples: int, phi: float) -> None:
     """200 replicates: 95 % on average within 92..98, no parameter below 90."""
     jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
@@ -73,11 +72,10 @@ def test_residuals_of_a_signal_that_says_nothing_of_a_factor_do_not_count() -> N
     assert fit_statistics(fitted(JACOBIAN, error, CLUSTERS, NAMES)).chosen == "sandwich"
 
 
-@pytest.mark.parametrize("runs", [1, 3])
-def test_factors_that_priors_alone_hold_lend_no_trust(runs: int) -> None:
+def test_factors_that_priors_alone_hold_lend_no_trust() -> None:
     """Four that the data do not see made the sandwich of three runs trusted, and of one run: without a warning."""
-    error, names = noise(np.random.default_rng(0), runs, 400, 0.8), labels(runs, 400)
-    jacobian = design(runs, 400, 7) * np.where(np.arange(7) < 3, 1.0, 1e-6)
+    error, names = noise(np.random.default_rng(0), 3, 400, 0.8), labels(3, 400)
+    jacobian = design(3, 400, 7) * np.where(np.arange(7) < 3, 1.0, 1e-6)
     widths = np.full(7, 0.3)
     few = fit_statistics(fitted(jacobian[:, :3], error, *names, prior_widths=widths[:3]))
     more = fit_statistics(fitted(jacobian, error, *names, prior_widths=widths))
@@ -85,13 +83,6 @@ def test_factors_that_priors_alone_hold_lend_no_trust(runs: int) -> None:
     assert more.chosen == few.chosen
     np.testing.assert_allclose(more.high[:3] - more.low[:3], few.high - few.low, rtol=1e-3)
     np.testing.assert_allclose(more.errors[3:], widths[3:], rtol=1e-3)
-
-
-def test_runs_too_short_for_stretches_are_not_called_stretches() -> None:
-    """Residuals that remember 30 samples would need stretches of 300; the runs have 100 and stay whole."""
-    short = fit_statistics(fitted(design(3, 100, 3), noise(np.random.default_rng(0), 3, 100, 0.95), *labels(3, 100)))
-    assert short.covariances["blocks"].reason.startswith("3 runs, too short to be cut into stretches of ")
-    np.testing.assert_allclose(short.covariances["blocks"].matrix, short.covariances["sandwich"].matrix)
 
 
 def test_fisher_is_the_textbook_formula() -> None:
@@ -139,24 +130,11 @@ def test_sandwich_is_the_jackknife_over_runs() -> None:
     assert matrix[0, 0] / expected[0, 0] == pytest.approx((RUNS - 1) / RUNS, rel=0.1)
 
 
-def test_sandwich_of_a_mean_over_equal_clusters() -> None:
-    """G equal clusters, one mean: the variance of the means of the clusters (divisor G - 1) over G."""
-    clusters, error = np.repeat(np.arange(7), 12), np.random.default_rng(0).normal(size=84)
-    form = fit_statistics(fitted(np.ones((84, 1)), error, clusters, ("u",) * 84)).covariances["sandwich"]
-    expected = error.reshape(7, 12).mean(axis=1).var(ddof=1) / 7
-    assert form.matrix[0, 0] == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("among", [(), (2, 3, 4, 5)])
-def test_intervals_cover_what_one_run_alone_excites(among: tuple[int, ...]) -> None:
-    """That run has no residuals along such a factor: they said nothing of its error, which was given as next to none.
-
-    among : factors that this run does not excite.
-    """
+def test_intervals_cover_what_one_run_alone_excites() -> None:
+    """That run has no residuals along such a factor: they say nothing of its error."""
     runs, samples = 10, 40
     jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
     jacobian[clusters > 0, 0] = 0.0
-    jacobian[np.ix_(clusters == 0, among)] = 0.0
     rng, covered = np.random.default_rng(1), np.zeros(COUNT)
     for _ in range(60):
         estimates = fit_statistics(fitted(jacobian, noise(rng, runs, samples, 0.8), clusters, signals))
@@ -172,14 +150,6 @@ def test_a_run_that_alone_decides_a_factor_is_named() -> None:
     fit = fitted(jacobian, noise(np.random.default_rng(0), RUNS, SAMPLES, 0.8), CLUSTERS, NAMES, runs=names)
     assert factors_of_single_runs(fit) == {fit.paths[2]: "M05"}
     assert factors_of_single_runs(one(0.8, runs=names)) == {}
-    few = labels(1, 400)
-    assert factors_of_single_runs(fitted(design(1, 400, 3), np.ones(1200), *few, runs=("M01",))) == {}
-
-
-def test_a_single_run_is_not_trusted() -> None:
-    single = fit_statistics(fitted(design(1, 400, 3), noise(np.random.default_rng(0), 1, 400, 0.99), *labels(1, 400)))
-    assert not single.covariances["sandwich"].trusted
-    assert np.isfinite(single.covariances["sandwich"].matrix).all()
 
 
 def test_freedom_of_a_mean_over_equal_clusters() -> None:
@@ -189,17 +159,15 @@ def test_freedom_of_a_mean_over_equal_clusters() -> None:
     assert fit_statistics(fit).covariances["sandwich"].freedom[0] == pytest.approx(6)
 
 
-@pytest.mark.parametrize("phi", [0.0, 0.8])
-def test_scaling_a_parameter_scales_its_interval(phi: float) -> None:
-    fit, scale = one(phi), np.array([1e-6, 1.0, 1e3, 1e6, 0.1, 7.0])
+def test_scaling_a_parameter_scales_its_interval() -> None:
+    fit, scale = one(0.8), np.array([1e-6, 1.0, 1e3, 1e6, 0.1, 7.0])
     scaled = replace(fit, jacobian=fit.jacobian / scale, factors=fit.factors * scale)
     np.testing.assert_allclose(fit_statistics(scaled).errors, fit_statistics(fit).errors * scale, rtol=1e-6)
     np.testing.assert_allclose(fit_statistics(scaled).correlations, fit_statistics(fit).correlations, atol=1e-9)
 
 
-@pytest.mark.parametrize("phi", [0.0, 0.8])
-def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
-    fit, rng = one(phi), np.random.default_rng(5)
+def test_order_of_runs_and_parameters_is_of_no_account() -> None:
+    fit, rng = one(0.8), np.random.default_rng(5)
     estimates = fit_statistics(fit)
     rows = np.concatenate([np.flatnonzero(fit.clusters == run) for run in rng.permutation(RUNS)])
     columns = rng.permutation(COUNT)
@@ -213,13 +181,6 @@ def test_order_of_runs_and_parameters_is_of_no_account(phi: float) -> None:
     )
     np.testing.assert_allclose(fit_statistics(moved).errors, estimates.errors[columns], rtol=1e-8)
     assert [fit_statistics(moved).sentences[k] for k in range(COUNT)] == [estimates.sentences[j] for j in columns]
-
-
-def test_declared_levels_that_are_wrong_do_no_harm() -> None:
-    """All residuals and sensitivities over ten times the standard deviation: the same intervals."""
-    fit = one(0.0)
-    other = replace(fit, residuals=fit.residuals / 10, jacobian=fit.jacobian / 10)
-    np.testing.assert_allclose(fit_statistics(other).errors, fit_statistics(fit).errors, rtol=1e-9)
 
 
 def test_levels_and_memory_are_measured() -> None:
@@ -257,19 +218,6 @@ def test_whiteness_is_that_of_ljung_and_box_and_of_means_over_quarters() -> None
     assert residual_whiteness(fit)["u"].probability == pytest.approx(min(2 * min(both), 1.0))
 
 
-@pytest.mark.parametrize(("share", "least", "most"), [(0.0, 0.0, 0.08), (0.04, 0.5, 1.0), (0.1, 0.9, 1.0)])
-def test_a_slow_drift_in_noise_is_seen(share: float, least: float, most: float) -> None:
-    """Unmeasured gusts under sensor noise: six runs of 100 rows, correlated over 100 rows, passed for white."""
-    rng, found = np.random.default_rng(0), 0
-    clusters, signals = np.repeat(np.arange(6), 100), ("u",) * 600
-    for _ in range(100):
-        slow = noise(rng, 6, 100, 0.98).reshape(6, 3, 100)[:, 2].ravel()
-        error = np.sqrt(1 - share) * rng.normal(size=600) + np.sqrt(share) * slow
-        fit = LinearFit(("p",), np.ones(1), error, np.ones((600, 1)), clusters, signals)
-        found += not residual_whiteness(fit)["u"].white
-    assert least <= found / 100 <= most
-
-
 T = np.arange(200)
 START = 3 * np.exp(-T / 60)  # what a start that is known to one standard deviation does to a run
 SLOW = np.column_stack([np.ones(200), np.sin(T / 32), np.sin(T / 14), np.sin(T / 6), np.cos(T / 2)])
@@ -303,48 +251,6 @@ def test_the_covariance_of_means_over_quarters_is_that_of_residuals_of_a_fit(pri
     assert seen.expected < 7
 
 
-@pytest.mark.parametrize("runs", [1, 3])
-def test_means_over_quarters_of_white_residuals_are_as_probable_as_they_say(runs: int) -> None:
-    """One run's factors take in so much that 1 fit of 200 was below 5 %, as if there were no factors."""
-    rng, found = np.random.default_rng(0), []
-    for _ in range(600):
-        error = rng.normal(size=200 * runs) + np.kron(rng.normal(size=runs), START)
-        found.append(drifts(begun(error, runs=runs)).probability)
-    assert 0.025 <= np.mean(np.array(found) < 0.05) <= 0.075
-    assert 0.42 <= np.mean(np.array(found) < 0.5) <= 0.58
-
-
-@pytest.mark.parametrize("runs", [1, 3, 10])
-def test_every_second_fit_overlooks_the_hidden_drift(runs: int) -> None:
-    """And `ratio` shows, in the mean of all fits, what it adds. Without nuisances, which take in a part of it."""
-    rng, jacobian = np.random.default_rng(1), np.tile(SLOW, (runs, 1))
-    clusters, signals, seen, added = np.repeat(np.arange(runs), 200), ("u",) * 200 * runs, [], 0.0
-    for _ in range(301):
-        drift = np.kron(np.eye(runs), QUARTER.T) @ rng.normal(0, np.sqrt(added / 50), 4 * runs)
-        seen.append(drifts(fitted(jacobian, rng.normal(size=200 * runs) + drift, clusters, signals)))
-        added = seen[0].hidden
-    assert 0.3 <= np.mean([one.probability < WHITE / 2 for one in seen[1:]]) <= 0.6
-    assert np.mean([one.ratio for one in seen[1:]]) == pytest.approx(1 + added, rel=0.2)
-
-
-def test_a_drift_that_one_run_does_not_show_names_the_factors_that_it_moves() -> None:
-    """Of the fits that pass for white, intervals of factors that are not named cover; half of those named did not."""
-    rng, passed, covered, open_ = np.random.default_rng(0), 0, np.zeros(5), np.zeros(5)
-    for _ in range(300):
-        drift = noise(rng, 1, 600, 0.99)[400:600] / LEVELS["u"]
-        judged = fit_statistics(begun(rng.normal(size=200) + 0.4 * drift))
-        if judged.chosen == "fisher" and judged.covariances["fisher"].trusted:
-            passed += 1
-            named = open_to_drift(judged)
-            open_ += [path in named for path in judged.free]
-            covered += (judged.low <= 1) & (judged.high >= 1)
-    assert passed > 50
-    assert set(open_[:2]) == {passed}
-    assert not open_[3:].any()
-    assert covered[0] / passed < 0.7
-    assert (covered[3:] / passed > 0.9).all()
-
-
 def test_ten_runs_show_a_drift_that_would_matter() -> None:
     rng = np.random.default_rng(0)
     few, more = (fit_statistics(begun(rng.normal(size=200 * runs), runs=runs)) for runs in (2, 10))
@@ -361,29 +267,6 @@ def test_autocorrelation_is_the_mean_product_of_all_pairs() -> None:
     np.testing.assert_allclose(rho, [np.mean(each) / np.mean(products[0]) for each in products], rtol=1e-9)
 
 
-def test_a_run_without_errors_is_no_sign_of_colour() -> None:
-    errors = np.random.default_rng(0).normal(size=60)
-    fit = LinearFit(("p",), np.ones(1), errors, np.ones((60, 1)), np.zeros(60, dtype=int), ("u",) * 60)
-    exact = LinearFit(
-        ("p",), np.ones(1), np.append(errors, np.zeros(20)), np.ones((80, 1)), np.repeat([0, 1], [60, 20]), ("u",) * 80
-    )
-    assert residual_whiteness(exact)["u"].probability == residual_whiteness(fit)["u"].probability
-    assert residual_whiteness(exact)["u"].memory == pytest.approx(residual_whiteness(fit)["u"].memory)
-
-
-@pytest.mark.parametrize("phi", [0.0, 0.8])
-def test_correlated_residuals_are_worth_fewer(phi: float) -> None:
-    for colour in fit_statistics(one(phi)).whiteness.values():
-        assert colour.effective * colour.memory == pytest.approx(colour.samples)
-        assert colour.effective <= colour.samples
-
-
-@pytest.mark.parametrize("phi", [0.0, 0.8])
-def test_without_priors_an_interval_is_that_of_the_data_alone(phi: float) -> None:
-    estimates = fit_statistics(one(phi))
-    np.testing.assert_allclose(estimates.alone, (estimates.high - estimates.low) / 2, rtol=1e-9)
-
-
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: float) -> None:
     widths = 1e-5 * np.arange(1, COUNT + 1)
@@ -393,8 +276,7 @@ def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: flo
         np.testing.assert_allclose(form.errors, widths, rtol=1e-3)
 
 
-@pytest.mark.parametrize("width", [1e-3, 0.02, 1.0])
-@pytest.mark.parametrize("phi", [0.0, 0.8])
+@pytest.mark.parametrize(("phi", "width"), [(0.0, 1.0), (0.8, 1e-3)])
 def test_what_the_data_alone_say_is_not_changed_by_priors(phi: float, width: float) -> None:
     """Correlated residuals widen it as without priors: tight priors hid them, and factors were called identified."""
     without = fit_statistics(one(phi))
@@ -467,15 +349,6 @@ def test_what_is_held_counts_as_known() -> None:
     np.testing.assert_allclose(estimates.errors[~held], fit_statistics(without).errors, rtol=1e-9)
 
 
-def test_nothing_free_is_nothing_known() -> None:
-    fit = one(at_bound=np.arange(COUNT) < 2, held=np.arange(COUNT) >= 2)
-    estimates = fit_statistics(fit)
-    assert np.isinf(estimates.errors).all()
-    assert (estimates.low, estimates.high) == (pytest.approx(-np.inf), pytest.approx(np.inf))
-    assert not estimates.identifiable.any()
-    assert len(estimates.sentences) == COUNT
-
-
 def test_nuisances_cost_degrees_of_freedom() -> None:
     """A free level for each run and signal, projected out: the level of the noise stays right."""
     error = noise(np.random.default_rng(0), RUNS, 8, 0.0)
@@ -500,18 +373,6 @@ def test_blocks_cut_all_signals_at_the_same_times() -> None:
         u, v, r = (numbers[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
         assert (u == v).all()
         assert (v == r).all()
-
-
-@pytest.mark.parametrize("thinned", SIGNALS)
-def test_a_block_holds_one_run_where_a_signal_has_fewer_rows(thinned: str) -> None:
-    fit = one()
-    kept = (np.array(NAMES) != thinned) | (np.arange(len(NAMES)) % 4 == 0)
-    signals = tuple(name for name, here in zip(NAMES, kept, strict=True) if here)
-    few = LinearFit(fit.paths, fit.factors, fit.residuals[kept], fit.jacobian[kept], CLUSTERS[kept], signals)
-    numbers = block_clusters(few, 20)
-    runs_of = [np.unique(few.clusters[numbers == number]) for number in np.unique(numbers)]
-    assert all(len(runs) == 1 for runs in runs_of)
-    assert len(runs_of) == RUNS * 4
 
 
 def test_fits_without_a_meaning_are_refused() -> None:

@@ -84,6 +84,12 @@ def trials(
     return Dataset(frame, {"clock": "run", "flags": []})
 
 
+def noisy(dataset: Dataset, deviations: Mapping[str, float], seed: int) -> Dataset:
+    """The same log with errors of these standard deviations."""
+    rng, count = np.random.default_rng(seed), len(dataset.frame)
+    return changed(dataset, **{name: dataset.frame[name] + rng.normal(0, s, count) for name, s in deviations.items()})
+
+
 def changed(dataset: Dataset, **columns: np.ndarray) -> Dataset:
     """The same log with some columns replaced."""
     return Dataset(dataset.frame.assign(**columns), dataset.metadata)

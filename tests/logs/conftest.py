@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,16 +17,8 @@ PLAIN = REPOSITORY / "tests" / "bad" / "logs" / "plain.toml"
 
 
 @pytest.fixture(scope="session")
-def data_folder() -> Path:
-    folder = Path(os.environ.get("SHIPID_DATA", REPOSITORY.parent / "shared" / "data"))
-    if not folder.is_dir():
-        pytest.skip("no folder with recorded data: set SHIPID_DATA")
-    return folder
-
-
-@pytest.fixture(scope="session")
-def gunnerus_log(data_folder: Path) -> Path:
-    file = data_folder / "gunnerus_2022" / "RVG_ManeuveringTests.csv"
+def gunnerus_log(shared_data: Path) -> Path:
+    file = shared_data / "gunnerus_2022" / "RVG_ManeuveringTests.csv"
     if not file.is_file():
         pytest.skip(f"no {file.name} in the data folder")
     return file

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from pymap3d import ned2geodetic
 
+from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.logs.guess.clues import State
+from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.draft import draft_mapping
 from shipid.logs.guess.evidence import row_windows
+from shipid.logs.importing import import_log, read_mapping
 from shipid.vessel.load import load_vessel
 
 KNOT = 1852 / 3600
@@ -72,6 +77,25 @@ def as_bridge(frame: pd.DataFrame) -> pd.DataFrame:
             "rudder": -np.degrees(frame["alpha"]),  # > 0 to starboard
         }
     )
+
+
+def guess_of(folder: Path, frame: pd.DataFrame) -> Guess:
+    """Write a frame as log.csv into a folder, and guess it."""
+    frame.to_csv(folder / "log.csv", index=False)
+    return guess(folder / "log.csv")
+
+
+def import_draft(folder: Path, proposal: Guess, **options: object) -> Dataset:
+    """Import log.csv in a folder by its draft, the whole of it."""
+    (folder / "draft.toml").write_text(draft_mapping(proposal))
+    whole = read_mapping(folder / "draft.toml").model_copy(update={"segment": ()})
+    return import_log(whole, folder / "log.csv", **options)  # type: ignore[arg-type]
+
+
+def drafted(frame: pd.DataFrame, folder: Path) -> tuple[Guess, Dataset]:
+    """Guess of a frame, and what its draft makes of it."""
+    proposal = guess_of(folder, frame)
+    return proposal, import_draft(folder, proposal)
 
 
 def state_of(columns: dict[str, np.ndarray], t: np.ndarray, unit: str = "s") -> State:

@@ -1,7 +1,6 @@
 """Public sets: from the data folder with their checksum, or one line that says what to do. Nothing is downloaded."""
 
 import errno
-import hashlib
 from pathlib import Path
 
 import pooch
@@ -11,13 +10,12 @@ import requests
 from shipid.errors import DataError, DocumentError
 from shipid.logs.catalogue import bundled_mappings, fetch_log
 from shipid.logs.importing import read_mapping
-from tests.logs.conftest import PLAIN
 
 NAME = "gunnerus-2022"
 
 
-def test_from_the_data_folder(data_folder: Path, gunnerus_log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SHIPID_DATA", str(data_folder))
+def test_from_the_shared_data(shared_data: Path, gunnerus_log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SHIPID_DATA", str(shared_data))
     assert fetch_log(NAME) == gunnerus_log
 
 
@@ -74,29 +72,6 @@ def test_download_keeps_the_checksum(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with pytest.raises(DataError, match="is not the published file"):
         fetch_log(NAME)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("absolute", [True, False])
-def test_download_of_a_users_mapping_stays_in_the_cache(
-    absolute: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    log, cache, folder = b"tvec\n", tmp_path / "cache", tmp_path / "mine"
-    monkeypatch.delenv("SHIPID_DATA", raising=False)
-    monkeypatch.setattr(pooch, "os_cache", lambda _: cache)
-
-    class FromDisk:
-        def __call__(self, _url: str, output_file: str, _pooch: object, **__: object) -> None:
-            Path(output_file).write_bytes(log)
-
-    monkeypatch.setattr(pooch.core, "choose_downloader", lambda *_, **__: FromDisk())
-    folder.mkdir()
-    mapping = folder / "own.toml"
-    source = f'[source]\nurl = "https://example.org/log.csv"\nsha256 = "{hashlib.sha256(log).hexdigest()}"\n'
-    mapping.write_text(PLAIN.read_text() + source)
-    monkeypatch.chdir(folder)
-    file = fetch_log(str(mapping) if absolute else "../mine/own.toml")
-    assert file == cache / "own-log.csv"
-    assert file.read_bytes() == log
 
 
 def test_unknown_name() -> None:

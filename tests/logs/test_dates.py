@@ -7,17 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.errors import DataError, DocumentError
-from shipid.logs import dates
-from shipid.logs.dates import (
-    date_texts,
-    format_date,
-    format_moment,
-    format_span,
-    join_date_and_time,
-    parse_dates,
-    time_texts,
-)
+from shipid.errors import DataError
+from shipid.logs.dates import date_texts, format_date, format_moment, format_span, parse_dates, time_texts
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.conftest import T, mapping_with
@@ -64,21 +55,6 @@ def test_dates_as_they_are_written(style: str, unix: bool) -> None:
     np.testing.assert_allclose(times, T + (1666828770.5 if unix else 86370.5), atol=1e-5)
 
 
-def test_few_ways_of_writing_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each costs milliseconds, in each of two thousand files of a folder: only those are tried that a text may have."""
-    tried: list[str] = []
-    by_pandas = dates._parse_moments
-    monkeypatch.setattr(dates, "_parse_moments", lambda texts, way: tried.append(way) or by_pandas(texts, way))
-    for way in dates.WAYS:
-        tried.clear()
-        moments = pd.Timestamp("2022-10-26T23:40:30.5") + pd.to_timedelta(T * 20, "s")
-        assert way in dates.date_formats(pd.Series(moments.strftime(way.replace("%S", "%S.%f"))))
-        assert len(tried) <= 8, way
-    tried.clear()
-    assert dates.date_formats(pd.Series(moments.strftime("%Y-%m-%d %H:%M:%S"))) == []
-    assert tried == []
-
-
 @pytest.mark.parametrize("kind", ["int64", "float64"])
 def test_dates_in_one_number(kind: str) -> None:
     moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(np.arange(90), "s")
@@ -95,15 +71,14 @@ TWICE = {
 }
 
 
-@pytest.mark.parametrize("every", ["", "\nevery = 0.5"])
 @pytest.mark.parametrize("name", TWICE)
-def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.DataFrame, tmp_path: Path) -> None:
+def test_an_hour_that_occurs_twice_is_refused(name: str, log: pd.DataFrame, tmp_path: Path) -> None:
     """Half a minute before the clocks of Berlin were set back to half a minute after."""
     style, span = TWICE[name]
     moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert("Europe/Berlin") + pd.to_timedelta(T, "s")
     log.assign(time=moments.strftime(style)).to_csv(tmp_path / "log.csv", index=False)
     unit = "hhmmss" if name == "hhmmss" else "date"
-    mapping = mapping_with(tmp_path, "", ('from = "time"', f'from = "time"\nunit = "{unit}"{every}'))
+    mapping = mapping_with(tmp_path, "", ('from = "time"', f'from = "time"\nunit = "{unit}"\nevery = 0.5'))
     message = f"time goes back by an hour, from {span}: is it local time as daylight saving ends"
     with pytest.raises(DataError, match=message) as caught:
         import_log(read_mapping(mapping), tmp_path / "log.csv")
@@ -112,25 +87,6 @@ def test_an_hour_that_occurs_twice_is_refused(name: str, every: str, log: pd.Dat
         with pytest.raises(DataError, match=message) as caught:
             recognise_log(tmp_path / "log.csv")
         assert caught.value.path == "row 61"
-
-
-def test_a_week_number_that_rolled_over_has_its_word(log: pd.DataFrame, tmp_path: Path) -> None:
-    moments = pd.Timestamp("2019-04-06T23:59:50Z") + pd.to_timedelta(T, "s")
-    rolled = moments.where(T < 10.0, moments - pd.Timedelta(weeks=1024))
-    log.assign(time=rolled.strftime("%Y-%m-%dT%H:%M:%S.%fZ")).to_csv(tmp_path / "log.csv", index=False)
-    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
-    message = "from 2019-04-06 23:59:59 UTC to 1999-08-22 00:00:00 UTC .1,024 weeks apart: .*, add 619315200 s"
-    with pytest.raises(DataError, match=message):
-        import_log(read_mapping(mapping), tmp_path / "log.csv")
-    with pytest.raises(DataError, match=message):
-        recognise_log(tmp_path / "log.csv")
-
-
-@pytest.mark.parametrize("style", ["%Y-%m-%dT%H:%M:%S.%f%z", "%H:%M:%S.%f"])
-def test_the_end_of_daylight_saving_in_times_that_say_their_zone_or_are_utc(style: str) -> None:
-    zone = "Europe/Berlin" if "z" in style else "UTC"
-    moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert(zone) + pd.to_timedelta(T, "s")
-    np.testing.assert_allclose(np.diff(parse_dates(pd.Series(moments.strftime(style)))), 0.5, atol=1e-6)
 
 
 @pytest.mark.parametrize("style", ["%d/%m/%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S"])
@@ -149,12 +105,7 @@ def test_noon_and_midnight_of_twelve_hours() -> None:
     np.testing.assert_allclose(parse_dates(pd.Series(texts)), [0, 1800, 3600, 43200, 44100, 86399])
 
 
-def test_what_is_no_date_is_not_a_number() -> None:
-    times = parse_dates(pd.Series(["27.10.2022 08:00:00", "later", "27.10.2022 08:00:01"]))
-    np.testing.assert_array_equal(times, [1666857600.0, np.nan, 1666857601.0])
-
-
-@pytest.mark.parametrize("zone", ["Z", "+02:00", "-0330", "+02"])
+@pytest.mark.parametrize("zone", ["Z", "-0330"])
 def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log: pd.DataFrame, tmp_path: Path) -> None:
     """As UTC it would be hours off; with no zone anywhere every row is UTC."""
     moments = (pd.Timestamp("2024-05-14T08:00:00") + pd.to_timedelta(log["time"], "s")).dt.strftime(
@@ -180,20 +131,6 @@ def test_a_time_that_cannot_be_read_is_shown(text: str, log: pd.DataFrame, tmp_p
     assert caught.value.path == "row 1"
 
 
-@pytest.mark.parametrize(("day", "time"), [("%d.%m.%Y", "%H:%M:%S.%f"), ("%Y-%m-%d", "%H:%M:%S,%f")])
-def test_date_and_time_in_two_columns(day: str, time: str, log: pd.DataFrame, tmp_path: Path) -> None:
-    moments = pd.Timestamp("2022-10-26T23:59:30") + pd.to_timedelta(log["time"], "s")
-    split = log.assign(time=moments.dt.strftime(time), day=moments.dt.strftime(day))
-    split.to_csv(tmp_path / "log", sep=";", index=False)
-    clock = 'from = "time"\nunit = "date"\ndate = "day"'
-    mapping = mapping_with(tmp_path, 'separator = ";"', ('from = "time"', clock))
-    frame = import_log(read_mapping(mapping), tmp_path / "log").frame
-    np.testing.assert_allclose(frame["t"] - 1666828770.0, T, atol=1e-5)
-    mapping.write_text(mapping.read_text().replace('unit = "date"\n', ""))
-    with pytest.raises(DocumentError, match=r"clock\.date: .*write unit = 'date'"):
-        read_mapping(mapping)
-
-
 def test_dates_in_columns_of_numbers() -> None:
     """What is no month, day or whole number is no date; two digits of a year are of 1969 to 2068."""
     year, month, day = [2024.0, 24.0, 68.0, 69.0, 2024.0, 2024.0, 2024.0, 2024.0], [12.0] * 8, [31.0] * 8
@@ -212,18 +149,10 @@ def test_times_of_day_in_columns_of_numbers() -> None:
     assert time_texts([np.array([8.0]), np.array([5.0])]).tolist() == ["08:05:00.000000"]
 
 
-def test_a_second_that_rounds_to_midnight_keeps_its_date() -> None:
-    """It was 24:00:00, which no date has: the row had no time."""
-    days = date_texts([np.array([2024.0, 2024.0]), np.array([5.0, 5.0]), np.array([14.0, 15.0])])
-    times = time_texts([np.array([23.0, 0.0]), np.array([59.0, 0.0]), np.array([59.9999999, 0.1])])
-    assert np.diff(parse_dates(join_date_and_time(days, times))) == pytest.approx([0.1], abs=2e-6)
-
-
 DAYS = ("%Y%m%d", "%d%m%Y", "%d%m%y", "%y%m%d", "day of Excel")
 
 
-@pytest.mark.parametrize("numbers", [True, False])
-@pytest.mark.parametrize("time", ["%H:%M:%S", "%H%M%S"])
+@pytest.mark.parametrize(("numbers", "time"), [(True, "%H%M%S"), (False, "%H:%M:%S")])
 @pytest.mark.parametrize("day", DAYS)
 def test_a_date_in_one_number_beside_a_time_of_day(
     day: str, time: str, numbers: bool, log: pd.DataFrame, tmp_path: Path
@@ -276,7 +205,7 @@ def test_a_moment_and_its_date() -> None:
     assert format_span(t, t + 60.0) == f"{text} to 2022-11-30 09:16:02 UTC"
 
 
-@pytest.mark.parametrize("t", [-1e308, -5.0, 0.0, 12.5, 9.99e7, 1e13, 1e308, float("inf"), float("nan")])
+@pytest.mark.parametrize("t", [-5.0, 12.5, 9.99e7, 1e13, float("nan")])
 def test_a_moment_without_a_date_is_seconds(t: float) -> None:
     """A damaged clock too: no date is beyond the year 9999."""
     assert format_moment(t) == f"{t:.10g} s"
@@ -284,11 +213,10 @@ def test_a_moment_without_a_date_is_seconds(t: float) -> None:
     assert format_span(t, 1.7e9).endswith(" s")
 
 
-@pytest.mark.parametrize("rate", [1, 2, 5, 10, 20])
 @pytest.mark.parametrize("style", ["%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%Y-%m-%d %I:%M:%S.%f %p"])
-def test_whole_seconds_may_be_written_without_a_fraction(style: str, rate: int) -> None:
-    moments = pd.Timestamp("2024-02-01T10:00:00") + pd.to_timedelta(np.arange(1200) / rate, "s")
+def test_whole_seconds_may_be_written_without_a_fraction(style: str) -> None:
+    moments = pd.Timestamp("2024-02-01T10:00:00") + pd.to_timedelta(np.arange(1200) / 10, "s")
     texts = pd.Series(moments.strftime(style)).str.replace(".000000", "", regex=False)
     times = parse_dates(texts)
-    np.testing.assert_allclose(np.diff(times), 1 / rate, atol=1e-5)
+    np.testing.assert_allclose(np.diff(times), 0.1, atol=1e-5)
     np.testing.assert_array_equal(parse_dates(texts.astype("category")), times)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import gzip
 import io
-import json
 import sqlite3
-import tarfile
 import zipfile
 from pathlib import Path
 
@@ -33,15 +31,6 @@ def zipped(**files: bytes) -> bytes:
     return held.getvalue()
 
 
-def tarred() -> bytes:
-    held = io.BytesIO()
-    with tarfile.open(fileobj=held, mode="w") as archive:
-        entry = tarfile.TarInfo("log.csv")
-        entry.size = len(TEXT)
-        archive.addfile(entry, io.BytesIO(TEXT))
-    return held.getvalue()
-
-
 def saved(write: str) -> bytes:
     held = io.BytesIO()
     np.save(held, TABLE.to_numpy()) if write == "npy" else np.savez(held, north=TABLE["north"])
@@ -54,34 +43,19 @@ FILES = {
     "log.csv.gz": (gzip.compress(TEXT), "packed by gzip", "unpack it"),
     "log.zip": (zipped(**{"log.csv": TEXT}), "a ZIP archive", "unpack it"),
     "log.docx": (zipped(**{"[Content_Types].xml": b"<x/>", "word/document.xml": b"<x/>"}), "a text document", "CSV"),
-    "log.pptx": (zipped(**{"[Content_Types].xml": b"<x/>", "ppt/slides.xml": b"<x/>"}), "presentation", "CSV"),
-    "log.odt": (zipped(mimetype=b"application/vnd.oasis.opendocument.text"), "a text document", "CSV"),
     "log.numbers": (zipped(**{"Index/Document.iwa": BINARY}), "Apple's Numbers", "export it as .xlsx"),
-    "log.rtf": (b"{\\rtf1\\ansi 1;2\\par}", "a text document", "save it as plain text"),
-    "log.mdb": (b"\0\1\0\0Standard Jet DB\0" + BINARY, "a data base of Access", "CSV"),
-    "log.tar": (tarred(), "a tar archive", "unpack it"),
-    "log.zst": (b"\x28\xb5\x2f\xfd" + BINARY, "packed by zstd", "unpack it"),
-    "log.npz": (saved("npz"), "arrays of NumPy", "CSV or Parquet"),
     "log.npy": (saved("npy"), "an array of NumPy", "CSV"),
     "records.json": (TABLE.to_json(orient="records").encode(), "JSON", "CSV"),
-    "lines.jsonl": (TABLE.to_json(orient="records", lines=True).encode(), "JSON", "CSV"),
-    "split.json": (json.dumps(TABLE.to_dict("split"), indent=1).encode(), "JSON", "CSV"),
     "log.xml": (b'<?xml version="1.0"?>\n<log><row>1</row></log>', "XML", "CSV"),
     "log.gpx": (b'<?xml version="1.0"?>\n<gpx version="1.1"><trk></trk></gpx>', "a track", "CSV or NMEA"),
     "log.bag": (b"#ROSBAG V2.0\n" + BINARY, "a recording of ROS", "topics as CSV"),
-    "log.mcap": (b"\x89MCAP0\r\n" + BINARY, "a recording of ROS", "topics as CSV"),
     "log.ulg": (b"ULog\x01\x12\x35\x01" + BINARY, "PX4", "ulog2csv"),
     "log.bin": (b"\xa3\x95\x80\x80" + BINARY, "ArduPilot", "mavlogdump"),
     "log.tdms": (b"TDSm" + BINARY, "LabVIEW", "CSV"),
-    "log.mf4": (b"MDF     4.10" + BINARY, "ASAM", "CSV"),
     "log.h5": (b"\x89HDF\r\n\x1a\n" + BINARY, "HDF5", "CSV or Parquet"),
     "log.nc": (b"CDF\x01" + BINARY, "netCDF", "CSV or Parquet"),
-    "log.feather": (b"ARROW1\0\0" + BINARY, "Feather", "Parquet"),
     "candump.log": (b"(1715673600.250000) can0 09F112CC#01FFFF0A7FFF7FFD\n", "NMEA 2000", "analyzer of canboat"),
-    "candump.txt": (b" (000.000125)  vcan0  1CFF0100   [8]  01 00 3C 00 00 FF 7F FD\n", "a CAN bus", "a column for"),
-    "n2k.csv": (b"2024-05-14T08:00:00.250Z,2,127250,204,255,8,ff,10,9b,ff,7f,ff,7f,fd\n", "NMEA 2000", "canboat"),
     "actisense.txt": (b"A173321.107 23FF7 1F513 012F3070002F30709F\n", "NMEA 2000", "a row for each time"),
-    "yd.raw": (b"08:00:01.500 R 09F112CC 01 10 9B FF 7F FF 7F FD\n", "NMEA 2000", "a row for each time"),
     "n2k.json": (
         b'{"version":"5.0.2","units":"std"}\n{"timestamp":"2024-05-14","prio":2,"pgn":127250,"fields":{}}\n',
         "NMEA 2000 as JSON",
@@ -93,7 +67,6 @@ FILES = {
         "InfluxDB",
         "pivot it by _time",
     ),
-    "flux.csv": (b",result,table,_start,_stop,_time,_value,_field,_measurement\n,,0,a,b,c,1,sog,nav\n", "InfluxDB", ""),
     "log.pdf": (b"%PDF-1.7\n" + BINARY, "a PDF", "CSV"),
 }
 
@@ -140,9 +113,3 @@ def test_a_data_base_is_named(tmp_path: Path) -> None:
 )
 def test_what_a_reader_reads_is_not_foreign(head: bytes) -> None:
     assert foreign_format(head) is None
-
-
-def test_a_track_before_the_table_may_be_skipped(tmp_path: Path) -> None:
-    """A text with a head of XML is read where the mapping skips the head."""
-    (tmp_path / "log.txt").write_bytes(b'<?xml version="1.0"?>\n' + TEXT)
-    assert len(read_log_table(tmp_path / "log.txt", TextFormat(skip_rows=1), "time")) == len(TABLE)

@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset, flag_bit, read_dataset, stretches_of_runs, write_dataset
+from shipid.data.dataset import Dataset, flag_bit, stretches_of_runs
 from shipid.errors import DataError, DocumentError
-from shipid.logs import frames, readers
+from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping, run_files
 from shipid.logs.mapping import LogSource
-from tests.logs.conftest import CLOCKS, DATES, PLAIN, SPEEDS, as_log, stamps, turning
+from tests.logs.conftest import CLOCKS, DATES, PLAIN, SPEEDS, as_log, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -49,32 +49,11 @@ class TestGunnerus:
         spans = [(run.partition(" (")[0], start, end) for run, start, end in times.itertuples()]
         assert spans == tests
 
-    def test_ranges(self, gunnerus_log: Path) -> None:
-        raw = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("scale", "heading_offset", "lever_arm"))
-        assert raw.frame["u"].agg(["min", "max"]).round(1).tolist() == [1.2, 6.1]
-        assert raw.frame["v"].abs().max() == pytest.approx(0.9, abs=0.01)
-        assert np.degrees(raw.frame["r"].abs().max()) == pytest.approx(5.0, abs=0.01)
-        assert raw.frame["port.n"].max() * 60 == pytest.approx(205.0)
-
-    def test_positive_azimuth_turns_to_port(self, gunnerus: Dataset) -> None:
-        assert np.corrcoef(gunnerus.frame["port.alpha"], gunnerus.frame["r"])[0, 1] < -0.8
-        pd.testing.assert_series_equal(gunnerus.frame["port.n"], gunnerus.frame["starboard.n"], check_names=False)
-
     def test_straight_runs_do_not_drift_after_the_repairs(self, gunnerus: Dataset, gunnerus_log: Path) -> None:
         raw = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("heading_offset", "lever_arm"))
         for dataset, drift in ((raw, 0.040), (gunnerus, 0.0)):
             rows = dataset.frame[dataset.frame["run"].str.startswith("Speed")]
             assert np.median(rows["v"] / rows["u"]) == pytest.approx(drift, abs=0.01)
-
-    def test_heading_agrees_with_its_rate_only_without_the_breaks(self, gunnerus: Dataset, gunnerus_log: Path) -> None:
-        whole = import_log(read_mapping("gunnerus-2022"), gunnerus_log, without=("break",))
-        for dataset, worst in ((whole, 40.0), (gunnerus, 10.0)):
-            errors = [
-                np.abs(np.unwrap(rows["psi"])[6:] - np.unwrap(rows["psi"])[:-6] - 0.5 * rows["r"].rolling(6).sum()[6:])
-                for _, rows in stretches_of_runs(dataset)
-            ]
-            largest = np.degrees(max(error.max() for error in errors))  # over 3 s
-            assert largest > worst if dataset is whole else largest < worst
 
     def test_breaks_lie_where_a_minute_is_missing(self, gunnerus: Dataset) -> None:
         broken = gunnerus.frame["flags"] & flag_bit(gunnerus.metadata, "break") != 0
@@ -83,42 +62,11 @@ class TestGunnerus:
             ["ZZ 20/20", 4215.0],
         ]
 
-    def test_round_trip(self, gunnerus: Dataset, tmp_path: Path) -> None:
-        back = read_dataset(write_dataset(gunnerus, tmp_path / "g.parquet"))
-        pd.testing.assert_frame_equal(back.frame, gunnerus.frame)
-        assert back.metadata == gunnerus.metadata
-
     def test_a_changed_log_is_refused(self, gunnerus_log: Path, tmp_path: Path) -> None:
         other = tmp_path / "log.csv"
         other.write_bytes(gunnerus_log.read_bytes()[:-1])
         with pytest.raises(DataError, match="sha256 differs"):
             import_log(read_mapping("gunnerus-2022"), other)
-
-
-def test_kvlcc2_earth_velocities_become_body_velocities(data_folder: Path, plain_mapping: Write) -> None:
-    """HSVA free-model zigzag 20/10: the body velocities by central differences of the recorded positions."""
-    log = data_folder / "kvlcc2_hsva" / "HSVA_CPMC_KVLCC2_Z_20_10_P.dat"
-    if not log.is_file():
-        pytest.skip(f"no {log.name} in the data folder")
-    columns = {"north": "x0 m", "east": "y0 m", "psi": "psi deg", "u": "dx0 m/s", "v": "dy0 m/s", "r": "r deg/s"}
-    columns |= {"phi": "phi deg", "rudder.delta": "delta deg", "propeller.n": "n rev/s"}
-    text = 'name = "HSVA"\n[format]\nseparator = "whitespace"\nencoding = "cp1252"\nskip_rows = 4\n'
-    text += 'names = ["t", "x0", "y0", "psi", "dx0", "dy0", "r", "phi", "delta", "n", "thrust", "torque"]\n'
-    text += '[clock]\nfrom = "t"\n'
-    for name, (source, unit) in ((name, value.split()) for name, value in columns.items()):
-        frame = 'frame = "earth"\n' if name in "uv" else ""
-        text += f'[columns."{name}"]\nfrom = "{source}"\nunit = "{unit}"\n{frame}'
-    file = plain_mapping()
-    file.write_text(text)
-    rows = import_log(read_mapping(file), log).frame
-    psi, north, east = (rows[name].to_numpy() for name in ("psi", "north", "east"))
-    dn, de = np.gradient(north, rows["t"]), np.gradient(east, rows["t"])
-    error = np.hypot(dn * np.cos(psi) + de * np.sin(psi) - rows["u"], de * np.cos(psi) - dn * np.sin(psi) - rows["v"])
-    assert np.sqrt(np.mean(error**2)) < 1e-3
-    assert rows["u"].iloc[0] == pytest.approx(1.179, abs=0.02)
-    overshoots = np.degrees(rows["psi"].max()) - 10.0, -np.degrees(rows["psi"].min()) - 10.0
-    assert min(abs(np.subtract.outer(overshoots, [11.97, 13.87, 13.16])).min(axis=1)) < 0.05
-    assert np.degrees(np.std(np.gradient(psi, rows["t"]) - rows["r"])) < 0.05
 
 
 def test_units_wrapping_and_names(plain_mapping: Write, tmp_path: Path) -> None:
@@ -142,65 +90,16 @@ def test_a_heading_that_counts_from_0_again_is_refused_without_wrap(plain_mappin
     np.testing.assert_allclose(imported(straight, plain, tmp_path).frame["psi"], straight["psi"], atol=1e-9)
 
 
-def test_a_heading_that_counts_from_0_again_within_a_gap_that_is_filled_is_refused_without_wrap(
-    plain_mapping: Write, tmp_path: Path
-) -> None:
-    """Filled evenly, it would go through half a turn in the gap; a longer gap breaks the run and is no harm."""
-    file = as_log(turning(T), tmp_path / "log.csv")
-    log = pd.read_csv(file)
-    first = int(np.argmax(np.abs(np.diff(log["heading"])) > 300.0))
-    log.loc[first - 8 : first + 8, "heading"] = np.nan
-    log.to_csv(file, index=False)
-    mapping = plain_mapping("", ("wrap = true", "wrap = false"))
-    written = mapping.read_text()
-    step = float(T[1] - T[0])
-    mapping.write_text(written.replace('from = "time"', f'from = "time"\nmax_gap = {18 * step}'))
-    with pytest.raises(DataError, match=r"columns.psi: .* jumps by a whole turn, once at .* s: write wrap = true"):
-        import_log(read_mapping(mapping), file)
-    mapping.write_text(written.replace('from = "time"', f'from = "time"\nmax_gap = {17 * step}'))
-    assert len(import_log(read_mapping(mapping), file).frame) == len(T) - 17
-
-
-def test_an_order_that_counts_from_0_again_is_refused_without_wrap(plain_mapping: Write, tmp_path: Path) -> None:
-    """The unit of the vessel would turn by 358 deg, the unit of the ship by 2."""
-    alpha = 0.02 * (T - 20.0)
-    column = '[columns."unit.alpha"]\nfrom = "azimuth"\nunit = "rad"\n'
-    wraps_not, wraps_too = (read_mapping(plain_mapping(f"{column}wrap = {on}\n")) for on in ("false", "true"))
-    file = as_log(turning(T), tmp_path / "log.csv")
-    plain = pd.read_csv(file)
-    plain.assign(azimuth=alpha % (2 * np.pi)).to_csv(file, index=False)
-    with pytest.raises(
-        DataError, match=r"columns.unit.alpha: .* jumps by a whole turn, once at 20 s: write wrap = true"
-    ):
-        import_log(wraps_not, file)
-    np.testing.assert_allclose(import_log(wraps_too, file).frame["unit.alpha"], alpha, atol=1e-9)
-    plain.assign(azimuth=np.where(T < 20.0, 2.0, -2.0)).to_csv(file, index=False)  # 229 deg: an order
-    assert import_log(wraps_not, file).frame["unit.alpha"].min() == -2.0
-
-
 def test_segments_may_overlap(plain_mapping: Write, tmp_path: Path) -> None:
     more = '\n[[segment]]\nrun = "a"\nstart = 10\nend = 20\n[[segment]]\nrun = "b"\nstart = 15\nend = 30\n'
     frame = imported(turning(T), plain_mapping(more), tmp_path).frame
     assert frame.groupby("run")["t"].agg(["min", "max", "size"]).to_numpy().tolist() == [[10, 20, 21], [15, 30, 31]]
 
 
-def test_segments_at_unix_time(plain_mapping: Write, tmp_path: Path) -> None:
-    """A run may begin one step of the log before it, not more, however large the clock is."""
-    motion = turning(T).assign(t=1.7e9 + T)
-    segment = '\n[[segment]]\nrun = "a"\nstart = {}\nend = 1700000010.0\n'
-    frame = imported(motion, plain_mapping(segment.format(1699999999.5)), tmp_path).frame
-    assert frame["t"].iloc[[0, -1]].tolist() == [1.7e9, 1.7e9 + 10.0]
-    with pytest.raises(DataError, match="is not in the log"):
-        imported(motion, plain_mapping(segment.format(1699999999.0)), tmp_path)
-
-
 @pytest.mark.parametrize("clock", [*CLOCKS, *DATES])
-@pytest.mark.parametrize("seed", range(2))
-def test_a_log_imports_to_the_same_numbers_from_every_unit(
-    seed: int, clock: str, plain_mapping: Write, tmp_path: Path
-) -> None:
+def test_a_log_imports_to_the_same_numbers_from_every_unit(clock: str, plain_mapping: Write, tmp_path: Path) -> None:
     """Segments and breaks are on the clock of the log, those of dates in seconds since 1970."""
-    random = np.random.default_rng([11, seed])
+    random = np.random.default_rng(11)
     begin = random.uniform(8e8, 1.9e9) if clock in DATES else random.uniform(0.0, 1e4)
     t = np.round(begin, 3) + np.cumsum(random.choice([0.25, 0.5, 1.0], 120))
     motion = turning(t, psi0=6.0 - 0.05 * t[0])
@@ -219,26 +118,7 @@ def test_a_log_imports_to_the_same_numbers_from_every_unit(
     assert np.flatnonzero(rows["flags"]).tolist() == [int((expected["t"] < hole * size).sum())]
 
 
-@pytest.mark.parametrize("clock", [*CLOCKS, *DATES])
-def test_every_is_seconds_in_every_unit_of_the_clock(clock: str, plain_mapping: Write, tmp_path: Path) -> None:
-    t = (1.7e9 if clock in DATES else 0.0) + 0.25 * np.arange(200)
-    log = as_log(turning(t), tmp_path / "log.csv")
-    pd.read_csv(log).assign(time=stamps(np.floor(t), clock)).to_csv(log, index=False)
-    declared = plain_mapping("", ('from = "time"', f'from = "time"\nunit = "{clock}"\nevery = 0.25'))
-    rows = import_log(read_mapping(declared), log).frame
-    np.testing.assert_allclose(np.diff(rows["t"]), 0.25, atol=1e-6)
-    assert abs(rows["t"].iloc[0] - t[0]) < 1.0
-
-
-def test_clock_in_minutes(plain_mapping: Write, tmp_path: Path) -> None:
-    more = '\n[[segment]]\nrun = "a"\nstart = 0.5\nend = 1.0\n'
-    mapping = plain_mapping(more, ('from = "time"', 'from = "time"\nunit = "min"'))
-    motion = turning(T)
-    dataset = import_log(read_mapping(mapping), as_log(motion.assign(t=motion["t"] / 60.0), tmp_path / "log.csv"))
-    assert dataset.frame["t"].iloc[[0, -1]].tolist() == [30.0, 60.0]
-
-
-@pytest.mark.parametrize(("step", "rounded"), [(0.5, 1.0), (0.02, 0.1), (0.1, 1.0)])
+@pytest.mark.parametrize(("step", "rounded"), [(0.02, 0.1)])
 def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping: Write, tmp_path: Path) -> None:
     """The rows are `every` apart; without the key, the same log is refused, for its times stand twice."""
     t = 30.0 + step * np.arange(400)
@@ -250,14 +130,6 @@ def test_a_rounded_clock_runs_evenly(step: float, rounded: float, plain_mapping:
     times = import_log(read_mapping(mapping), log).frame["t"].to_numpy()
     np.testing.assert_allclose(np.diff(times), step, rtol=1e-9)
     np.testing.assert_allclose(times, t, atol=rounded)
-
-
-def test_wind_from_becomes_towards(plain_mapping: Write, tmp_path: Path) -> None:
-    more = '[columns.V_w]\nfrom = "u"\nunit = "kn"\n[columns.beta_w]\nfrom = "heading"\nunit = "deg"\n'
-    mapping = plain_mapping(more + 'direction = "from"\nwrap = true\n')
-    frame = imported(turning(T), mapping, tmp_path).frame
-    np.testing.assert_allclose(np.cos(frame["beta_w"]), -np.cos(frame["psi"]), atol=1e-12)
-    np.testing.assert_allclose(frame["V_w"], frame["u"] * 1852 / 3600)
 
 
 def test_short_gaps_are_filled_and_long_ones_break(plain_mapping: Write, tmp_path: Path) -> None:
@@ -281,23 +153,6 @@ def test_short_gaps_are_filled_and_long_ones_break(plain_mapping: Write, tmp_pat
     assert [record["count"] for record in dataset.metadata["repairs"]] == [2, 0, 2]
 
 
-@pytest.mark.parametrize("start", [0.0, 1.7e9])
-def test_a_gap_as_long_as_max_gap_is_filled(start: float, plain_mapping: Write, tmp_path: Path) -> None:
-    """However times are rounded: the difference of two that are three steps of 0.1 s apart is 0.3 s."""
-    motion = turning(np.arange(400) / 10)
-    holes = motion.assign(u=motion["u"].where(np.arange(400) % 10 < 8))  # two rows in ten: 0.3 s between known values
-    holes = holes[~np.isin(np.arange(400) % 10, (4, 5))]  # and two rows that are not there
-    holes = holes.assign(t=start + holes["t"])[:-2]
-    mapping = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.3'))
-    dataset = imported(holes, mapping, tmp_path)
-    assert len(dataset.frame) == len(holes)
-    assert len(list(stretches_of_runs(dataset))) == 1
-    smaller = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.29'))
-    assert len(list(stretches_of_runs(imported(holes, smaller, tmp_path)))) > 40
-    steady = plain_mapping(replace=('from = "time"', 'from = "time"\nmax_gap = 0.1'))
-    assert len(list(stretches_of_runs(imported(motion.assign(t=start + motion["t"]), steady, tmp_path)))) == 1
-
-
 def test_resampling_keeps_the_motion(plain_mapping: Write, tmp_path: Path) -> None:
     frame = imported(turning(T), plain_mapping("\n[resample]\nstep = 1.0\n"), tmp_path).frame
     assert np.unique(np.diff(frame["t"])).tolist() == [1.0]
@@ -314,20 +169,10 @@ def test_unknown_repair_to_leave_out(plain_mapping: Write, tmp_path: Path) -> No
         imported(turning(T), plain_mapping(), tmp_path, without=("heading-offset",))
 
 
-def test_mapping_is_frozen_and_digested(plain_mapping: Write) -> None:
-    first, second = read_mapping(plain_mapping()), read_mapping(plain_mapping("\n[resample]\nstep = 1.0\n"))
-    assert first.digest != second.digest
-    with pytest.raises(ValueError, match="frozen"):
-        first.name = "other"
-
-
 @pytest.mark.parametrize("direction", ["from", "towards"])
-@pytest.mark.parametrize("seed", range(3))
-def test_wind_felt_on_board_becomes_the_wind_over_ground(
-    seed: int, direction: str, plain_mapping: Write, tmp_path: Path
-) -> None:
+def test_wind_felt_on_board_becomes_the_wind_over_ground(direction: str, plain_mapping: Write, tmp_path: Path) -> None:
     """A ship that turns and drifts feels the true wind less the ship's velocity, from another side each second."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     motion = turning(T, u=rng.uniform(2, 6), v=rng.uniform(-2, 2), psi0=rng.uniform(0, 6))
     speed, towards = rng.uniform(1, 12), rng.uniform(0, 2 * np.pi)
     felt = speed * np.exp(1j * (towards - motion["psi"])) - (motion["u"] + 1j * motion["v"])
@@ -356,20 +201,9 @@ def test_files_are_parted_by_a_column_and_by_pauses(plain_mapping: Write, tmp_pa
         dataset = import_log(read_mapping(plain_mapping(f"\n[parts]\n{keys}\n")), log)
         assert dataset.runs == names
         assert len(dataset.frame) == len(table)
-    table.assign(run=np.repeat(["a", "a (2)", "b", "a"], -(-len(table) // 4))[: len(table)]).to_csv(log, index=False)
-    dataset = import_log(read_mapping(plain_mapping('\n[parts]\nfrom = "run"\n')), log)
-    assert dataset.runs == ["log a", "log a (2)", "log b", "log a (3)"]  # whatever names the log has itself
     missing = plain_mapping('\n[parts]\nfrom = "runn"\n')
     with pytest.raises(DataError, match="did you mean"):
         import_log(read_mapping(missing), log)
-
-
-def test_an_azimuth_about_360_is_one_about_0(plain_mapping: Write, tmp_path: Path) -> None:
-    log = as_log(turning(T), tmp_path / "log.csv")
-    pd.read_csv(log).assign(azimuth=(np.linspace(-5.0, 40.0, len(T)) % 360).round(3)).to_csv(log, index=False)
-    more = '\n[columns."port.alpha"]\nfrom = "azimuth"\nunit = "deg"\nwrap = true\n'
-    alpha = import_log(read_mapping(plain_mapping(more)), log).frame["port.alpha"]
-    np.testing.assert_allclose(np.degrees(alpha), np.linspace(-5.0, 40.0, len(T)), atol=1e-3)
 
 
 def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mapping: Write, tmp_path: Path) -> None:
@@ -381,41 +215,6 @@ def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mappi
     dataset = import_log(read_mapping(plain_mapping("", ('from = "time"', 'from = "time"\nrepeated = "drop"'))), log)
     assert counts(dataset)["repeated"] == 3
     np.testing.assert_allclose(dataset.frame["north"], motion["north"], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("text", "what"), [("abc", r"row 31: 'abc' is no number"), ("", r"row 31, clock\.max_gap: no n")]
-)
-def test_a_row_has_its_number_among_all_rows_of_the_file(
-    text: str, what: str, plain_mapping: Write, tmp_path: Path
-) -> None:
-    """Rows 9 and 10 say the time of the row before, and are left out."""
-    log = as_log(turning(T).iloc[[*range(8), 7, 7, *range(8, len(T))]], tmp_path / "log.csv")
-    table = pd.read_csv(log, dtype=str)
-    table.loc[30, "heading"] = text
-    table.to_csv(log, index=False)
-    mapping = read_mapping(plain_mapping("", ('from = "time"', 'from = "time"\nrepeated = "drop"')))
-    with pytest.raises(DataError, match=what):
-        import_log(mapping, log)
-
-
-@pytest.mark.parametrize("large", [False, True])
-def test_rows_of_a_ship_at_rest_are_not_repeated_rows(
-    large: bool, plain_mapping: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A rounded clock gives rows of one time: those are repeated that agree in all columns, also in those not used."""
-    t = np.arange(0.0, 30.0, 0.1)
-    rest = pd.DataFrame({"t": np.floor(t + 1e-9), **dict.fromkeys(("north", "east", "psi", "u", "v", "r"), 0.0)})
-    log = as_log(rest.assign(**{"port.n": 0.0}), tmp_path / "log.csv")
-    rows = pd.read_csv(log).assign(counter=np.arange(len(t)))
-    pd.concat([rows.iloc[:100], rows.iloc[99:]]).to_csv(log, index=False)
-    if large:
-        monkeypatch.setattr(readers, "LARGE", 1)
-    mapping = plain_mapping("", ('from = "time"', 'from = "time"\nevery = 0.1\nrepeated = "drop"'))
-    dataset = import_log(read_mapping(mapping), log)
-    assert counts(dataset)["repeated"] == 1
-    np.testing.assert_allclose(dataset.frame["t"], t, atol=1.0)
-    np.testing.assert_allclose(np.diff(dataset.frame["t"]), 0.1, rtol=1e-9)
 
 
 def test_a_place_beyond_the_poles_is_refused(tmp_path: Path) -> None:
@@ -442,11 +241,8 @@ def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Wr
 @pytest.mark.parametrize(
     ("first", "second", "remedy"),
     [
-        (358.0, 2.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
         (-11.0, 349.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
         (436.0, 96.0, r"it goes from 96 to 436 deg, as no such angle does that begins again: is the unit"),
-        (-349.0, 0.0, r"is the unit right\? If it counts"),
-        (-262.0, 98.0, r"it goes from -262 to 98 deg, as no such angle does that begins again: is the unit"),
     ],
 )
 def test_a_rudder_that_jumps_is_asked_for_its_unit(
@@ -464,22 +260,6 @@ def test_a_rudder_that_jumps_is_asked_for_its_unit(
             import_log(read_mapping(mapping), file)
 
 
-def test_a_heading_that_counts_on_or_begins_anew_needs_no_wrap(tmp_path: Path) -> None:
-    """Two turns in one run, then from 0 in the next: no jump of one turn within a run."""
-    one = turning(T, r=0.11)
-    motion = pd.concat([one, one.assign(t=one["t"] + 500.0)], ignore_index=True)
-    log = pd.DataFrame({"t": motion["t"], "x": motion["north"], "y": motion["east"], "psi": motion["psi"]})
-    log = log.assign(**{name: motion[name] for name in ("u", "v", "r")})
-    log.to_csv(tmp_path / "log.csv", index=False)
-    units = {"north": ("x", "m"), "east": ("y", "m"), "psi": ("psi", "rad"), "r": ("r", "rad/s")}
-    units |= {name: (name, "m/s") for name in ("u", "v")}
-    text = 'name = "m"\n[clock]\nfrom = "t"\nunit = "s"\n'
-    text += "".join(f'[columns.{name}]\nfrom = "{a}"\nunit = "{unit}"\n' for name, (a, unit) in units.items())
-    (tmp_path / "m.toml").write_text(text)
-    frame = import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame
-    assert frame["psi"].max() > 4 * np.pi
-
-
 def test_a_run_is_named_by_a_file_in_utf_8(tmp_path: Path) -> None:
     (tmp_path / os.fsdecode(b"a\xe9.csv")).touch()
     with pytest.raises(DataError, match="its name is not UTF-8"):
@@ -487,7 +267,7 @@ def test_a_run_is_named_by_a_file_in_utf_8(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("large", [False, True])
-@pytest.mark.parametrize("value", ["8.400", "-1.250", "1.250.000", "8.400,5"])
+@pytest.mark.parametrize("value", ["8.400", "1.250.000"])
 def test_a_point_that_may_mark_thousands_is_refused_beside_a_decimal_comma(
     value: str, large: bool, plain_mapping: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -576,15 +356,6 @@ def test_dates_and_angles_in_several_columns(side: float, tmp_path: Path) -> Non
     np.testing.assert_allclose(dataset.frame["north"], metres, atol=0.02)
 
 
-def test_positions_are_projected_block_by_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "mapping.toml").write_text(PARTED)
-    parted().to_csv(tmp_path / "log.csv", index=False)
-    whole = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv").frame
-    monkeypatch.setattr(frames, "BLOCK", 3)
-    by_parts = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv").frame
-    pd.testing.assert_frame_equal(by_parts, whole, rtol=1e-14)
-
-
 @pytest.mark.parametrize("large", [False, True])
 def test_positions_as_text(large: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(readers, "LARGE", 0 if large else readers.LARGE)
@@ -641,21 +412,6 @@ def test_only_dates_and_positions_are_in_parts(change: tuple[str, str], path: st
     with pytest.raises(DocumentError) as caught:
         read_mapping(tmp_path / "mapping.toml")
     assert caught.value.path == path
-
-
-@pytest.mark.parametrize(("decimal", "mark"), [(".", ","), (",", "."), (".", "'"), (",", "\u202f")])
-def test_numbers_with_a_mark_of_thousands(decimal: str, mark: str, tmp_path: Path) -> None:
-    log = parted()
-    log["psi"] = [f"{1000.25 * k:,.2f}".replace(",", "#").replace(".", decimal).replace("#", mark) for k in range(10)]
-    log.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal)
-    form = f'[format]\nseparator = ";"\ndecimal = "{decimal}"\nthousands = "{mark}"\n'
-    (tmp_path / "mapping.toml").write_text(PARTED.replace("[clock]", f"{form}[clock]"))
-    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
-    np.testing.assert_allclose(dataset.frame["psi"], 1000.25 * np.arange(10))
-    log["psi"] = f"12{mark}34"  # no group of three
-    log.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal)
-    with pytest.raises(DataError, match="is no number"):
-        import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
 
 
 def test_one_sign_is_not_both_decimal_and_thousands(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.instants import clock_rounding, even_clock, even_instants
+from shipid.logs.instants import even_clock, even_instants
+from tests.draws import seeds
 
 
 @pytest.mark.parametrize(
@@ -39,14 +40,7 @@ def test_a_clock_of_another_rate_is_refused() -> None:
         even_instants(t, 0.2, pd.DataFrame(index=range(len(t))), Path("log.csv"))
 
 
-def test_the_rounding_of_a_clock_grows_with_its_numbers() -> None:
-    """Of numbers with three digits, 9.99 is known to 0.01, and 99.9 to 0.1."""
-    t = np.arange(1.0, 99.0, 0.05)
-    rounding = clock_rounding(np.array([float(f"{value:.3g}") for value in t]))
-    np.testing.assert_allclose(rounding[[0, -1]], [0.05, 0.1], rtol=1e-6)
-
-
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(5))
 def test_a_rounded_clock_keeps_time_where_rows_were_lost(seed: int) -> None:
     """Times err by less than a rounding against each other; rows are whole steps apart, and none goes back."""
     random = np.random.default_rng(seed)

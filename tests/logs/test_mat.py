@@ -13,8 +13,7 @@ from shipid.errors import DataError
 from shipid.logs.formats import MatFormat
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.mat import _no_vectors, is_mat, read_mat
-from shipid.logs.readers import read_log_table
+from shipid.logs.mat import is_mat, read_mat
 from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
 
 
@@ -54,58 +53,12 @@ def test_a_matlab_variable_that_is_no_vector_is_named(name: str, log: pd.DataFra
     assert caught.value.path == "columns.propeller.n.from"
 
 
-def test_a_matlab_array_of_structs_is_named(log: pd.DataFrame, tmp_path: Path) -> None:
-    """Alone it is all that the file holds; beside vectors its fields are columns that the mapping may name."""
-    rows = log.to_records(index=False)
-    file = tmp_path / "log.mat"
-    savemat(file, {"log": rows})
-    message = r"no variable .* 'log' is an array of 120 structs, .* such as s\.time = \[log\.time\]"
-    with pytest.raises(DataError, match=message):
-        read_log_table(file, MatFormat(kind="mat"), "time")
-    savemat(file, {**{name: log[name].to_numpy() for name in log}, "log": rows})
-    changes = [('from = "rpm"', 'from = "log.rpm"')]
-    with pytest.raises(DataError, match=r"'log\.rpm' is in an array of structs: save"):
-        import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"', *changes)), file)
-
-
-def test_a_matlab_object_of_a_class_is_named() -> None:
-    """As scipy returns a datetime: its name, the system of types, its class and numbers."""
-    kind = [("s0", "O"), ("s1", "O"), ("s2", "O"), ("arr", "O")]
-    opaque = np.array([(b"t", b"MCOS", b"datetime", np.zeros(6))], dtype=kind)
-    ((name, what, remedy),) = _no_vectors({"None": opaque, "__function_workspace__": np.zeros(3)})
-    assert name == "t"
-    assert what == "an object of class datetime, not a vector of numbers"
-    assert remedy.startswith("save seconds(t - t(1))")
-
-
 def test_a_matlab_file_of_version_7_3_has_its_remedy(tmp_path: Path) -> None:
     """As MATLAB writes its first 128 bytes: text, no subsystem, version 0x0200, byte order; HDF5 follows."""
     (tmp_path / "log.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM" + bytes(600))
     with pytest.raises(DataError, match=r"a MATLAB file of version 7\.3: save it with") as caught:
         import_log(read_mapping(mapping_with(tmp_path, 'kind = "mat"')), tmp_path / "log.mat")
     assert caught.value.path == "format.kind"
-
-
-@pytest.mark.parametrize("kind", [MemoryError, OSError])
-def test_what_the_system_lacks_is_no_damage(
-    kind: type[Exception], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """A file that is too large for the memory was said to be damaged, or none of MATLAB's."""
-
-    def lacking(*_: object, **__: object) -> None:
-        raise kind("lacking")
-
-    savemat(tmp_path / "log.mat", {"t": T})
-    monkeypatch.setattr("scipy.io.loadmat", lacking)
-    with pytest.raises(kind, match="lacking"):
-        read_mat(tmp_path / "log.mat", MatFormat(kind="mat"), "t")
-
-
-def test_a_sparse_vector_is_a_column(log: pd.DataFrame, tmp_path: Path) -> None:
-    """As MATLAB stores a rudder that is mostly amidships; it was lost without a word."""
-    vectors = {name: log[name].to_numpy() for name in log}
-    savemat(tmp_path / "log.mat", {**vectors, "rpm": csc_matrix(vectors["rpm"][:, None])})
-    assert_is_the_motion(mapping_with(tmp_path, 'kind = "mat"'), tmp_path / "log.mat")
 
 
 @pytest.mark.parametrize("order", ["<", ">"])

@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import BREAK, Dataset, flag_bit, stretches_of_runs
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.repairs import FLAGS, Despike, Latency, apply_repairs, remove_spikes
+from tests.draws import seeds
 from tests.logs.conftest import as_log, turning
 
 T = np.arange(0.0, 240.0, 0.5)
@@ -106,16 +107,6 @@ def test_disabled_in_the_file(plain_mapping: Callable[..., Path], tmp_path: Path
     np.testing.assert_allclose(dataset.frame["u"], MOTION["u"])
 
 
-def test_heading_offset_keeps_the_path(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
-    """Velocity over ground, R(psi) (u, v), is the same with and without."""
-    repair = '\n[[repair]]\nkind = "heading_offset"\noffset = 0.3\nreason = "a test"\n'
-    frame = import_log(read_mapping(plain_mapping(repair)), as_log(MOTION, tmp_path / "log.csv")).frame
-    for f in (frame, MOTION):
-        np.testing.assert_allclose(np.hypot(f["u"], f["v"]), np.hypot(4.0, 0.5))
-    course = [np.unwrap(f["psi"] + np.arctan2(f["v"], f["u"])) for f in (frame, MOTION)]
-    np.testing.assert_allclose(course[0], course[1], atol=1e-9)
-
-
 def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
     plain_mapping: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -128,7 +119,7 @@ def test_break_removes_what_lies_between_and_despike_does_not_reach_over(
     assert [record["count"] for record in dataset.metadata["repairs"]] == [1, 0]
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", seeds(10))
 def test_a_spike_is_mended_by_its_own_stretch(seed: int) -> None:
     """Wherever it is, and wherever the ship was before and after the break: on a line the mended value is the true."""
     rng = np.random.default_rng(seed)
@@ -183,77 +174,6 @@ def test_what_came_late_is_taken_earlier(signal: str) -> None:
         np.testing.assert_allclose(mended[name], wanted[name], atol=2e-2, err_msg=name)
     assert len(mended) == len(t) - 4
     assert records[0]["kind"] == "latency"
-
-
-@pytest.mark.parametrize("signal", ["position", "velocity", "heading", "yaw rate"])
-@pytest.mark.parametrize("seconds", [0.6, -0.6])
-def test_a_late_signal_of_a_broken_log_is_mended_stretch_by_stretch(signal: str, seconds: float) -> None:
-    """Rows at the ends of each stretch go, and the break with them: the first row that is left has it."""
-    bit = 1 << FLAGS.index(BREAK)
-    rows = turning(np.arange(0.0, 30.0, 0.25)).assign(flags=0)
-    rows["t"] += np.where(np.arange(len(rows)) >= 50, 40.0, 0.0)
-    rows["north"] += np.where(np.arange(len(rows)) >= 50, 500.0, 0.0)
-    rows.loc[50, "flags"] = bit
-    repair = Latency(kind="latency", reason="seen", signal=signal, seconds=seconds, turn=True)
-    mended, _ = apply_repairs(rows, [repair])
-    alone = [apply_repairs(part.reset_index(drop=True), [repair])[0] for part in (rows[:50], rows[50:])]
-    values = mended.drop(columns="flags")
-    pd.testing.assert_frame_equal(values, pd.concat(alone, ignore_index=True).drop(columns="flags"))
-    assert np.flatnonzero(mended["flags"].to_numpy() & bit).tolist() == [len(alone[0])]
-
-
-@pytest.mark.parametrize("first", [True, False])
-def test_a_repair_that_leaves_no_row_is_named(first: bool, plain_mapping: Callable[..., Path], tmp_path: Path) -> None:
-    """A break that holds the whole log, with a latency, which needs rows, after or before it."""
-    gone = '\n[[repair]]\nkind = "break"\nintervals = [[-1e6, 1e6]]\nreason = "a test"\n'
-    late = '\n[[repair]]\nkind = "latency"\nsignal = "velocity"\nseconds = 1.5\nreason = "a test"\n'
-    mapping = read_mapping(plain_mapping(gone + late if first else late + gone))
-    log = as_log(MOTION, tmp_path / "log.csv")
-    with pytest.raises(DataError, match=r"log\.csv: repair\.break: no row is left .*--without break"):
-        import_log(mapping, log)
-    assert len(import_log(mapping, log, without=("break",)).frame) > 400
-
-
-def test_a_speed_over_ground_is_mended_before_it_becomes_u_and_v(tmp_path: Path) -> None:
-    """A rotten speed would be in u and v for good, and beside a missing value, too."""
-    speed, course = np.hypot(MOTION["u"], MOTION["v"]), MOTION["psi"] + np.arctan2(MOTION["v"], MOTION["u"])
-    log = pd.DataFrame({"t": T, "x": MOTION["north"], "y": MOTION["east"], "psi": MOTION["psi"], "r": MOTION["r"]})
-    log = log.assign(sog=speed.where(~np.isin(T, [61.0])), cog=course)
-    log.loc[np.isin(T, [60.5, 100.0]), "sog"] = 99.9
-    log.to_csv(tmp_path / "log.csv", index=False)
-    columns = {"north": ("x", "m"), "east": ("y", "m"), "psi": ("psi", "rad"), "r": ("r", "rad/s")}
-    columns |= {"speed": ("sog", "m/s"), "course": ("cog", "rad")}
-    text = 'name = "m"\n[clock]\nfrom = "t"\nunit = "s"\nmax_gap = 3\n'
-    text += "".join(
-        f'[columns.{name}]\nfrom = "{source}"\nunit = "{unit}"\n' for name, (source, unit) in columns.items()
-    )
-    repair = '[[repair]]\nkind = "despike"\ncolumns = {}\nwindow = 3\nthreshold = 100\nunit = "kn"\nreason = "r"\n'
-    mapping = tmp_path / "m.toml"
-    mapping.write_text(text + repair.format('["speed"]'))
-    dataset = import_log(read_mapping(mapping), tmp_path / "log.csv")
-    assert dataset.metadata["repairs"][0]["count"] == 2
-    for name in ("u", "v"):
-        np.testing.assert_allclose(dataset.frame[name], MOTION[name], atol=0.01)
-    mapping.write_text(text + repair.format('["speed", "u"]'))
-    with pytest.raises(DocumentError, match=r"repair.0.columns: 'u' is made of columns .* two repairs"):
-        read_mapping(mapping)
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_a_spike_at_an_end_is_replaced_and_nothing_else_is(seed: int) -> None:
-    """A ship on a drawn track; spikes in the first and last half window, at the very ends, and in the middle."""
-    random = np.random.default_rng(seed)
-    t = np.arange(300) * 0.5
-    psi = random.uniform(0, 6) + random.uniform(0.1, 0.6) * np.sin(t / random.uniform(15, 60))
-    north = np.cumsum(random.uniform(1, 9) * np.cos(psi)) * 0.5 + random.normal(0, 0.1, len(t))
-    wild = np.unique([random.integers(0, 9), 150, 299 - random.integers(0, 9)])
-    spoilt = north.copy()
-    spoilt[wild] += random.choice([-1, 1], len(wild)) * random.uniform(150, 900, len(wild))
-    rows = pd.DataFrame({"t": t, "north": spoilt, "flags": np.zeros(len(t), dtype=np.int64)})
-    repair = Despike(kind="despike", reason="drawn", columns=("north",), window=10.0, threshold=60.0)
-    outcome = remove_spikes(rows, repair)
-    assert np.flatnonzero(outcome.touched).tolist() == wild.tolist()
-    assert np.abs(outcome.rows["north"] - north).max() < 10
 
 
 def test_a_window_of_a_single_row_is_refused(plain_mapping: Callable[..., Path], tmp_path: Path) -> None:

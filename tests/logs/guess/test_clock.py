@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from shipid.errors import DataError
-from shipid.logs.guess.clock import _is_time_of_day
-from shipid.logs.guess.columns import guess
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.mapping import clock_seconds
-from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, text
+from tests.logs.guess.conftest import TABLE, T, log_of
 
 
 @pytest.mark.parametrize(
@@ -40,8 +35,7 @@ def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
 
 
-@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
-@pytest.mark.parametrize("stored", ["csv", "parquet"])
+@pytest.mark.parametrize(("step", "stored"), [(0.2, "csv"), (10.0, "parquet")])
 def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str, tmp_path: Path) -> None:
     """Before, every minute had a hole of 41 s."""
     t = step * np.arange(900)
@@ -55,21 +49,6 @@ def test_a_date_and_a_time_in_one_number_are_no_seconds(step: float, stored: str
     sniffed = recognise_log(tmp_path / "log")
     assert sniffed.clock == {"from": "time", "unit": "date"}
     np.testing.assert_allclose(sniffed.t, t + pd.Timestamp("2024-05-14 08:13:20").timestamp(), atol=5e-3)
-
-
-@pytest.mark.parametrize("pause", [200.0, 1500.0])
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_days_with_few_decimals_have_the_step_of_the_rows_and_not_that_with_their_pauses(
-    seed: int, pause: float, tmp_path: Path
-) -> None:
-    """A step of 1 s became 1.46 s, for the pauses between the runs were counted."""
-    lengths = np.random.default_rng(seed).integers(150, 400, 8)
-    t = np.concatenate([k * pause + lengths[:k].sum() + np.arange(length) for k, length in enumerate(lengths)])
-    days = pd.Series(45_426.25 + t / 86_400).map("{:.6f}".format)
-    pd.DataFrame({"Time": days, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
-    assert sniffed.clock.get("every", 1.0) == pytest.approx(1.0, abs=1e-4)
-    assert np.abs(sniffed.t - sniffed.t[0] - t).max() < 0.1
 
 
 @pytest.mark.parametrize(("epoch", "who"), [(11_644_473_600, "Windows"), (62_135_596_800, ".NET")])
@@ -110,8 +89,7 @@ def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> No
         recognise_log(tmp_path / "log.csv")
 
 
-@pytest.mark.parametrize("name", ["utc", "time", "t"])
-@pytest.mark.parametrize("step", [0.2, 1.0, 10.0])
+@pytest.mark.parametrize(("name", "step"), [("utc", 0.2), ("t", 10.0)])
 def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step: float, tmp_path: Path) -> None:
     t = step * np.arange(900)
     moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
@@ -120,13 +98,6 @@ def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step:
     sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": name, "unit": "hhmmss"}
     np.testing.assert_allclose(sniffed.t, 8 * 3600 + 13 * 60 + 20 + t, atol=1e-6)
-
-
-@pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 50.0, 60.0, 100.0])
-@pytest.mark.parametrize("begin", [0.0, 37.0, 120.0, 86340.0, 123000.0])
-def test_seconds_are_no_hours_minutes_and_seconds(step: float, begin: float) -> None:
-    for count in (5, 40, 400):
-        assert not _is_time_of_day(begin + step * np.arange(count))
 
 
 START = pd.Timestamp("2024-05-14 08:00:05")
@@ -138,8 +109,7 @@ DAYS_OF["datenum"] += 5 / 86400
 
 
 @pytest.mark.parametrize("unit", DAYS_OF)
-@pytest.mark.parametrize("name", ["time", "Time [d]", "datenum", "t_days", "Time [days]"])
-@pytest.mark.parametrize("step", [0.01, 0.5, 10.0])
+@pytest.mark.parametrize(("name", "step"), [("time", 0.5), ("Time [d]", 10.0)])
 def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, step: float, tmp_path: Path) -> None:
     """A double has such a day to 1e-5 s, a table to as much as it writes."""
     t = step * np.arange(60)
@@ -148,18 +118,6 @@ def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, 
     sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": name, "unit": unit}
     np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=3e-5)
-
-
-@pytest.mark.parametrize("unit", DAYS_OF)
-@pytest.mark.parametrize(("step", "digits"), [(0.25, 5), (0.5, 6), (1.0, 5)])
-def test_rounded_days_keep_their_rate(unit: str, step: float, digits: int, tmp_path: Path) -> None:
-    """Five digits of a day are 0.86 s: rows of 4 Hz appear three or four times at one time."""
-    t = step * np.arange(400)
-    stamps = [f"{DAYS_OF[unit] + one / 86400:.{digits}f}" for one in t]
-    pd.DataFrame({"time": stamps, "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
-    assert sniffed.clock == {"from": "time", "unit": unit, "every": pytest.approx(step, rel=1e-3)}
-    np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=1.0)
 
 
 @pytest.mark.parametrize(
@@ -191,15 +149,7 @@ def test_what_a_clock_counts_in(name: str, values: np.ndarray, unit: str, tmp_pa
     assert recognise_log(tmp_path / "log.csv").clock["unit"] == unit
 
 
-def test_a_row_of_units_says_that_of_the_clock(tmp_path: Path) -> None:
-    lines = ["time,u,v", "h,mph,mm/s", *(f"{k / 3600:.8f},{0.1 * k:.1f},{k}" for k in range(30))]
-    sniffed = recognise_log(log_of(tmp_path, lines))
-    assert sniffed.clock == {"from": "time [h]", "unit": "h"}
-    np.testing.assert_allclose(sniffed.t, np.arange(30), atol=1e-4)
-    assert list(sniffed.columns) == ["u [mph]", "v [mm/s]"]
-
-
-@pytest.mark.parametrize("day", ["%d.%m.%Y", "%Y-%m-%d", "%Y/%m/%d", "%m/%d/%Y", "%d.%m.%y"])
+@pytest.mark.parametrize("day", ["%d.%m.%Y", "%m/%d/%Y"])
 def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
     moments = pd.to_datetime(1.7e9 + T, unit="s")
     split = TABLE.assign(time=moments.strftime("%H:%M:%S.%f"))
@@ -217,16 +167,6 @@ def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
     sniffed = recognise_log(tmp_path / "log.csv")
     assert sniffed.clock == {"from": "time", "unit": "s", "every": 0.1}
     np.testing.assert_allclose(np.diff(sniffed.t), 0.1, rtol=1e-6)
-
-
-def test_a_date_beside_times_of_whole_seconds_is_kept(tmp_path: Path) -> None:
-    """The times alone were the clock, and the log had no date."""
-    t = pd.Timestamp("2024-05-14 23:59:50") + pd.to_timedelta(0.5 * np.arange(80), "s")
-    log = pd.DataFrame({"date": t.strftime("%d.%m.%Y"), "time": t.strftime("%H:%M:%S"), "N": 1.0, "psi": 2.0})
-    log.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
-    assert sniffed.clock == {"from": "time", "unit": "date", "date": "date", "every": 0.5}
-    np.testing.assert_allclose(sniffed.t, t[0].timestamp() + 0.5 * np.arange(80), atol=0.5)
 
 
 def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path) -> None:
@@ -272,15 +212,6 @@ def test_dates_that_may_be_other_moments_are_asked(
     assert [words in doubt for doubt in doubts] == [True] * bool(words)
 
 
-def test_dates_that_rise_are_the_clock_beside_dates_that_go_back(tmp_path: Path) -> None:
-    """A receiver's clock set back is no reason to refuse the logger's own."""
-    table = TABLE.assign(
-        time=SUMMER_TIME_ENDS, utc=pd.date_range("2025-10-26", periods=len(T), freq="500ms").astype(str)
-    )
-    (tmp_path / "log.csv").write_text(text(table=table))
-    assert recognise_log(tmp_path / "log.csv").clock["from"] == "utc"
-
-
 def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path) -> None:
     rows = [f"{0.2 * k:.1f},{np.sin(k):.3f},{np.cos(k):.3f}" for k in range(60)]
     twice = sorted(rows + rows[7:9], key=lambda row: float(row.split(",")[0]))
@@ -289,24 +220,6 @@ def test_rows_that_repeat_the_row_before_are_dropped_and_reported(tmp_path: Path
     np.testing.assert_allclose(sniffed.t, 0.2 * np.arange(60))
     assert all(len(values) == 60 for values in sniffed.columns.values())
     assert any("repeat" in note for note in sniffed.notes)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_rounded_clock_keeps_its_rate_where_rows_are_lost(tmp_path: Path, seed: int) -> None:
-    """Stamps of whole seconds at 2 or 4 Hz, some rows lost and a long pause: no instant is off by more than a step."""
-    rng = np.random.default_rng(seed)
-    every, count = (0.5, 0.25)[seed % 2], 900
-    true = every * np.arange(count) + np.where(np.arange(count) < 500, 0.0, 300.0)
-    true = true[rng.random(count) > 0.006]
-    stamp = [f"{int(t // 3600) + 8:02d}:{int(t // 60) % 60:02d}:{int(t % 60):02d}" for t in true]
-    x = rng.normal(size=len(true))
-    sniffed = recognise_log(
-        log_of(tmp_path, ["time,x", *(f"{s},{value:.4f}" for s, value in zip(stamp, x, strict=True))])
-    )
-    assert sniffed.clock["every"] == pytest.approx(every)
-    off = sniffed.t - sniffed.t[0] - (true - true[0])
-    assert np.ptp(off) < 1.0 + every, "within the rounding"
-    assert (np.diff(sniffed.t) > 0).all()
 
 
 START_OF_DAY = pd.Timestamp("2024-05-14 23:58:00") + pd.to_timedelta(0.5 * np.arange(600), unit="s")
@@ -345,9 +258,7 @@ def test_clocks_that_begin_again_and_days_of_the_year(
     np.testing.assert_allclose(np.diff(read), 0.5, atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    "write", ["{:g} sec", "{:g}s", lambda t: f"{t / 60:.9f} min", lambda t: f"0 days 00:{t // 60:02.0f}:{t % 60:09.6f}"]
-)
+@pytest.mark.parametrize("write", ["{:g} sec", lambda t: f"0 days 00:{t // 60:02.0f}:{t % 60:09.6f}"])
 def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) -> None:
     """As MATLAB writes those of a timetable, and pandas its own."""
     times = [write.format(0.5 * k) if isinstance(write, str) else write(0.5 * k) for k in range(600)]
@@ -357,7 +268,7 @@ def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) 
     np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
 
 
-@pytest.mark.parametrize(("name", "digits"), [("Decimal year", 12), ("time", 12), ("Jahr", 12), ("time", 4)])
+@pytest.mark.parametrize(("name", "digits"), [("Decimal year", 12), ("time", 4)])
 def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp_path: Path) -> None:
     """With four digits an hour has one number, which repeats."""
     with_clock(name, [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]).to_csv(
@@ -376,13 +287,6 @@ def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: P
         recognise_log(tmp_path / "log.csv")
 
 
-def test_a_clock_that_goes_back_by_less_than_a_day_is_refused(tmp_path: Path) -> None:
-    values = [86280 + 0.5 * k if k < 300 else 40000 + 0.5 * k for k in range(600)]
-    with_clock("Seconds of day", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
-    with pytest.raises(DataError, match=r"goes back from .* in row 301"):
-        recognise_log(tmp_path / "log.csv")
-
-
 @pytest.mark.parametrize(
     ("line", "words"),
     [
@@ -396,28 +300,6 @@ def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -
     with pytest.raises(DataError) as caught:
         recognise_log(log_of(tmp_path, [*lines[:31], line, *lines[31:]]))
     assert words in caught.value.message
-
-
-@pytest.mark.parametrize("time", ["", "---"])
-def test_a_time_that_is_missing_beside_dates_is_named(time: str, tmp_path: Path) -> None:
-    """Not the dates, that repeat from row to row."""
-    rows = [f"2024/05/14,{time if k == 30 else f'08:00:{k:02}'},{2 * k},0.1" for k in range(60)]
-    with pytest.raises(DataError, match="'Time' has no value in row 31"):
-        recognise_log(log_of(tmp_path, ["Date,Time,north,heading", *rows]))
-
-
-def test_a_line_below_times_of_day_is_named(tmp_path: Path) -> None:
-    """The first row has a time that can be read: it was said to have none."""
-    lines = ["Time,north,heading", *(f"08:00:{k:02},{2 * k},0.1" for k in range(60)), "Average,59,0.1"]
-    with pytest.raises(DataError, match="holds 'Average' in row 61, no time: remove the line"):
-        recognise_log(log_of(tmp_path, lines))
-    moments = [f"2024-05-14 {line}" for line in lines[1:-1]]
-    for below, which in (
-        ("Run,1,2", "the line"),
-        ("Run,1,2\n1,1,2\n2,1,2", "the 3 such lines"),
-    ):  # a number made it no column of dates
-        with pytest.raises(DataError, match=f"holds 'Run' in row 61, no time: remove {which}"):
-            recognise_log(log_of(tmp_path, [lines[0], *moments, below]))
 
 
 @pytest.mark.parametrize(
@@ -445,13 +327,6 @@ def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str,
     with pytest.raises(DataError, match="no column can be the clock: 'GPS time") as caught:
         recognise_log(log_of(tmp_path, lines))
     assert words in caught.value.message
-
-
-def test_rows_in_too_short_a_time_name_the_clock(tmp_path: Path) -> None:
-    frame = pd.DataFrame({"t": 1e-5 * np.arange(6), "N": np.arange(6.0), "E": 0.0, "heading": 0.1})
-    frame.to_csv(tmp_path / "log.csv", index=False)
-    with pytest.raises(DataError, match=r"6 rows over 5e-05 s are too few .* is 't' the clock, in s\?"):
-        guess(tmp_path / "log.csv")
 
 
 def in_columns(frame: pd.DataFrame, fields: dict[str, str], begin: str = "2024-02-29T23:59:57.5") -> pd.DataFrame:
@@ -489,27 +364,6 @@ def test_a_date_in_columns_is_the_clock(
     assert list(sniffed.columns) == ["N", "psi"]
 
 
-def test_a_date_in_columns_without_names_is_the_clock(tmp_path: Path) -> None:
-    """As datevec of MATLAB has it, beside a count of rows."""
-    fields = {"Year": "%Y", "Month": "%m", "Day": "%d", "Hour": "%H", "Minute": "%M", "Second": "%S.%f"}
-    log = in_columns(TABLE, fields)
-    log.insert(0, "row", range(1, 1 + len(log)))
-    log.to_csv(tmp_path / "log.csv", index=False, header=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
-    assert (sniffed.clock["from"], sniffed.clock["date"]) == (["5", "6", "7"], ["2", "3", "4"])
-    np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
-    assert list(sniffed.columns) == ["1", "8", "9"]
-
-
-def test_a_date_in_columns_beside_a_time_of_day(tmp_path: Path) -> None:
-    log = in_columns(TABLE, {"Day": "%d", "Month": "%m", "Year": "%Y"})
-    moments = pd.Timestamp("2024-02-29T23:59:57.5") + pd.to_timedelta(T, "s")
-    log.assign(Time=moments.strftime("%H:%M:%S.%f")).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
-    assert sniffed.clock == {"from": "Time", "unit": "date", "date": ["Year", "Month", "Day"]}
-    np.testing.assert_allclose(sniffed.t, 1709251197.5 + T, atol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("second", "asked"),
     [
@@ -534,58 +388,15 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
     assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
 
 
-def _rows(change: Any) -> list[str]:
-    times = [f"{k}.0" for k in range(60)]
-    change(times)
-    return ["time,north,fuel total", *(f"{time},{k % 7},{100 + 0.01 * k * k:.2f}" for k, time in enumerate(times))]
-
-
-@pytest.mark.parametrize(
-    ("first", "changed", "fault"),
-    [
-        (30, lambda k: f"{k - 5}.0", "goes back from 29 s to 25 s in row 31"),
-        (59, lambda _: "", "has no value in row 60"),
-        (59, lambda _: "1" + "0" * 400, "in row 60, no time: remove the line"),
-        (59, lambda _: "err", "holds 'err' in row 60, no time: remove the line"),
-    ],
-)
-def test_a_total_that_rises_is_no_clock_beside_a_clock_with_a_fault(
-    first: int, changed: Any, fault: str, tmp_path: Path
-) -> None:
-    """Before, the fuel total was the clock, and the draft said that no column is called one."""
-
-    def change(times: list[str]) -> None:
-        times[first:] = [changed(k) for k in range(first, 60)]
-
-    with pytest.raises(DataError, match=f"no column can be the clock: 'time' .*{re.escape(fault)}"):
-        recognise_log(log_of(tmp_path, _rows(change)))
-
-
-@pytest.mark.parametrize("other", ["%Y-%m-%dT%H:%M:%SZ", "%d.%m.%Y %H:%M:%S"])
-def test_dates_written_in_two_ways_are_refused_with_what_to_do(other: str, tmp_path: Path) -> None:
-    def change(times: list[str]) -> None:
-        begin = datetime(2024, 5, 14, 8, tzinfo=UTC)
-        ways = ["%Y-%m-%d %H:%M:%S"] * 35 + [other] * 25
-        times[:] = [f"{begin + timedelta(seconds=k):{way}}" for k, way in enumerate(ways)]
-
-    with pytest.raises(DataError, match=r"'time' holds .* in row .*, and other rows are written otherwise"):
-        recognise_log(log_of(tmp_path, _rows(change)))
-
-
 @pytest.mark.parametrize(
     ("head", "clock", "behind", "said"),
     [
         ("# tz=+01:00\n# vessel 7\n", "time", "", "tz=+01:00"),
         ("Time zone: Europe/Oslo\n", "time", "", "Time zone: Europe/Oslo"),
-        ("UTC offset = +0200\n", "time", "", "UTC offset = +0200"),
         ("all times are local time\n", "time", "", "local time"),
         ("", "time (UTC+2)", "", "UTC+2"),
         ("", "Zeit [MESZ]", "", "MESZ"),
-        ("", "local_time", "", "local"),
-        ("", "Lokal tid", "", "Lokal tid"),
         ("", "heure locale", "", "heure locale"),
-        ("", "Time LT", "", "LT"),
-        ("alle tider er lokal tid\n", "Tid", "", "lokal tid"),
         ("# tz=+01:00\n", "time", "+01:00", ""),
         ("# tz=+00:00\n", "time", "", ""),
         ("Time zone: UTC\n", "time (UTC)", "", ""),

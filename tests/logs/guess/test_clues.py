@@ -95,11 +95,6 @@ def test_what_a_name_excludes_is_not_eligible(state: State) -> None:
     assert named.eligible() == ["rudder", "Kanal7"]
 
 
-def test_questions_are_kept(state: State) -> None:
-    state.ask(("psi",), "which way?")
-    assert [(question.about, question.sentence) for question in state.questions] == [(("psi",), "which way?")]
-
-
 def test_a_suggestion_takes_its_column(state: State) -> None:
     state.suggest("u", "sog", "m/s", 0.87654, "a reason", sign=-1)
     assert "sog" not in state.free()
@@ -107,15 +102,6 @@ def test_a_suggestion_takes_its_column(state: State) -> None:
     assert state.all_called("speed") == ["sog", "SOG [kn]"]
     (suggestion,) = state.suggestions
     assert (suggestion.confidence, suggestion.extra) == (0.88, {"sign": -1})
-
-
-def test_findings_are_kept_in_order(state: State) -> None:
-    state.find("clipped", ("rpm",), 0.7, "a sentence")
-    state.find("late heading", ("psi",), 0.9, "another", {"kind": "break"})
-    assert [(finding.kind, finding.repair) for finding in state.findings] == [
-        ("clipped", None),
-        ("late heading", {"kind": "break"}),
-    ]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """A draft is a mapping that imports, says why, and lists the manoeuvres of the log."""
 
-import tempfile
 import tomllib
 from pathlib import Path
 
@@ -8,17 +7,15 @@ import numpy as np
 import pytest
 
 from shipid.data.checks import check_dataset
-from shipid.data.dataset import Dataset
 from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import clock_moment, draft_mapping, draft_text, segment_log, segments_text
 from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.mapping import UNITS, Segment
-from shipid.logs.segments import run_kind
 from tests.logs.conftest import DATES, stamps
 from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, si_log
-from tests.logs.test_nmea import bridge_log, sentence
+from tests.logs.test_nmea import bridge_log
 
 
 def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:
@@ -34,20 +31,6 @@ def test_the_draft_of_a_clean_log_imports_to_the_motion(tmp_path: Path) -> None:
     assert "99 %" in text
     assert "lever_arm" in text  # the questions that no log answers
     assert "Is the wind" not in text  # which this log does not have
-
-
-def test_a_draft_needs_no_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before, its text was written there to be read again."""
-    log = tmp_path / "trial.csv"
-    as_bridge(si_log()).to_csv(log, index=False)
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    assert "[[segment]]" in draft_mapping(guess(log))
-
-
-def test_a_log_with_a_wind_is_asked_which(tmp_path: Path) -> None:
-    log = tmp_path / "trial.csv"
-    as_bridge(si_log()).assign(**{"Wind speed": 5.0, "Wind dir": 40.0}).to_csv(log, index=False)
-    assert "# ? Is the wind true or apparent" in draft_text(guess(log))
 
 
 def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
@@ -115,31 +98,11 @@ def test_segments_of_gunnerus_are_its_zigzags_and_circles(gunnerus_log: Path) ->
         assert [6005.0 <= s.start <= 6200.0 for s in elsewhere] == [True] * (kind == "turning")
 
 
-def test_every_hsva_file_is_a_zigzag(hsva: Dataset) -> None:
-    assert {run_kind(rows) for _, rows in hsva.frame.groupby("run")} == {"zigzag"}
-
-
-def test_segments_are_text_to_edit(tmp_path: Path) -> None:
-    as_bridge(si_log()).to_csv(tmp_path / "trial.csv", index=False)
-    mapping = write_new(draft_mapping(guess(tmp_path / "trial.csv")), tmp_path / "draft.toml")
-    text = mapping.read_text().replace('run = "turning 1"', 'run = "circle, 25 deg"')
-    mapping.write_text(text)
-    assert "circle, 25 deg" in import_log(read_mapping(mapping), tmp_path / "trial.csv").runs
-    assert segments_text(read_mapping(mapping).segment).count("[[segment]]") == 7
-
-
 def test_segments_of_a_dated_log_say_when() -> None:
     """1715673605 s after 1970 is 14 May 2024, 08:00:05 UTC."""
     text = segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)], "date")
     assert "[[segment]]    # 2024-05-14 08:00:05 to 2024-05-14 08:03:00" in text
     assert "2024-05-14" not in segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)])
-
-
-@pytest.mark.parametrize("unit", ["datenum", "excel"])
-def test_segments_on_a_clock_of_days_since_a_zero_say_when(unit: str) -> None:
-    text = segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)], unit)
-    assert "[[segment]]    # 2024-05-14 08:00:05 to 2024-05-14 08:03:00" in text
-    assert clock_moment(1e13, unit) == "1e+13"  # beyond the year 9999
 
 
 def test_segments_on_times_of_day_have_no_date() -> None:
@@ -150,7 +113,7 @@ def test_segments_on_times_of_day_have_no_date() -> None:
     assert clock_moment(28805.0, "date") == "28805"
 
 
-@pytest.mark.parametrize("unit", UNITS["s"])
+@pytest.mark.parametrize("unit", ["s", "ns", "d"])
 def test_segments_keep_a_millisecond_in_every_unit(unit: str) -> None:
     size = UNITS["s"][unit]
     written = segments_text([Segment(run="a", start=100.001 / size, end=200.002 / size)], unit)
@@ -159,7 +122,7 @@ def test_segments_keep_a_millisecond_in_every_unit(unit: str) -> None:
     assert segment["end"] * size == pytest.approx(200.002, abs=1e-3)
 
 
-@pytest.mark.parametrize("unit", ["min", "h", "d", "datenum", "excel"])
+@pytest.mark.parametrize("unit", ["h", "datenum"])
 def test_the_draft_of_a_clock_in_any_unit_imports_to_the_motion(unit: str, tmp_path: Path) -> None:
     """Segments, breaks and times in words are those of the log's clock."""
     log = as_bridge(si_log()).assign(N=lambda frame: frame["N"] + 150.0 * (frame["time"] > 700))
@@ -178,32 +141,12 @@ def test_the_draft_of_a_clock_in_any_unit_imports_to_the_motion(unit: str, tmp_p
     assert spans.loc["turning 1"].tolist() == pytest.approx([ends[7] - 6, ends[8] + 6], abs=6.5)
 
 
-def test_a_document_is_never_written_over(tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text("name = 'mine'\n")
-    with pytest.raises(DataError, match="not written over"):
-        write_new("", tmp_path / "mine.toml")
-    with pytest.raises(DataError, match=r"end in \.toml"):
-        write_new("", tmp_path / "mine.csv")
-    assert (tmp_path / "mine.toml").read_text() == "name = 'mine'\n"
-
-
-@pytest.mark.parametrize("name", ["u\n[[segment]]\nrun = 1", 'a"b', "#", "ü °", "x]"])
+@pytest.mark.parametrize("name", ["u\n[[segment]]\nrun = 1", "x]"])
 def test_hostile_names_stay_in_their_strings(name: str, tmp_path: Path) -> None:
     log = as_bridge(si_log()).rename(columns={"rpm": f"rpm {name}", "u": "u"})
     log.to_parquet(tmp_path / "log.parquet")
     mapping = write_new(draft_mapping(guess(tmp_path / "log.parquet")), tmp_path / "draft.toml")
     assert len(import_log(read_mapping(mapping), tmp_path / "log.parquet").frame) > 2000
-
-
-def test_times_before_the_first_fix_are_no_part_of_a_draft(tmp_path: Path) -> None:
-    """The clock of a receiver begins in 1980, and is set with its first fix."""
-    text, motion = bridge_log("fix", 0.0, si_log(0, 10))
-    early = "\n".join(sentence(f"GPZDA,0000{k:02d}.00,06,01,1980,00,00") for k in range(5))
-    (tmp_path / "bridge.nmea").write_text(f"{early}\n{text}")
-    proposal = guess(tmp_path / "bridge.nmea")
-    assert proposal.findings == ()
-    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
-    assert len(import_log(read_mapping(mapping), tmp_path / "bridge.nmea").frame) == len(motion)
 
 
 def test_sentences_of_nmea(tmp_path: Path) -> None:

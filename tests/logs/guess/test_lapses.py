@@ -5,60 +5,47 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from shipid.data.checks import check_dataset
-from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import draft_mapping
-from shipid.logs.importing import import_log, read_mapping
-from tests.logs.simulated import globe, si_log
+from shipid.logs.importing import read_mapping
+from tests.logs.simulated import globe, guess_of, import_draft, si_log
 
 
-def guessed(folder: Path, frame: pd.DataFrame) -> Guess:
-    frame.to_csv(folder / "log.csv", index=False)
-    return guess(folder / "log.csv")
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_lapses_of_commands_are_drafted_mended_and_checked(seed: int, tmp_path: Path) -> None:
+def test_lapses_of_commands_are_drafted_mended_and_checked(tmp_path: Path) -> None:
     """Before, a shaft that is 0 for two seconds, and a rudder of 90 deg in one row, came into the dataset silently."""
-    clean = globe(seed)
+    clean = globe(0)
     frame = clean.copy()
     for place in (300, 1200, 2000):
         frame.loc[place : place + 3, "rpm"] = 0.0
         frame.loc[place + 20, "rudder"] = 90.0
-    expected, proposal = guessed(tmp_path, clean), guessed(tmp_path, frame)
+    expected, proposal = guess_of(tmp_path, clean), guess_of(tmp_path, frame)
     assert "lapses of a command" not in expected.kinds
     found = {one.columns: one for one in proposal.findings if one.kind == "lapses of a command"}
     assert set(found) == {("rpm",), ("rudder",)}
     assert "is 0 in 12 rows at 3 places" in found["rpm",].sentence
     assert f"t = {clean['time'][300]:g}" in found["rpm",].sentence
-    (tmp_path / "draft.toml").write_text(draft_mapping(proposal))
-    mapping = read_mapping(tmp_path / "draft.toml").model_copy(update={"segment": ()})
-    log, unmended = si_log(seed), import_log(mapping, tmp_path / "log.csv", without=("despike",))
-    table = check_dataset(unmended)
+    table = check_dataset(import_draft(tmp_path, proposal, without=("despike",)))
     failed = table[~table["ok"] & table["check"].str.startswith("lapses")]
     assert dict(zip(failed["check"], failed["value"], strict=True)).keys() == {
         f"lapses {one.name}" for one in proposal.columns if one.source in ("rpm", "rudder")
     }
     assert all("despike or a break" in sentence for sentence in failed["sentence"])
-    mended = import_log(mapping, tmp_path / "log.csv")
+    log, mended = si_log(0), import_draft(tmp_path, proposal)
     assert not check_dataset(mended)["check"].str.startswith("lapses").any()
     shaft = next(one.name for one in proposal.columns if one.source == "rpm")
     truth = np.interp(mended.frame["t"], log["t"], log["n"])
     assert mended.frame[shaft].to_numpy() == pytest.approx(truth, abs=0.05)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_may_be_an_order_is_asked_and_stays_as_it_is(seed: int, tmp_path: Path) -> None:
+def test_what_may_be_an_order_is_asked_and_stays_as_it_is(tmp_path: Path) -> None:
     """Zeros between equal orders, and a rudder that stands still through a zigzag."""
-    frame = globe(seed)
+    frame = globe(1)
     order = np.where(np.arange(len(frame)) < 1500, 100.0, 120.0)
     for place in (300, 1200, 2000):
         order[place : place + 3] = 0.0
     frame["rpm"] = order
-    proposal = guessed(tmp_path, frame)
+    proposal = guess_of(tmp_path, frame)
     (found,) = (one for one in proposal.findings if one.kind == "lapses of a command")
     assert found.columns == ("rpm",)
     asked = [
@@ -66,10 +53,9 @@ def test_what_may_be_an_order_is_asked_and_stays_as_it_is(seed: int, tmp_path: P
     ]
     assert len(asked) == 1
     assert "'rpm' is 0 in 9 rows at 3 places" in asked[0]
-    (tmp_path / "draft.toml").write_text(draft_mapping(proposal))
-    mapping = read_mapping(tmp_path / "draft.toml").model_copy(update={"segment": ()})
+    dataset = import_draft(tmp_path, proposal)
+    mapping = read_mapping(tmp_path / "draft.toml")
     assert not any(repair.enabled for repair in mapping.repair if repair.kind in ("break", "despike"))
-    dataset = import_log(mapping, tmp_path / "log.csv")
     assert len(dataset.frame) == len(frame)
     table = check_dataset(dataset)
     assert table.loc[table["check"].str.startswith("lapses"), "ok"].all()

@@ -7,15 +7,11 @@ import pytest
 
 from shipid.logs.guess.clues import State
 from shipid.logs.guess.motion import (
-    FASTEST,
-    HARDEST,
     check_clock,
     choose_velocities,
     choose_yaw_rate,
     is_possible,
-    ship_pace,
 )
-from shipid.units import GRAVITY
 from tests.logs.conftest import CLOCKS, SPEEDS
 from tests.logs.simulated import KNOT, si_log, state_with_pose
 
@@ -90,8 +86,7 @@ def spoken(unit: str, kind: str, named: bool, factor: float = 1.0) -> dict[str, 
 
 
 @pytest.mark.parametrize("unit", SPEEDS)
-@pytest.mark.parametrize("kind", ["body", "speed and course"])
-@pytest.mark.parametrize("named", [True, False], ids=["named", "not named"])
+@pytest.mark.parametrize(("kind", "named"), [("body", False), ("speed and course", True), ("speed and course", False)])
 def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> None:
     """A unit in the name is no finding; another than m/s that no name says is one, of speeds over ground if it is rare.
 
@@ -107,9 +102,7 @@ def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> No
     np.testing.assert_allclose(state.velocity, GROUND, atol=1e-9)
 
 
-@pytest.mark.parametrize("unit", SPEEDS)
-@pytest.mark.parametrize("kind", ["body", "speed and course"])
-@pytest.mark.parametrize("factor", [0.94, 1.06, 1.149])
+@pytest.mark.parametrize(("unit", "kind", "factor"), [("kn", "body", 1.149), ("mph", "speed and course", 0.94)])
 def test_a_factor_does_not_pass_for_another_unit_than_the_name_says(unit: str, kind: str, factor: float) -> None:
     """A knot is 1.15 miles per hour: the name decides, and the factor is found."""
     state = state_with_pose(spoken(unit, kind, True, factor))
@@ -121,10 +114,9 @@ def test_a_factor_does_not_pass_for_another_unit_than_the_name_says(unit: str, k
     assert finding.repair["factor"] == pytest.approx(1 / factor, rel=0.005)
 
 
-@pytest.mark.parametrize("said", [*CLOCKS, "datenum"])
-@pytest.mark.parametrize("true", CLOCKS)
-@pytest.mark.parametrize("kind", ["body", "speed and course"])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("said", ["s", "ms", "datenum"])
+@pytest.mark.parametrize("true", ["s", "min", "ns"])
+@pytest.mark.parametrize(("kind", "seed"), [("body", 0), ("speed and course", 1)])
 def test_a_clock_in_another_unit_than_drafted_is_asked(said: str, true: str, kind: str, seed: int) -> None:
     random = np.random.default_rng([3, seed])
     unit, named = str(random.choice(list(SPEEDS))), bool(random.random() < 0.5)
@@ -142,7 +134,7 @@ def test_a_clock_in_another_unit_than_drafted_is_asked(said: str, true: str, kin
             assert f"is the clock in {true}?" in asked[0].sentence
 
 
-@pytest.mark.parametrize(("wrong", "asked"), [(1.0, 0), (3.0, 0), (60.0, 1), (3600.0, 1), (1e-3, 1), (1e-6, 1)])
+@pytest.mark.parametrize(("wrong", "asked"), [(3.0, 0), (60.0, 1), (1e-3, 1)])
 def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> None:
     """Without velocities in the log the pace of the track says that the clock has another unit."""
     state = state_with_pose({}, 1.0 / wrong)
@@ -150,34 +142,6 @@ def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> Non
     check_clock(state)
     check_clock(state)  # once is enough
     assert len(state.questions) == asked
-
-
-@pytest.mark.parametrize(("wrong", "asked"), [(1.0, 0), (3.0, 0), (60.0, 1)])
-def test_a_slow_model_that_goes_as_none_of_its_length_does_is_asked(wrong: float, asked: int) -> None:
-    """With its clock in minutes it goes as a fast ship: only its length says that it does not."""
-    state = state_with_pose({}, 1.0 / wrong)
-    speed, across = ship_pace(state)
-    scale = min(1.0, 0.5 * HARDEST / across, 0.5 * FASTEST / speed)
-    assert state.position is not None
-    state.position = np.asarray(scale * state.position)
-    check_clock(state)
-    assert not state.questions
-    fastest = speed * scale / wrong  # m/s, by a right clock
-    check_clock(state, (fastest / 0.1) ** 2 / GRAVITY)  # Froude number 0.1
-    assert len(state.questions) == asked
-
-
-@pytest.mark.parametrize(("name", "factor"), [("speed [m/s]", 1.0), ("sog_kn", 1852 / 3600), ("speed", 1.0)])
-@pytest.mark.parametrize(("wrong", "asked"), [(1.0, 0), (60.0, 1), (3600.0, 1)])
-def test_a_recorded_speed_says_that_the_clock_is_in_another_unit(
-    wrong: float, asked: int, name: str, factor: float
-) -> None:
-    """Also of a slow model, whose pace alone is possible: no course is logged, so that no velocity says it."""
-    state = state_with_pose({name: np.hypot(U, V) / factor}, 1.0 / wrong)
-    check_clock(state, np.inf)
-    assert len(state.questions) == asked
-    if asked:
-        assert f"is the clock in {'min' if wrong == 60 else 'h'}?" in state.questions[0].sentence
 
 
 def test_a_factor_that_no_sensor_has_is_asked_and_not_repaired() -> None:
@@ -211,34 +175,12 @@ def test_yaw_rate(columns: dict[str, np.ndarray], expected: tuple[str, str, int]
         np.testing.assert_allclose(state.r, R, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["Rudder Answer", "Rudder response", "rudder xy"])
-def test_a_rudder_that_has_the_numbers_of_a_yaw_rate_is_none(name: str) -> None:
-    """A large ship turns by about as many deg/min as her rudder has degrees."""
-    rate = np.degrees(R) * 60.0
-    rudder = np.round(1.1 * np.interp(T + 5.0, T, rate))
-    state = state_with_pose({name: rudder})
-    choose_yaw_rate(state)
-    assert "r" not in described(state)
-    state = state_with_pose({name: rudder, "channel 7": rate})
-    choose_yaw_rate(state)
-    assert described(state)["r"] == ("channel 7", "deg/min", 1)
-
-
-def test_a_ship_that_hardly_turns_has_a_yaw_rate_by_its_name_alone() -> None:
-    state = state_with_pose({"rot": 0.01 * np.sin(T), "other": np.cos(T)})
-    state.psi = 1e-4 * np.sin(T)
-    choose_yaw_rate(state)
-    (column,) = state.suggestions
-    assert (column.source, column.unit) == ("rot", "deg/s")
-    assert column.confidence < 0.5
-
-
 def over_ground(turn: float = 0.0) -> dict[str, np.ndarray]:
     """Speed, and a course turned by an angle [rad]."""
     return {"sog": np.abs(GROUND), "cog": np.degrees(np.angle(GROUND) + turn) % 360.0}
 
 
-@pytest.mark.parametrize("degrees", [-8.0, -1.0, 0.0, 0.2, 1.0, 8.0])
+@pytest.mark.parametrize("degrees", [-8.0, 0.2, 1.0])
 @pytest.mark.parametrize("earth", [True, False], ids=["north and east", "speed and course"])
 def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, earth: bool) -> None:
     """As by the north of a map or a compass; it is no factor of the speed, which its cosine looked like."""
@@ -254,17 +196,6 @@ def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, 
         assert np.isnan(said) if earth else said == pytest.approx(-degrees, abs=0.02)
 
 
-@pytest.mark.parametrize("late", [-2.0, 2.0])
-@pytest.mark.parametrize("x", [-15.0, 15.0])
-def test_a_late_position_of_another_point_is_no_turned_track(late: float, x: float) -> None:
-    """A ship that turns to one side alone is turned, too."""
-    state = state_with_pose(over_ground())
-    place = LOG["north"] + 1j * LOG["east"] + x * np.exp(1j * PSI)
-    state.position = np.interp(T - late, T, np.real(place)) + 1j * np.interp(T - late, T, np.imag(place))
-    choose_velocities(state)
-    assert not state.questions
-
-
 @pytest.mark.parametrize("exchanged", [True, False])
 def test_heading_and_course_that_are_exchanged_are_asked(exchanged: bool) -> None:
     columns, state = over_ground(), state_with_pose({})
@@ -275,12 +206,3 @@ def test_heading_and_course_that_are_exchanged_are_asked(exchanged: bool) -> Non
     assert [question.sentence.partition("?")[0] for question in state.questions] == (
         ["are 'psi' and 'cog' exchanged"] if exchanged else []
     )
-
-
-@pytest.mark.parametrize("lag", [1.0, 3.0])
-def test_a_course_that_is_late_is_not_exchanged(lag: float) -> None:
-    columns = over_ground()
-    late = np.interp(T - lag, T, np.unwrap(np.angle(GROUND)))
-    state = state_with_pose(columns | {"cog": np.degrees(late) % 360.0})
-    choose_velocities(state)
-    assert not any("exchanged" in question.sentence for question in state.questions)

@@ -28,23 +28,6 @@ def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None
     )
 
 
-def test_only_variables_that_must_be_saved_anew_have_a_note(tmp_path: Path) -> None:
-    """Before, a matrix or a number had one, too, where its name held the word "save"."""
-    file = tmp_path / "log.mat"
-    columns = {name: TABLE[name].to_numpy() for name in TABLE}
-    savemat(file, {**columns, "saved": np.ones((len(TABLE), 2)), "save_rate": 3.0})
-    assert recognise_log(file).notes == ()
-
-
-def test_a_quantity_in_words_has_its_remedy(tmp_path: Path) -> None:
-    rows = [f"{k},{'PS'[k % 2]}{k % 9}.5,A{k},{k % 3},{k % 5}" for k in range(80)]
-    notes = recognise_log(
-        log_of(tmp_path, ["time,Rudder order,ROT,remark,x,y", *(row.replace(",", ",P1,", 1) for row in rows)])
-    ).notes
-    assert "column 'ROT' holds words, not numbers, such as 'P0.5': write it as a number with a sign" in notes
-    assert "column 'remark' holds words, not numbers" in notes
-
-
 def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> None:
     TABLE.assign(mode="auto", spare=np.nan, N=TABLE["N"].where(T != 2.0)).to_csv(tmp_path / "log.csv", index=False)
     sniffed = recognise_log(tmp_path / "log.csv")
@@ -103,7 +86,7 @@ def test_a_number_for_missing_values_is_reported_and_not_taken(tmp_path: Path, w
     assert np.nanmax(np.abs(sniffed.columns["heading"])) <= 360
 
 
-@pytest.mark.parametrize("word", ["---", "N/A", "#N/A", "NULL", "None", "***", "--.-", "-1.#IND", "inf", "-nan"])
+@pytest.mark.parametrize("word", ["---", "#N/A", "-1.#IND", "inf"])
 def test_a_word_for_nothing_is_declared_as_a_missing_value(tmp_path: Path, word: str) -> None:
     """Before, the draft could not be imported: this word is no number."""
     rows = [f"{k};{str(np.sin(k)).replace('.', ',')};{k % 360}" for k in range(80)]
@@ -179,32 +162,6 @@ def test_a_log_of_several_ships_is_refused(name: str, values: tuple[str, str], w
         recognise_log(log)
 
 
-def test_a_column_that_changes_with_every_row_is_no_ship(tmp_path: Path) -> None:
-    rows = [f"{k},{k},{np.sin(k):.3f}" for k in range(80)]
-    assert "lat" in recognise_log(log_of(tmp_path, ["time,Ship no,lat", *rows])).columns
-
-
-def test_a_column_of_whole_degrees_is_no_list_of_ships(tmp_path: Path) -> None:
-    """A heading `Ship` was refused as 84 ships."""
-    rows = [f"{k},{k // 10},{np.sin(k):.3f}" for k in range(840)]
-    assert "Ship" in recognise_log(log_of(tmp_path, ["time,Ship,lat", *rows])).columns
-    names = [f"{k},Ship {k // 10},{np.sin(k):.3f}" for k in range(840)]
-    with pytest.raises(DataError, match="holds 84 ships"):
-        recognise_log(log_of(tmp_path, ["time,Ship,lat", *names]))
-
-
-def test_a_number_for_missing_values_is_one_in_every_column(tmp_path: Path) -> None:
-    """In hundredths of a degree -999 is not far from the others, but the import takes it for a missing value."""
-    rows = [f"{k},{np.sin(k):.3f},{400 * k}" for k in range(80)]
-    rows[40] = "40,-999,-999"
-    assert np.isnan(recognise_log(log_of(tmp_path, ["time,x,heading", *rows])).columns["heading"][40])
-
-
-def test_a_speed_of_999_rpm_is_no_missing_value(tmp_path: Path) -> None:
-    rows = [f"{k},{600 + 5 * k}" for k in range(80)] + ["80,999"]
-    assert "missing" not in recognise_log(log_of(tmp_path, ["time,rpm", *rows])).form
-
-
 @pytest.mark.parametrize("others", [(98,), (0,), (60, 99), (0, 55)])
 def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tmp_path: Path) -> None:
     """Before, every row of 99 was taken out where the rest was 98, or stood."""
@@ -216,19 +173,12 @@ def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tm
     assert sniffed.columns["rpm"].tolist() == speeds.tolist()
 
 
-@pytest.mark.parametrize("name", ["log.csv.gz", "log.csv.bz2", "log.csv.xz", "log.zip"])
+@pytest.mark.parametrize("name", ["log.csv.xz", "log.zip"])
 def test_a_packed_log_is_named_as_one(name: str, tmp_path: Path) -> None:
     TABLE.to_csv(tmp_path / name, index=False)
     with pytest.raises(DataError, match=r"packed by|a ZIP archive") as caught:
         recognise_log(tmp_path / name)
     assert "unpack it" in caught.value.message
-
-
-def test_a_column_of_yes_and_no_is_no_number(tmp_path: Path) -> None:
-    TABLE.assign(rpm=T > 3).to_parquet(tmp_path / "log.parquet")
-    sniffed = recognise_log(tmp_path / "log.parquet")
-    assert "rpm" not in sniffed.columns
-    assert any("'rpm' holds words" in note for note in sniffed.notes)
 
 
 @pytest.mark.parametrize(
@@ -284,9 +234,7 @@ def test_positions_as_text(
     assert not any("Latitude" in note or "Position" in note for note in sniffed.notes)
 
 
-@pytest.mark.parametrize(
-    "value", ["32767", "-32768", "65535", "-999.25", "1e+20", "2147483647", "9.96921e+36", "327.67"]
-)
+@pytest.mark.parametrize("value", ["32767", "-999.25", "9.96921e+36", "327.67"])
 def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path) -> None:
     """The largest number of an integer of 16 or 32 bits, perhaps in tenths, and what netCDF and well logs have."""
     table = TABLE.assign(rudder=np.sin(T)).astype(object)

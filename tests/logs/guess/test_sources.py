@@ -39,20 +39,6 @@ def test_a_folder_is_one_source_that_imports(tmp_path: Path) -> None:
     assert "notes.csv is left out" in mapping.read_text()
 
 
-@pytest.mark.parametrize("notes", [1, 2, 5])
-def test_notes_beside_a_log_are_named_and_the_log_is_read(notes: int, tmp_path: Path) -> None:
-    """However many notes there are, and whatever their names."""
-    logs = folder_of(tmp_path / "logs", "all.csv", "more.csv")
-    for number in range(notes):
-        (logs / f"{'az'[number % 2]}{number}.txt").write_text("Hull 12\nt in s\npsi in rad\n")
-    proposal = guess(logs)
-    assert proposal.source.pattern == "*.csv"
-    assert len(proposal.source.skipped) == notes
-    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
-    assert mapping.read_text().count("is left out") == notes
-    assert import_log(read_mapping(mapping), logs).runs == ["all", "more"]
-
-
 def test_a_glob_takes_the_files_that_fit(tmp_path: Path) -> None:
     folder_of(tmp_path, "ZZ_1.csv", "ZZ_2.csv", "other.csv")
     source = read_source(tmp_path / "ZZ_*.csv")
@@ -94,46 +80,17 @@ def test_files_of_several_runs_are_parted(column: bool, tmp_path: Path) -> None:
     assert set(dataset.frame.groupby("run", sort=False).size()) == {400}
 
 
-def test_names_of_runs_may_be_words(tmp_path: Path) -> None:
-    parts = [LOG.iloc[start : start + 400].assign(run=name) for start, name in ((240, "ZZ a"), (1200, "TC"))]
-    file = tmp_path / "all.csv"
-    pd.concat(parts).to_csv(file, index=False)
-    found = guess(file)
-    assert found.source.parts == {"from": "run"}
-    dataset = import_log(read_mapping(write_new(draft_mapping(found), tmp_path / "draft.toml")), file)
-    assert dataset.runs == ["all ZZ a", "all TC"]
-
-
-def test_a_jump_within_one_of_many_files_makes_no_repair_by_their_joined_clock(tmp_path: Path) -> None:
-    """Times of several files in a row are the clock of none: an interval would remove sound rows of another file."""
-    folder_of(tmp_path / "logs", "a.csv", "b.csv", "c.csv")
-    jumped = pd.read_csv(tmp_path / "logs" / "b.csv")
-    jumped.loc[500:, "N"] += 300.0
-    for count in (3, 1):
-        jumped.to_csv(tmp_path / "logs" / "b.csv", index=False)
-        for name in "ac" if count == 1 else "":
-            (tmp_path / "logs" / f"{name}.csv").unlink()
-        found = [one for one in guess(tmp_path / "logs").findings if one.kind == "position jumps"]
-        assert len(found) == 1
-        assert (found[0].repair is None) == (count > 1)
-    begin, end = found[0].repair["intervals"][0]
-    assert begin <= jumped["time"].iloc[500] <= end, "by the clock of the file, which does not begin at 0"
-
-
-@pytest.mark.parametrize("names", [("M001", "M002", "M003"), (1, 2, 3), ("out", "home", "out")])
-@pytest.mark.parametrize("unit", ["s", "ms"])
-def test_a_clock_that_begins_again_with_each_run_is_as_a_file_for_each(
+@pytest.mark.parametrize(("names", "unit"), [((1, 2, 3), "s"), (("out", "home", "out"), "ms")])
+def test_a_clock_that_begins_again_with_each_run_is_one_of_each_run(
     names: tuple[object, ...], unit: str, tmp_path: Path
 ) -> None:
-    """The same rows in SI units, and every run on a clock from its start."""
+    """Every run is on a clock from its start."""
     clock = {"s": "time", "ms": "time [ms]"}[unit]
     pieces = []
-    for number, start in enumerate((240, 1000, 1800)):
+    for start in (240, 1000, 1800):
         part = LOG.iloc[start : start + 500].copy()
         part["time"] = (part["time"] - part["time"].iloc[0]) * (1000 if unit == "ms" else 1)
         pieces.append(part.rename(columns={"time": clock}))
-        (tmp_path / "each").mkdir(exist_ok=True)
-        pieces[-1].to_csv(tmp_path / "each" / f"{number}.csv", index=False)
     file = tmp_path / "all.csv"
     pd.concat([part.assign(run=name) for part, name in zip(pieces, names, strict=True)]).to_csv(file, index=False)
     found = guess(file)
@@ -144,15 +101,3 @@ def test_a_clock_that_begins_again_with_each_run_is_as_a_file_for_each(
     expected = ("all out", "all home", "all out (2)") if names[0] == "out" else tuple(f"all {name}" for name in names)
     assert dataset.runs == list(expected)
     assert dataset.metadata["clock"] == "run"
-    apart = guess(tmp_path / "each")
-    each = import_log(read_mapping(write_new(draft_mapping(apart), tmp_path / "apart.toml")), tmp_path / "each")
-    assert [column.name for column in found.columns] == [column.name for column in apart.columns]
-    pd.testing.assert_frame_equal(dataset.frame.drop(columns="run"), each.frame.drop(columns="run"))
-
-
-def test_time_that_goes_back_within_a_run_is_refused(tmp_path: Path) -> None:
-    rows = pd.concat([LOG.iloc[240:740].assign(run="a"), LOG.iloc[1000:1500].assign(run="b")], ignore_index=True)
-    rows.loc[900, "time"] -= 100.0
-    rows.to_csv(tmp_path / "log.csv", index=False)
-    with pytest.raises(DataError, match=r"goes back .* in row 901"):
-        guess(tmp_path / "log.csv")

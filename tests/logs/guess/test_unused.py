@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_text
-from tests.logs.simulated import as_bridge, si_log
+from tests.logs.simulated import as_bridge, guess_of, si_log
 
 
 @pytest.mark.parametrize(
@@ -21,10 +20,8 @@ from tests.logs.simulated import as_bridge, si_log
         ("SOG", "u", "is read from 'u' and 'v'"),
         ("AWD [deg]", "noise", "write the angle from the bow"),
         ("Telegraph [%]", "noise", "map it to a command .n with factor"),
-        ("EOT", "noise", "map it to a command .n with factor"),
         ("GPS time", "clock", "it is another clock, which goes 0.997 times as fast as that of the draft"),
         ("Wind blowing towards [deg]", "noise", "map it to beta_w with direction"),
-        ("Wind speed [Bft]", "noise", "its unit Bft does not fit wind speed"),
         ("GPS Week", "noise", "315964800 + 604800 weeks + seconds, less 18 s"),
         ("row", "number", "it holds the numbers of the rows"),
     ],
@@ -34,9 +31,7 @@ def test_a_column_that_is_not_used_says_why(name: str, values: str, message: str
     drawn = {"noise": np.random.default_rng(1).normal(size=len(log)), "number": np.arange(len(log))}
     drawn["clock"] = 3600.0 + 0.997 * log["time"]
     added = drawn.get(values, log.get(values))
-    file = tmp_path / "log.csv"
-    log.assign(**{name: added}).to_csv(file, index=False)
-    proposal = guess(file)
+    proposal = guess_of(tmp_path, log.assign(**{name: added}))
     assert list(proposal.unused) == [name]
     assert message in proposal.unused[name]
     assert f"# column {name!r} is not used: {proposal.unused[name]}" in draft_text(proposal)
@@ -47,8 +42,6 @@ def test_a_speed_without_a_course_is_not_said_to_differ_from_the_motion(name: st
     """It was said that the motion did not bear out a speed that agreed with the positions."""
     log = as_bridge(si_log())
     speed = 3.6 * np.hypot(log["u"], log["v"])
-    file = tmp_path / "log.csv"
-    log.drop(columns=["u", "v"]).assign(**{name: speed}).to_csv(file, index=False)
-    assert guess(file).unused == {
+    assert guess_of(tmp_path, log.drop(columns=["u", "v"]).assign(**{name: speed})).unused == {
         name: "it may be speed, which says something together with a course alone: there is none"
     }

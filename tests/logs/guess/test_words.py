@@ -184,12 +184,6 @@ def test_units_that_are_set_off(name: str, units: list[str]) -> None:
     assert units_in_name(name) == units
 
 
-def test_a_magnetic_heading_is_a_second_one() -> None:
-    assert is_magnetic("heading_mag")
-    assert is_magnetic("CAP COMPAS")
-    assert not is_magnetic("Heading")
-
-
 @pytest.mark.parametrize(
     ("name", "magnetic"),
     [
