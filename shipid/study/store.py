@@ -33,14 +33,11 @@ from shipid.files import (
     write_table,
     write_text,
 )
-from shipid.hybrid.methods import METHODS
-from shipid.physics import TERMS
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.declared import Foundation
 from shipid.study.lock import sole_writer
-from shipid.study.plan import METHOD_CODE, TERM_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
-from shipid.units import join_names, plural_word
+from shipid.study.plan import Plan, Unit, build_plan, own_code, plan_text, program_of
 from shipid.version import __version__
 from shipid.vessel.load import check_document
 
@@ -113,18 +110,11 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
 
 
 def _other_study(folder: Path, plan: Plan) -> str:
-    """What a folder holds that is of another digest: where the documents are equal, what was changed since."""
+    """What a folder holds that is of another digest."""
     if documents.read_document(folder / STUDY) != plan.document:
         return f"holds the results of another study than {plan.file}: choose another --out"
-    stored, record = read_json(folder / VESSELS), provenance(folder)
-    try:
-        changed = [one.file for name, one in plan.vessels.items() if stored[name]["document"] != one.document]
-    except (TypeError, KeyError):
-        raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
-    changed += [f"the {name}" for name, digest in plan.sources.items() if record["sources"].get(name) != digest]
-    what = join_names(changed) if changed else f"a default of a method, or of shipid (this is {__version__}),"
-    words = f"holds results from before {what} changed: choose another --out"
-    return f"{words}, or go on with it as it was: `{program_of(plan)} study resume {quote_argument(folder)}`"
+    words = f"holds results from before a vessel, the data, or a default of shipid (this is {__version__}) changed"
+    return f"{words}: choose another --out, or go on with it as it was: `{program_of(plan)} study resume {quote_argument(folder)}`"
 
 
 def check_readable(folder: Path) -> None:
@@ -258,9 +248,11 @@ def stored_plan(folder: Path) -> Plan:
         file = folder / STUDY
         plan = build_plan(document, Path(record["file"]), vessels, record["sources"], record["changes"])
     except DocumentError as error:
-        other = "if the run is of another version, read its report.html, and run the study again into a new folder"
-        message = f"shipid {__version__} does not take it ({error.message}): {other}"
-        raise NotTaken(_needed_script(folder, record, document) or message, file=file, path=error.path) from None
+        remedy = "if the run is of another version, read its report.html, and run the study again into a new folder"
+        if "program" in record:
+            remedy = f"open it by your script with its methods and terms: `{record['program']} study report {quote_argument(folder)}`"
+        message = f"shipid {__version__} does not take it ({error.message}): {remedy}"
+        raise NotTaken(message, file=file, path=error.path) from None
     except (TypeError, KeyError, AttributeError, ValueError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     if plan.digest != record["digest"]:
@@ -269,20 +261,6 @@ def stored_plan(folder: Path) -> Plan:
             file=folder,
         )
     return plan
-
-
-def _needed_script(folder: Path, record: Mapping[str, Any], document: documents.Document) -> str:
-    """How to open a run with terms and methods of a user that this process lacks; empty where it has all."""
-    kinds = {str(way.get("name")): str(way.get("kind")) for way in document.get("method", []) if isinstance(way, dict)}
-    lacking = sorted(record.get(TERM_CODE, {}).keys() - TERMS.keys())
-    lacking += sorted({kinds.get(name, name) for name in record.get(METHOD_CODE, {})} - METHODS.keys())
-    if not lacking:
-        return ""
-    words = (
-        f"{join_names(lacking)}, which a user wrote, {plural_word(len(lacking), 'is', 'are')} not known to this process"
-    )
-    script = f"open the run by the script that puts {plural_word(len(lacking), 'it', 'them')} into TERMS or METHODS"
-    return f"{words}: {script}: `{record.get('program', 'shipid')} study report {quote_argument(folder)}`"
 
 
 def provenance(folder: Path) -> dict[str, Any]:
