@@ -456,8 +456,9 @@ def _proposed_method(length: float | None, step: float, spare: float) -> Choice:
     ]
     memory = {"history": lags[:-2], "turned": lags[-2:], "error": [lags[-3]]}
     why = (
-        f"inputs of the last {lags[-1]:g} s ({PAST_IN_WAVE_TIMES:g} sqrt(L / g)): what ship and orders did, and what the physics "
-        "got wrong; validation chooses how much of it is taken. The first instants of a run have no past: left out"
+        f"inputs of the last {lags[-1]:g} s ({PAST_IN_WAVE_TIMES:g} sqrt(L / g)): what ship and orders did, and "
+        "what the physics got wrong; validation chooses how much of it is taken. The first instants of a run are left "
+        "out: they have no past"
     )
     return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
 

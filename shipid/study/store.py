@@ -21,7 +21,6 @@ from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.files import (
     arrays_with_prefix,
     make_folder,
-    open_file,
     quote_argument,
     read_arrays,
     read_json,
@@ -99,12 +98,11 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
             _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
-    check_readable(folder)
     if provenance(folder)["digest"] != plan.digest:
         raise ResultError(_other_study(folder, plan), file=folder)
     check_writable(folder)
     with in_place(folder, plan), sole_writer(folder):
-        _mend(folder, plan)
+        _check_described(folder, plan)
         sweep_run(folder)
         yield
 
@@ -114,22 +112,8 @@ def _other_study(folder: Path, plan: Plan) -> str:
     if documents.read_document(folder / STUDY) != plan.document:
         return f"holds the results of another study than {plan.file}: choose another --out"
     words = f"holds results from before a vessel, the data, or a default of shipid (this is {__version__}) changed"
-    return f"{words}: choose another --out, or go on with it as it was: `{program_of(plan)} study resume {quote_argument(folder)}`"
-
-
-def check_readable(folder: Path) -> None:
-    """Raise ResultError for what says which run a folder holds, and how far, where this user may not read it."""
-    for name in (STUDY, VESSELS, PROVENANCE):
-        try:
-            with open_file(folder / name) as stream:
-                stream.read()
-        except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
-            continue  # reported where it is read
-        except OSError as error:
-            raise ResultError(f"cannot be read ({error.strerror}): let this user read it", file=folder / name) from None
-    for name in (seals.FOLDER, "batches", JOURNALS):
-        if (folder / name).is_dir() and not os.access(folder / name, os.R_OK | os.X_OK):
-            raise ResultError("is a folder that this user may not read: let this user read it", file=folder / name)
+    resume = f"`{program_of(plan)} study resume {quote_argument(folder)}`"
+    return f"{words}: choose another --out, or go on with it as it was: {resume}"
 
 
 def check_writable(folder: Path) -> None:
@@ -150,7 +134,6 @@ def in_place(folder: Path, plan: Plan) -> Iterator[None]:
     except (OSError, ShipidError) as error:
         check_place(folder, plan.digest)
         if isinstance(error, PermissionError):
-            check_readable(folder)
             check_writable(folder)
         raise
 
@@ -179,23 +162,19 @@ def sweep_run(folder: Path) -> None:
         sweep_temporary(place)
 
 
-def _mend(folder: Path, plan: Plan) -> None:
-    """Write study and vessels again where they cannot be read; ResultError where they can and were changed."""
+def _check_described(folder: Path, plan: Plan) -> None:
+    """Raise ResultError where study and vessels in the folder are not those of the plan."""
     try:
-        changed = documents.digest_document(documents.read_document(folder / STUDY)) != documents.digest_document(
+        stored = {name: entry["document"] for name, entry in read_json(folder / VESSELS).items()}
+        same = documents.digest_document(documents.read_document(folder / STUDY)) == documents.digest_document(
             plan.document
-        )
-    except DocumentError:
-        write_text(folder / STUDY, plan_text(plan))
-        changed = False
-    try:
-        stored = read_json(folder / VESSELS)
-        digests = {name: documents.digest_document(entry["document"]) for name, entry in stored.items()}
-        changed = changed or digests != {name: vessel.digest for name, vessel in plan.vessels.items()}
-    except (ResultError, TypeError, KeyError, AttributeError):
-        _write_vessels(folder, plan)
-    if changed:
-        raise ResultError("its study or vessels were changed by hand: choose another --out", file=folder)
+        ) and {name: documents.digest_document(document) for name, document in stored.items()} == {
+            name: vessel.digest for name, vessel in plan.vessels.items()
+        }
+    except (ShipidError, TypeError, KeyError, AttributeError):
+        same = False
+    if not same:
+        raise ResultError("its study or vessels are damaged or were changed by hand: choose another --out", file=folder)
 
 
 def _write_vessels(folder: Path, plan: Plan) -> None:
@@ -234,7 +213,6 @@ def stored_plan(folder: Path) -> Plan:
 
     Raises ResultError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
     """
-    check_readable(folder)
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     record = provenance(folder)
@@ -250,7 +228,8 @@ def stored_plan(folder: Path) -> Plan:
     except DocumentError as error:
         remedy = "if the run is of another version, read its report.html, and run the study again into a new folder"
         if "program" in record:
-            remedy = f"open it by your script with its methods and terms: `{record['program']} study report {quote_argument(folder)}`"
+            command = f"`{record['program']} study report {quote_argument(folder)}`"
+            remedy = f"open it by your script, which knows its methods and terms: {command}"
         message = f"shipid {__version__} does not take it ({error.message}): {remedy}"
         raise NotTaken(message, file=file, path=error.path) from None
     except (TypeError, KeyError, AttributeError, ValueError):

@@ -109,8 +109,8 @@ class StructureComparison:
         rows = {str(row["structure"]): row for row in self.table.to_dict("records")}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
         notes = [
-            f"structure {self.chosen} has the least error of the position over {_length_in_words(self.ahead)} on runs that the "
-            f"fit has not seen: {rows[self.chosen]['position']:.3g} m"
+            f"structure {self.chosen} has the least error of the position over {_length_in_words(self.ahead)} on runs "
+            f"that the fit has not seen: {rows[self.chosen]['position']:.3g} m"
         ]
         if len(self.runs) < FEWEST_RUNS:
             notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")

@@ -168,20 +168,3 @@ def test_bundled_comparisons_have_their_parts(name: str, count: int) -> None:
     assert len([way for way in plan.methods if way.method.compensates]) >= 8
     budgets = {getattr(way.method, "budget", None) for way in plan.methods if way.method.compensates}
     assert len(budgets) == 1  # equal, so that nobody wins by time
-
-
-def test_a_check_looks_through_every_part(four: tuple[Plan, Path], tmp_path: Path) -> None:
-    plan, folder = four
-    shutil.copytree(folder, tmp_path / "run")
-    each = next(iter(plan.parts.values())).plan.cells
-    sound = check_folder(tmp_path / "run")
-    assert not sound.faults
-    assert [line for line in sound.lines if "cells" in line] == [
-        f"{name}: {each} of {each} cells finished, 0 faults" for name in plan.parts
-    ]
-    next((tmp_path / "run" / "parts" / "known-2" / "cells").iterdir()).unlink()
-    shutil.rmtree(tmp_path / "run" / "parts" / "held-1")
-    damaged = check_folder(tmp_path / "run")
-    assert len(damaged.faults) == 1
-    assert "held-1: not begun" in damaged.lines
-    assert any(line.startswith("known-2: ") and line.endswith(" 1 fault") for line in damaged.lines)

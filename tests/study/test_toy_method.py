@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from shipid.answer.findings_simulation import smooth_by_construction
+from shipid.answer.frames import provenance_words
 from shipid.answer.memory import taken
 from shipid.answer.pages import report_content
 from shipid.data.dataset import read_dataset
@@ -23,7 +24,7 @@ from shipid.study.apply import predict_log
 from shipid.study.plan import judged_method, model_label, plain_rival
 from shipid.study.prepare import prepare
 from shipid.study.progress import Watch
-from shipid.study.results import provenance_words, read_results
+from shipid.study.results import read_results
 from tests.documented import module
 from tests.study.tiny import run_here, tiny_plan
 

@@ -114,7 +114,7 @@ def observed_once() -> Iterator[None]:
             seen[key] = run_observer(vessel, dataset, observer)
         return seen[key]
 
-    with patch.object(apply, "observe", once):
+    with patch.object(apply, "run_observer", once):
         yield
 
 
