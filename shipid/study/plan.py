@@ -329,15 +329,6 @@ def model_label(plan: Plan, foundation: str, method: str) -> str:
     return foundation if method == judged_method(plan) else f"{foundation} {WITH} {method}"
 
 
-def disturbances_of(plan: Plan) -> tuple[str, ...]:
-    """What moves the ship or its log and is no coefficient of the vessel, in words; recorded runs have waves."""
-    truth = plan.study.truth
-    if truth is None:
-        return ("waves",)
-    known = {"waves": truth.waves, "gusts": truth.gusts, "noise of the sensors": truth.sensors}
-    return tuple(words for words, there in known.items() if there)
-
-
 def orders_may_react(plan: Plan) -> bool:
     """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by its heading."""
     truth = plan.study.truth

@@ -177,11 +177,6 @@ def _check_described(folder: Path, plan: Plan) -> None:
         raise ResultError("its study or vessels are damaged or were changed by hand: choose another --out", file=folder)
 
 
-def _write_vessels(folder: Path, plan: Plan) -> None:
-    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
-    write_json(folder / VESSELS, vessels)
-
-
 def _make(folder: Path, plan: Plan) -> None:
     """Make the folder at once; nothing happens where another run has just made it."""
     folder = Path(os.path.realpath(folder))  # a folder takes the place of an empty one, not of a link to it
@@ -204,7 +199,8 @@ def _describe(folder: Path, plan: Plan) -> None:
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     own = {"program": program_of(plan), **own_code(plan)} if own_code(plan) else {}
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin, "changes": dict(plan.changes), **own})
-    _write_vessels(folder, plan)
+    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
+    write_json(folder / VESSELS, vessels)
     write_text(folder / STUDY, plan_text(plan))
 
 
@@ -379,7 +375,13 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
     table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
-    trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
+    trials = [
+        {"cell": row["cell"]}
+        | {key: value for key, value in trial.items() if key != "params"}
+        | trial.get("params", {})
+        for _, row in rows.iterrows()
+        for trial in row["trials"]
+    ]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
     keys = [unit.key for unit in plan.units]
     if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in keys):
@@ -390,10 +392,6 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     if whole:
         seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
     return folder / "results.parquet"
-
-
-def _flat(trial: Mapping[str, Any]) -> dict[str, Any]:
-    return {**{k: v for k, v in trial.items() if k != "params"}, **trial.get("params", {})}
 
 
 def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], naive: np.ndarray) -> None:

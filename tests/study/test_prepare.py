@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -100,33 +100,6 @@ def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> N
             assert len(validated) == max(1, round(0.2 * batch.N_D))
         else:
             assert sorted(validated) == sorted(prepared.runs(batch))
-
-
-@pytest.mark.parametrize("kind", ["path-drawn", "path-trained"])
-def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]], kind: str) -> None:
-    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out and reported."""
-    t = np.arange(21.0)
-    runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
-    dataset = logged(runs, t, clock="shared")
-    changes = {"split": {"test": ["r3"], "folds": 2}, "grid": {"N_D": [7]}, "family": [ONE_FAMILY]}
-    plan, _ = recorded(dataset, **changes, method=[{"name": "one", "kind": kind}])
-    prepared = prepare(plan, dataset)
-    batch = plan.batches[0]
-
-    def moments(windows: Windows) -> list[tuple[float, float]]:
-        return list(zip(windows.t, windows.t + windows.horizon, strict=True))
-
-    def shared(one: Windows, other: Windows) -> bool:
-        return any(a <= d and c <= b for (a, b), (c, d) in product(moments(one), moments(other)))
-
-    everything = cut_windows(dataset, horizon=5)
-    left_out = len(everything) - len(prepared.pool) - len(prepared.test)
-    assert left_out > 0
-    assert any(note.startswith(f"{left_out} windows that touch the test") for note in prepared.notes)
-    assert shared(everything.select(everything.run != "r3"), prepared.test)
-    assert not shared(prepared.pool, prepared.test)
-    for train, validation in prepared.folds(batch, prepared.pool, plan.methods[0].method.validation):
-        assert not shared(prepared.pool.select(train), prepared.pool.select(validation))
 
 
 def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, Prepared]) -> None:
