@@ -158,14 +158,6 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
     )
 
 
-def test_a_summary_says_that_nothing_is_promised_in_alarm(banded, tmp_path):
-    _, file = banded
-    played = play_aboard(file, saved(log(), tmp_path), level=0.9)
-    lines = summary(replace(played, instants=played.instants.assign(outside=True)))
-    (line,) = (line for line in lines if line.startswith("band of 90 %"))
-    assert line.endswith("whole paths that can be judged, all in alarm, where nothing is promised")
-
-
 def test_a_band_wider_than_a_ship_can_go_is_none(banded, tmp_path):
     """Wind that was never there in training gave bands of 5,653,307 m; where it was as in training, digits stay."""
     fitted, _ = banded

@@ -139,7 +139,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     "two of a name": ({"condition": [{"name": "a"}, {"name": "a"}]}, "condition.1.name", "two conditions"),
     "a name that is no file": ({"condition": [{"name": "a/b"}]}, "condition.a/b.name", "pattern"),
     "no value": ({"repeat": {"seed": []}}, "repeat.seed", "must be a list of 1 or more entries .it has 0"),
-    "a world twice": ({"repeat": {"seed": [0, 1, 0]}}, "repeat.seed", "0 is there twice: give each value once"),
+    "a world twice": ({"repeat": {"seed": [0, 1, 0]}}, "repeat", "3 has the settings of 1: equal studies"),
     "equal conditions": (
         {"condition": [{"name": "a"}, {"name": "b", "set": {"prediction.commands": "held"}}]},
         "condition.b.set",

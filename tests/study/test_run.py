@@ -32,7 +32,7 @@ from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
 from shipid.study import cells, run, seals, sessions, store
 from shipid.study.check import check_folder
-from shipid.study.plan import Plan, own_code, program_of, read_plan, whole_unit
+from shipid.study.plan import Plan, whole_unit
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.results import read_results
 from shipid.study.run import run_study, run_unit
@@ -144,18 +144,6 @@ def test_an_engine_that_is_given_up_is_noted_before_anything_of_another_is_store
     assert f"earlier results were computed otherwise: engine was {other}, now {one}" in notes
 
 
-def test_an_engine_that_a_worker_of_a_cluster_gives_up_is_noted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(native, "_refused", [])
-    if native.find_compiler() is None:
-        pytest.skip("no compiler")
-    monkeypatch.setattr(run, "run_unit", lambda *_: native.refuse_compiling("the C compiler failed (Killed)"))
-    plan = tiny_plan(tmp_path)
-    noted, _ = run._on_cluster((plan, None, "cpu", {}), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
-    assert [session["engine"].partition(",")[0] for session in noted] == ["native", "casadi"]
-
-
 @pytest.mark.parametrize("package", ["scikit-learn", "scipy"])
 def test_another_version_of_a_package_that_computes_is_noted(package: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A forest is that of scikit-learn, a fit or a learned force that of SciPy: nothing said that one was another."""
@@ -204,40 +192,11 @@ def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType
     return module, tiny_plan(folder, {"truth.vessel": "ship.toml", "family.0.base": "ship.toml", "grid.N_D": [4]})
 
 
-def test_a_term_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The finished cells are those of the ship as she was; nothing said so, and hints named a command without it."""
-    assert not own_code(tiny_plan(tmp_path))
-    module, plan = skeg_plan(tmp_path, monkeypatch)
-    assert program_of(plan) == "python my.py"
-    folder = tmp_path / "run"
-    run_here(plan, folder)
-    (session,) = read_json(folder / store.PROVENANCE)["sessions"]
-    assert session["code of the term"].keys() == {"hull.skeg"}
-    assert not any("otherwise" in event.text for event in events_here(plan, folder))
-    file = tmp_path / "skeg.py"
-    file.write_text(file.read_text().replace("-rho / 2", "-rho * 5"))
-    importlib.reload(module)
-    monkeypatch.setitem(TERMS, "hull.skeg", Term(module.skeg))
-    notes = [event.text for event in events_here(read_plan(plan.file, plan.changes), folder) if event.kind == "note"]
-    assert any("earlier results were computed otherwise: code of the term.hull.skeg was" in note for note in notes)
-    assert "code of the term.hull.skeg" in provenance_words(read_results(folder))["computed in parts"]
-
-
 def test_a_worker_of_a_cluster_without_the_term_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, plan = skeg_plan(tmp_path, monkeypatch)
     monkeypatch.delitem(TERMS, "hull.skeg")
     with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': start them with --preload"):
         run._on_cluster((plan, None, "cpu", {}), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
-
-
-def test_a_dask_cluster_gives_the_same_numbers(tmp_path: Path, tiny_run: Path) -> None:
-    from dask.distributed import LocalCluster
-
-    options = {"processes": False, "protocol": "tcp://", "dashboard_address": ":0", "silence_logs": 50}
-    with LocalCluster(n_workers=1, threads_per_worker=1, **options) as cluster:
-        events = list(run_study(tiny_plan(tmp_path), tmp_path / "run", scheduler=cluster.scheduler_address))
-    assert [event.done for event in events if event.kind in ("start", "cell", "end")] == [*range(9), 8]
-    assert numbers(tmp_path / "run") == numbers(tiny_run)
 
 
 def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> None:
@@ -492,22 +451,6 @@ def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
         assert list(rebuilt.parameters.values()) == model.variant.parameters
     bundled = (tmp_path / "far" / "away" / "right.toml").read_text()
     assert 'base = "gunnerus-28.9"' in bundled
-
-
-def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Weights are drawn anew for each seed of the grid, not the order of the runs alone."""
-    plan, seen = tiny_plan(tmp_path, {"grid.seeds": [3, 8], "grid.N_D": [4]}), []
-
-    def fit(_: PathDrawn, task: Task) -> dict[str, Fitted]:
-        seen.append(task.seed)
-        return {name: Fitted(None, [], 0.0) for name in task.cases}
-
-    monkeypatch.setattr(PathDrawn, "fit", fit)
-    prepared = prepare(plan, obtain_runs(plan))
-    for batch in plan.batches:
-        run_unit(plan, prepared, whole_unit(plan, batch), "cpu")
-    assert seen == [batch.seed for batch in plan.batches]
-    assert sorted(seen) == [3, 8]
 
 
 MISTAKE = ""  # of `Faulty` and `Moved`

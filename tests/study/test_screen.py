@@ -87,22 +87,6 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
     assert [len(block) for block in screen(plan, obtain_runs(plan), drawn_families(plan, "wrong"), 3)] == [1, 1, 1]
 
 
-def test_members_with_other_lags_start_from_another_memory(tmp_path: Path) -> None:
-    """Each lag has separate hidden states at the start of a window: those of the orders before."""
-    vessel = tmp_path / "lagged.toml"
-    lag = "kind = 'first_order'\nT = 2.0\nrate = 0.2\n"
-    vessel.write_text(
-        "extends = 'gunnerus-28.9'\n" + "".join(f"[thruster.{s}.actuator.n]\n{lag}" for s in ("port", "starboard"))
-    )
-    rules = [{"parameters": ["thruster.*.actuator.n.T"], "factor": [0.5, 3.0]}]
-    family = [{"name": "wrong", "base": str(vessel), "members": 2, "perturb": rules}]
-    plan = tiny_plan(
-        tmp_path, {"family": family, "truth.vessel": str(vessel), "truth.manoeuvre.0.actuators_at": "rest"}
-    )
-    plan.vessels["gunnerus-28.9"] = plan.vessels[str(vessel)]  # type: ignore[index]
-    np.testing.assert_allclose(screened(plan, 3)["A"], [row["mean"] for row in by_paths(plan, 3)], rtol=1e-12)
-
-
 def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
     wild = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"], "factor": [-3e4, 1.0]}]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": wild}]
