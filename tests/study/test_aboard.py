@@ -23,7 +23,6 @@ from shipid.study.apply import table_of_stretch
 from shipid.units import percent_text
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
-from tests.logs.conftest import as_dataset, turning
 
 STEP = 5.0
 
@@ -261,23 +260,6 @@ def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
     assert second.instants.loc[before & (second.instants["t"] > 80), "reach"].isna().all()
     assert (first.gaps, second.gaps) == ("", "1 time without rows, the longest 50 s after t = 100 s of 'a'")
     assert any(second.gaps in line for line in summary(second))
-
-
-def test_errors_on_a_coarse_log_are_those_of_the_ship(tmp_path):
-    """In a turn with rows 5 s apart and a step of 1 s errors are as with rows of 1 s, not those to a chord."""
-    steady = Predictor(Physics(None, 10, 1.0), "alone", Unchanged({}), {}, {}).save(tmp_path / "cell.npz")
-    many, few = (
-        play_aboard(
-            steady, write_dataset(as_dataset(turning(np.arange(0.0, 101.0, apart), u=7.0)), tmp_path / "log.parquet")
-        )
-        for apart in (1.0, 5.0)
-    )
-    words = "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated"
-    assert (many.coarse, few.coarse) == ("", words)
-    assert words in summary(few)
-    both = few.points.merge(many.points, on=["run", "t", "ahead"]).dropna(subset=["error_x", "error_y"])
-    assert len(both) > 100
-    np.testing.assert_allclose(both["error_x"], both["error_y"], atol=0.1 * 7.0 * 0.05 * 5.0**2 / 8)
 
 
 def test_a_heading_that_wraps_changes_no_prediction():

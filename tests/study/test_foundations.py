@@ -153,6 +153,7 @@ def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Reco
     )
 
 
+@pytest.mark.slow
 def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a shared clock the rows of the test are gone: errors on runs left out are as small as on separate clocks."""
     kept: list[Any] = []
@@ -173,6 +174,7 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
 
 
+@pytest.mark.slow
 def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:
     """Among its levels and fades none predicts the training runs better; the page says whose A moves with the data."""
     plan, dataset = study(recorded, [WRONG, SEEN])

@@ -63,29 +63,6 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
     assert plan.study.question.endswith("?")
 
 
-def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
-    """Weather, sea, start, models and amounts are those of the other, and a past comes before the first instant.
-
-    Where orders hold, an observer's force and current last; where they change, neither is taken over.
-    """
-    constant, changing = read_plan("constant-orders").study, read_plan("changing-orders").study
-    assert constant.truth is not None
-    assert changing.truth is not None
-    assert constant.truth.run_up == 20.0
-    assert constant.truth.model_copy(update={"manoeuvre": changing.truth.manoeuvre}) == changing.truth
-    small = read_plan("simulation-small").study
-    for name in ("method", "grid", "split", "prediction"):
-        assert getattr(constant, name) == getattr(changing, name), name
-    for one, other in zip(constant.family, changing.family, strict=True):
-        if one.observer is not None:
-            assert one.observer == {"waves": [0.01], "fade": 1e6}, one.name
-            one = one.model_copy(update={"observer": {"waves": [0.01], "current": 0.0, "fade": 0.0}})
-        assert one == other, one.name
-    assert constant.grid == small.grid
-    assert constant.split == small.split
-    assert constant.prediction.model_copy(update={"integrator": "euler"}) == small.prediction
-
-
 def test_the_first_instant_comes_after_the_run_up() -> None:
     few = {"truth.manoeuvres": 4, "split.test": 1, "grid.N_D": [2], "truth.step": 0.5}
     plan = read_plan("zigzags", {"truth.run_up": 32.0, **few})

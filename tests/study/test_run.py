@@ -22,7 +22,7 @@ from shipid.answer.rotate import kept_folder
 from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
-from shipid.files import TEMPORARY, read_json
+from shipid.files import read_json
 from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
@@ -255,19 +255,6 @@ def test_H_is_what_the_stored_predictor_does_on_the_test_windows(tmp_path: Path,
 
 def _batch(tmp_path: Path, N_D: Any) -> Any:
     return next(batch for batch in tiny_plan(tmp_path).batches if batch.N_D == N_D)
-
-
-def test_the_folder_tells_what_it_was_computed_with(tmp_path: Path, tiny_run: Path) -> None:
-    record = read_json(tiny_run / store.PROVENANCE)
-    assert record["digest"] == tiny_plan(tmp_path).digest
-    assert {"shipid", "torch", "casadi", "optuna"} <= record["machine"]["packages"].keys()
-    models = read_json(tiny_run / store.FOUNDATIONS)
-    variant = next(m.variant for m in tiny_plan(tmp_path).foundations if m.name == "wrong-2")
-    assert variant is not None
-    entry = next(row for row in models if row["foundation"] == "wrong-2")
-    assert entry["factors"] == pytest.approx(dict(variant.factors), rel=1e-15)
-    assert entry["base_digest"] == load_vessel("gunnerus-28.9").digest
-    assert not list(tiny_run.rglob(f"{TEMPORARY}*"))
 
 
 def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,9 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from shipid.answer.findings_simulation import smooth_by_construction
 from shipid.answer.frames import provenance_words
-from shipid.answer.memory import taken
 from shipid.answer.pages import report_content
 from shipid.data.dataset import read_dataset
 from shipid.hybrid.alone import Unchanged
@@ -96,8 +94,6 @@ def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monk
     mine = plan.methods[1]
     assert (mine.method.traits, mine.method.num_trials()) == (Traits(), None)
     assert plain_rival(plan) is None
-    assert not any(taken(mine, foundation) for foundation in plan.foundations)
-    assert not smooth_by_construction(mine.method, plan.study.prediction.horizon)
     Watch(plan, tmp_path)
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
