@@ -35,6 +35,6 @@ def users_code(kinds: tuple[Callable[..., Any], ...]) -> str:
         with suppress(OSError, TypeError):  # of a notebook
             file, depth = Path(inspect.getfile(inspect.unwrap(kind))).resolve(), kind.__module__.count(".")
             beside = file.parents[depth - 1].rglob("*.py") if depth else file.parent.glob("*.py")
-            files |= {file, *beside}
+            files |= {file, *beside} if file.is_file() else set()
     texts = [file.read_bytes() for file in sorted(files)]
     return hashlib.sha256(b"\n".join(texts)).hexdigest()[:8] if texts else UNKNOWN

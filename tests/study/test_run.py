@@ -107,7 +107,11 @@ def test_another_shipid_that_goes_on_is_noted(
 
 @pytest.mark.parametrize(
     ("step", "before", "after"),
-    [("obtain", [], [run.DATA, run.COMMON]), ("prepare", [run.DATA], [run.COMMON]), ("run_unit", [run.COMMON], [])],
+    [
+        ("obtain_runs", [], [run.DATA, run.COMMON]),
+        ("prepare", [run.DATA], [run.COMMON]),
+        ("run_unit", [run.COMMON], []),
+    ],
 )
 def test_an_engine_that_is_given_up_is_noted_before_anything_of_another_is_stored(
     step: str, before: list[str], after: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -305,7 +309,9 @@ def test_runs_too_short_to_learn_from_are_a_value(tmp_path: Path) -> None:
     assert set(rows.loc[6, "status"]) == {"ok"}
     run_here(tiny_plan(tmp_path, {**changes, "grid.N_D": [2]}), tmp_path / "nothing")
     write_pages(tmp_path / "nothing")
-    assert "no cell with physics has a result" in (tmp_path / "nothing" / "answer.txt").read_text().lower()
+    assert (
+        "no cell with physics and data that counts has a" in (tmp_path / "nothing" / "answer.txt").read_text().lower()
+    )
 
 
 def test_absent_device_is_one_line(tmp_path: Path) -> None:

@@ -104,7 +104,8 @@ def test_a_method_in_a_file_needs_no_script(tmp_path: Path) -> None:
 
 def test_a_script_from_standard_input_is_named(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("")
-    piped = f"import subprocess, sys; subprocess.run([sys.executable, '-'], input={RUN!r}, text=True)"
+    alone = RUN.replace('"linear", "trials": 2', '"alone"')
+    piped = f"import subprocess, sys; subprocess.run([sys.executable, '-'], input={alone!r}, text=True)"
     words = "a script from standard input cannot start workers: save it as a file, and run that"
     assert ended(tmp_path, "-c", piped) == f"shipid.errors.ShipidError: {words}"
     assert not (tmp_path / "run").exists()
