@@ -102,11 +102,8 @@ def play_aboard(
             points.append(path)
             instants.append(seen.assign(latency=latency))
     if not instants:
-        past = predictor.past * step
-        if every is not None and any(np.ptp(piece["t"]) >= past for _, piece in stretches_of_runs(dataset)):
-            message = f"{every:g}: no instant so many s apart has the past of {past:g} s that the predictor needs"
-            raise DataError(f"{message}: give less, such as {past:g}", path="--every")
-        raise DataError(f"no run is as long as the past of {past:g} s that the predictor needs", file=log)
+        past = f"the past of {predictor.past * step:g} s that the predictor needs"
+        raise DataError(f"no instant has {past}: runs are shorter, or --every is longer", file=log)
     return Replay(
         pd.concat(instants, ignore_index=True),
         pd.concat(points, ignore_index=True),
@@ -236,8 +233,8 @@ def _band_in_words(instants: pd.DataFrame, band: BandSettings, why: str) -> str:
     if promised.any():
         inside = f"{percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
     line = (
-        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held[judged].mean())} of the {judged.sum()} "
-        f"whole paths that can be judged, {inside}"
+        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held[judged].mean())} of the "
+        f"{judged.sum()} whole paths that can be judged, {inside}"
     )
     if promised.any() and share_interval(held[promised], instants["run"].to_numpy()[promised])[1] < band.level:
         line += f"; that is fewer than {level_text(band.level)} by more than chance: {why}"

@@ -18,7 +18,6 @@ from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
 from shipid.hybrid.method import Row, Space
-from shipid.study.code import code_and_fault, code_digest
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
     "distributed.admin.large-graph-warning-threshold": "1GB",
@@ -106,7 +105,6 @@ def on_dask(
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
-    needs: object = None,
     receive: Callable[..., object] = lambda *_: None,
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks and what `work(shared, task, line)` makes of them, in the order in which they finish.
@@ -118,7 +116,6 @@ def on_dask(
     scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
     shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
         whole work; beside it the keys name this client, since a scheduler computes a key once for all its clients.
-    needs : a small part of `shared`; a worker that cannot read it is named, since it dies of the whole without a word.
     receive : called in this thread with the key of a task and each message that it sends by its line.
 
     Raises
@@ -140,9 +137,7 @@ def on_dask(
         except (OSError, ValueError) as error:
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
         try:
-            yield from _results(
-                client, work, shared, tasks, f"shipid-{name}-{client.id}", _Watch(client, needs), receive
-            )
+            yield from _results(client, work, shared, tasks, f"shipid-{name}-{client.id}", _Watch(client), receive)
         except ShipidError as error:
             raise ShipidError(error.message, file=error.file, path=error.path or f"--scheduler {scheduler}") from error
         finally:
@@ -167,7 +162,6 @@ def _results(
     mistake: Exception | None = None
     waiting, given = iter(tasks), None
     try:
-        watch.look()  # before anything is sent: what cannot be read ends a worker
         given = client.submit(_given, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         while mistake is None:
             watch.look()
@@ -207,8 +201,10 @@ def _results(
         raise mistake
     if killed:
         more = f" and {len(killed) - 3} more" if len(killed) > 3 else ""
-        words = f"workers of the cluster die, perhaps for want of memory, at {', '.join(killed[:3])}{more}"
-        raise ShipidError(f"{words}; {KEPT} and larger workers")
+        words = (
+            f"workers of the cluster die at {', '.join(killed[:3])}{more}: for want of memory, or of a module of yours"
+        )
+        raise ShipidError(f"{words}; {REMEDY}, or take larger workers; {KEPT}")
 
 
 def _given(shared: Shared) -> Shared:
@@ -226,18 +222,12 @@ def _unread(given: Any) -> str:
 class _Watch:
     """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while.
 
-    Workers that have joined are asked for their code, and whether they can read what tasks need: one that lacks it dies
-    of its first task without a word.
-
     threads : of all workers at the last look; at least 1, so that there is something to wait for.
     """
 
-    def __init__(self, client: Any, needs: object = None) -> None:
-        from distributed.protocol.pickle import dumps
-
-        self._client, self._needs = client, dumps(needs)
+    def __init__(self, client: Any) -> None:
+        self._client = client
         self._looked, self._seen, self._warned = float("-inf"), time.monotonic(), False
-        self._known: set[str] = set()
         self.threads = 1
 
     def look(self) -> None:
@@ -250,28 +240,10 @@ class _Watch:
         self._looked = time.monotonic()
         self.threads = max(sum(worker["nthreads"] for worker in workers.values()), 1)
         if workers:
-            self._ask(sorted(workers.keys() - self._known))
             self._seen, self._warned = time.monotonic(), False
         elif not self._warned and time.monotonic() - self._seen > PATIENCE:
             log.warning("the Dask scheduler has no workers: waiting for one")
             self._warned = True
-
-    def _ask(self, workers: list[str]) -> None:
-        """Ask workers for their code, once each; a warning for each where it is another."""
-        self._known |= set(workers)
-        if not workers:
-            return
-        ask, answers = self._client._run, dict[str, Any]()  # `Client.run` has no limit of time
-        with suppress(OSError, TimeoutError):  # a worker that is slow to answer gets its tasks all the same
-            answers = self._client.sync(
-                ask, code_and_fault, self._needs, workers=workers, on_error="return", callback_timeout=SILENT
-            )
-        for address, answer in sorted(answers.items()):
-            code, fault = ("", f"{answer}") if isinstance(answer, Exception) else answer
-            if fault:
-                log.warning("the worker %s cannot read the work, and may die of it (%s): %s", address, fault, REMEDY)
-            elif code != code_digest():
-                log.warning("the worker %s has another shipid: code %s, here %s", address, code, code_digest())
 
 
 @contextmanager

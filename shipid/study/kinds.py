@@ -74,8 +74,6 @@ def kind_by_motion(rows: pd.DataFrame, speed: float, shaft: float) -> str:
 def _is_random_helm(rows: pd.DataFrame) -> bool:
     """Whether the helm goes through many levels that have no size in common, as no standard manoeuvre does."""
     levels = _helm_levels(rows)
-    if len(levels) < RANDOM_LEVELS:
-        return False
     distinct = {round(level / LEVEL_DISTANCE) for level in levels}
     over = np.abs(levels)[np.abs(levels) > LEVEL_DISTANCE]
     if len(distinct) < RANDOM_LEVELS or len(over) < RANDOM_LEVELS:

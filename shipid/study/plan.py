@@ -329,15 +329,6 @@ def model_label(plan: Plan, foundation: str, method: str) -> str:
     return foundation if method == judged_method(plan) else f"{foundation} {WITH} {method}"
 
 
-def disturbances_of(plan: Plan) -> tuple[str, ...]:
-    """What moves the ship or its log and is no coefficient of the vessel, in words; recorded runs have waves."""
-    truth = plan.study.truth
-    if truth is None:
-        return ("waves",)
-    known = {"waves": truth.waves, "gusts": truth.gusts, "noise of the sensors": truth.sensors}
-    return tuple(words for words, there in known.items() if there)
-
-
 def orders_may_react(plan: Plan) -> bool:
     """Whether orders may have reacted to the ship: recorded runs, or made manoeuvres that steer by its heading."""
     truth = plan.study.truth
@@ -456,11 +447,6 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
     for place in range(len(names)):
         if twice := names_of_one_file(names[: place + 1]):
             raise DocumentError(f"two conditions are called {twice}", file=file, path=f"condition.{place}.name")
-    for path, values in repeat.items():
-        again = [value for place, value in enumerate(values) if value in values[:place]]
-        if again:
-            message = f"{again[0]!r} is there twice: give each value once, equal studies are no more evidence than one"
-            raise DocumentError(message, file=file, path=f"repeat.{path}")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
     parts: dict[str, Part] = {}
@@ -472,7 +458,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             part = build_plan(_changed_document(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
             part = build_plan(_changed_document(part.document, turn, "repeat", file), file, known, plan.sources)
             if part.study.data != plan.study.data:
-                part = completed_plan(replace(part, sources=_of_part(name, part, parts, sources)))
+                part = completed_plan(replace(part, sources=_of_part(name, part, sources)))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
             if twin is not None:
                 message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
@@ -484,13 +470,12 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
     return parts
 
 
-def _of_part(name: str, part: Plan, made: Mapping[str, Part], stored: Mapping[str, str] | None) -> Mapping[str, str]:
-    """Digests of the sources of a part with data of its own: as stored, or of its files, which are read once."""
-    if stored is not None:
-        begins = f"{name}{OF_PART}"
-        return {key.removeprefix(begins): digest for key, digest in stored.items() if key.startswith(begins)}
-    same = next((one.plan.sources for one in made.values() if one.plan.study.data == part.study.data), None)
-    return _sources(part.study.data, Path(part.file)) if same is None else same
+def _of_part(name: str, part: Plan, stored: Mapping[str, str] | None) -> Mapping[str, str]:
+    """Digests of the sources of a part with data of its own: as stored, or of its files."""
+    if stored is None:
+        return _sources(part.study.data, Path(part.file))
+    begins = f"{name}{OF_PART}"
+    return {key.removeprefix(begins): digest for key, digest in stored.items() if key.startswith(begins)}
 
 
 def _changed_document(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:

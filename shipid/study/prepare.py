@@ -214,7 +214,7 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
             known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
         windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
-        windows = windows.select(_place_in_run(windows) < prediction.samples)
+        windows = windows.select(pd.Series(windows.run).groupby(windows.run).cumcount().to_numpy() < prediction.samples)
     return windows
 
 
@@ -290,15 +290,6 @@ def runs_by_amount(study: Study, pool: Windows) -> dict[int, tuple[str, ...]]:
     """Training and validation runs of each amount of data, fewest first, for the least seed."""
     runs = nested_runs(pool.spans, study.grid.N_D, min(study.grid.seeds))
     return {amount: runs[amount] for amount in sorted(runs)}
-
-
-def _place_in_run(windows: Windows) -> Array:
-    """How many windows of the same run come before each, (S,)."""
-    place = np.zeros(len(windows), dtype=int)
-    for run in windows.spans:
-        mask = windows.run == run
-        place[mask] = np.arange(mask.sum())
-    return place
 
 
 def _test_runs(study: Study, windows: Windows) -> list[str]:

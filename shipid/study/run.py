@@ -34,7 +34,6 @@ from shipid.study.prepare import Prepared, foundation_record, obtain_runs, prepa
 from shipid.study.sessions import Code, Sessions, check_workers, machine, session_at_worker, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
-from shipid.users import is_user_code
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
 Computed = Iterator[tuple[Unit, list[store.Cell]]]
@@ -205,13 +204,12 @@ def _compute(
         return
     writer = cache(journals)  # of this process alone: workers send what it writes
     tasks = ((unit.key, (unit, _searches(unit, writer(unit.key)))) for unit in units)
-    own = [way.method for way in plan.methods if is_user_code(type(way.method))]
 
     def write(key: str, name: str, *given: Any) -> None:
         getattr(writer(key), name)(*given)
 
     shared = plan, prepared, means.device, own_code(plan)
-    for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, own, write):
+    for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, write):
         sessions.note_others(*noted)
         yield unit, results
 

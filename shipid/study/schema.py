@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -10,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, 
 
 from shipid.arguments import whole_steps
 from shipid.data.windows import Commands, PathSource
-from shipid.document import Document
+from shipid.document import Document, document_leaves
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DocumentError, suggest_name
 from shipid.physics.signals import SIGNALS, rows_of_role
@@ -20,6 +19,13 @@ from shipid.vessel.perturb import Family
 
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
+OLD_KEYS = {
+    "recipe": 'write [[method]] with kind = "path-drawn" (it was "fast") or "path-trained" (it was "paper"), the same '
+    "name, and the other keys of [recipe] instead",
+    "prediction.horizon": "was a number of steps: write ahead = its product with the step, in seconds",
+    "prediction.method": "is now called `integrator`",
+}
+"""Dotted path of a key of version 0.1 -> what to write instead."""
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
 
@@ -254,29 +260,11 @@ class Study(Strict):
 
 def check_version(document: Document, file: Path) -> None:
     """Refuse a document of version 0.1: a line for each old key, with what to write instead."""
-    old = [DocumentError(message, file=file, path=path) for path, message in _old_keys(document)]
+    paths = [f"{path}." for path, _ in document_leaves(document)]
+    found = (key for key in OLD_KEYS if any(path.startswith(f"{key}.") for path in paths))
+    old = [DocumentError(OLD_KEYS[key], file=file, path=key) for key in found]
     if old:
         raise DocumentError(old[0].message, file=file, path=old[0].path, others=old[1:])
-
-
-def _old_keys(document: Document) -> Iterator[tuple[str, str]]:
-    """Yield the dotted path of every key of version 0.1 in a document, and what to write instead."""
-    if "recipe" in document:
-        paper = isinstance(document["recipe"], dict) and document["recipe"].get("kind") == "paper"
-        new = "path-trained" if paper else "path-drawn"
-        yield "recipe", f'write [[method]] with name = "{new}", kind = "{new}" and the other keys of [recipe] instead'
-    prediction = document.get("prediction")
-    if isinstance(prediction, dict) and "horizon" in prediction:
-        value, step = prediction["horizon"], prediction.get("step", 1.0)
-        numbers = isinstance(value, int | float) and isinstance(step, int | float)
-        seconds = f"ahead = {value * step:g}" if numbers else "ahead"
-        yield "prediction.horizon", f"was a number of steps: write {seconds}, in seconds"
-    if isinstance(prediction, dict) and "method" in prediction:
-        yield "prediction.method", "is now called `integrator`"
-    families = document.get("family")
-    for index, family in enumerate(families if isinstance(families, list) else []):
-        if isinstance(family, dict) and "identify" in family and {"base", "perturb", "members"} & family.keys():
-            yield f"family.{index}.identify", separate_family(str(family.get("name", "")), "identify")
 
 
 def separate_family(name: str, block: str) -> str:

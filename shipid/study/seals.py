@@ -26,7 +26,6 @@ WORDS = {
     **dict.fromkeys(("missing", "damaged"), "missing or damaged: continue with `shipid study resume`"),
     "edited": "was changed after it was written: put it back, or delete it and continue with `shipid study resume`",
     "foreign": "is of another study: delete it and {}, and continue with `shipid study resume`",
-    "unreadable": "cannot be read ({}): let this user read it, or delete it and continue with `shipid study resume`",
 }
 
 
@@ -35,7 +34,6 @@ class Fault:
     """A file that is not what was written: `missing`, `damaged` (no whole file of its kind) or `edited`.
 
     `foreign`: of another study, copied into this folder with its seal; `reason` names what belongs to it.
-    `unreadable`: the system does not let this user read it, or the disk fails; it may be whole, and `reason` says why.
     """
 
     seal: str
@@ -62,7 +60,7 @@ def is_sealed(folder: Path, name: str) -> bool:
 def seal_names(folder: Path) -> set[str]:
     """Names of all seals; 10,000 take some milliseconds."""
     try:
-        return {entry.name.removesuffix(".sha256") for entry in os.scandir(folder / FOLDER)}
+        return {Path(entry).stem for entry in os.scandir(folder / FOLDER) if entry.name.endswith(".sha256")}
     except (FileNotFoundError, NotADirectoryError):
         return set()
 
@@ -89,8 +87,8 @@ def sealed_faults(folder: Path, among: str = "", names: Collection[str] = ()) ->
 
     among : how the paths in the folder of the files begin that are looked at. names : of the seals; by default all.
     """
-    files = sorted((folder / FOLDER).glob("*.sha256"))
-    return [fault for file in files if not names or file.stem in names for fault in _faults(folder, file, among)]
+    wanted = sorted(name for name in seal_names(folder) if not names or name in names)
+    return [fault for name in wanted for fault in _faults(folder, seal_file(folder, name), among)]
 
 
 def check_seals(folder: Path, among: str = "") -> None:
@@ -107,12 +105,12 @@ def fault_error(folder: Path, fault: Fault) -> ResultError:
 def remove_damaged(folder: Path) -> list[str]:
     """Remove the seals of files that are missing or damaged, so that they are computed again; a sentence each.
 
-    Raises ResultError, before anything is removed, for a file that can be read and is not what was written, and for one
-    that cannot be read: on a file server, or of another user, it may be whole.
+    Raises ResultError, before anything is removed, for a file that can be read and is not what was written, and OSError
+    for one that the system does not give: on a file server, or of another user, it may be whole.
     """
     damaged, sentences = sealed_faults(folder), []
     for fault in damaged:
-        if fault.kind in ("edited", "unreadable", "foreign"):
+        if fault.kind in ("edited", "foreign"):
             raise fault_error(folder, fault)
         if (folder / fault.file).is_dir():
             raise ResultError("is a folder where a file belongs: remove it and resume", file=folder / fault.file)
@@ -144,9 +142,6 @@ def _faults(folder: Path, seal: Path, among: str) -> Iterator[Fault]:
     except (FileNotFoundError, ValueError):
         yield Fault(name, place, "damaged")
         return
-    except OSError as error:
-        yield Fault(name, place, "unreadable", error.strerror or str(error))
-        return
     for number, (digest, path) in enumerate(known):
         if not path.startswith(among):
             continue
@@ -157,9 +152,8 @@ def _faults(folder: Path, seal: Path, among: str) -> Iterator[Fault]:
                 yield Fault(name, path, "foreign", place if name in FIRST else f"trials/{name}.log")
         except (FileNotFoundError, NotADirectoryError):
             yield Fault(name, path, "missing")
-        except OSError as error:
-            kind = "damaged" if (folder / path).is_dir() else "unreadable"
-            yield Fault(name, path, kind, error.strerror or str(error))
+        except IsADirectoryError:
+            yield Fault(name, path, "damaged")
 
 
 def _digest(file: Path) -> str:

@@ -21,7 +21,6 @@ from shipid.errors import DocumentError, ResultError, ShipidError
 from shipid.files import (
     arrays_with_prefix,
     make_folder,
-    open_file,
     quote_argument,
     read_arrays,
     read_json,
@@ -33,14 +32,11 @@ from shipid.files import (
     write_table,
     write_text,
 )
-from shipid.hybrid.methods import METHODS
-from shipid.physics import TERMS
 from shipid.predictor import Predictor
 from shipid.study import seals
 from shipid.study.declared import Foundation
 from shipid.study.lock import sole_writer
-from shipid.study.plan import METHOD_CODE, TERM_CODE, Plan, Unit, build_plan, own_code, plan_text, program_of
-from shipid.units import join_names, plural_word
+from shipid.study.plan import Plan, Unit, build_plan, own_code, plan_text, program_of
 from shipid.version import __version__
 from shipid.vessel.load import check_document
 
@@ -102,44 +98,22 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
             _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
-    check_readable(folder)
     if provenance(folder)["digest"] != plan.digest:
         raise ResultError(_other_study(folder, plan), file=folder)
     check_writable(folder)
     with in_place(folder, plan), sole_writer(folder):
-        _mend(folder, plan)
+        _check_described(folder, plan)
         sweep_run(folder)
         yield
 
 
 def _other_study(folder: Path, plan: Plan) -> str:
-    """What a folder holds that is of another digest: where the documents are equal, what was changed since."""
+    """What a folder holds that is of another digest."""
     if documents.read_document(folder / STUDY) != plan.document:
         return f"holds the results of another study than {plan.file}: choose another --out"
-    stored, record = read_json(folder / VESSELS), provenance(folder)
-    try:
-        changed = [one.file for name, one in plan.vessels.items() if stored[name]["document"] != one.document]
-    except (TypeError, KeyError):
-        raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
-    changed += [f"the {name}" for name, digest in plan.sources.items() if record["sources"].get(name) != digest]
-    what = join_names(changed) if changed else f"a default of a method, or of shipid (this is {__version__}),"
-    words = f"holds results from before {what} changed: choose another --out"
-    return f"{words}, or go on with it as it was: `{program_of(plan)} study resume {quote_argument(folder)}`"
-
-
-def check_readable(folder: Path) -> None:
-    """Raise ResultError for what says which run a folder holds, and how far, where this user may not read it."""
-    for name in (STUDY, VESSELS, PROVENANCE):
-        try:
-            with open_file(folder / name) as stream:
-                stream.read()
-        except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
-            continue  # reported where it is read
-        except OSError as error:
-            raise ResultError(f"cannot be read ({error.strerror}): let this user read it", file=folder / name) from None
-    for name in (seals.FOLDER, "batches", JOURNALS):
-        if (folder / name).is_dir() and not os.access(folder / name, os.R_OK | os.X_OK):
-            raise ResultError("is a folder that this user may not read: let this user read it", file=folder / name)
+    words = f"holds results from before a vessel, the data, or a default of shipid (this is {__version__}) changed"
+    resume = f"`{program_of(plan)} study resume {quote_argument(folder)}`"
+    return f"{words}: choose another --out, or go on with it as it was: {resume}"
 
 
 def check_writable(folder: Path) -> None:
@@ -160,7 +134,6 @@ def in_place(folder: Path, plan: Plan) -> Iterator[None]:
     except (OSError, ShipidError) as error:
         check_place(folder, plan.digest)
         if isinstance(error, PermissionError):
-            check_readable(folder)
             check_writable(folder)
         raise
 
@@ -189,28 +162,19 @@ def sweep_run(folder: Path) -> None:
         sweep_temporary(place)
 
 
-def _mend(folder: Path, plan: Plan) -> None:
-    """Write study and vessels again where they cannot be read; ResultError where they can and were changed."""
+def _check_described(folder: Path, plan: Plan) -> None:
+    """Raise ResultError where study and vessels in the folder are not those of the plan."""
     try:
-        changed = documents.digest_document(documents.read_document(folder / STUDY)) != documents.digest_document(
+        stored = {name: entry["document"] for name, entry in read_json(folder / VESSELS).items()}
+        same = documents.digest_document(documents.read_document(folder / STUDY)) == documents.digest_document(
             plan.document
-        )
-    except DocumentError:
-        write_text(folder / STUDY, plan_text(plan))
-        changed = False
-    try:
-        stored = read_json(folder / VESSELS)
-        digests = {name: documents.digest_document(entry["document"]) for name, entry in stored.items()}
-        changed = changed or digests != {name: vessel.digest for name, vessel in plan.vessels.items()}
-    except (ResultError, TypeError, KeyError, AttributeError):
-        _write_vessels(folder, plan)
-    if changed:
-        raise ResultError("its study or vessels were changed by hand: choose another --out", file=folder)
-
-
-def _write_vessels(folder: Path, plan: Plan) -> None:
-    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
-    write_json(folder / VESSELS, vessels)
+        ) and {name: documents.digest_document(document) for name, document in stored.items()} == {
+            name: vessel.digest for name, vessel in plan.vessels.items()
+        }
+    except (ShipidError, TypeError, KeyError, AttributeError):
+        same = False
+    if not same:
+        raise ResultError("its study or vessels are damaged or were changed by hand: choose another --out", file=folder)
 
 
 def _make(folder: Path, plan: Plan) -> None:
@@ -235,7 +199,8 @@ def _describe(folder: Path, plan: Plan) -> None:
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     own = {"program": program_of(plan), **own_code(plan)} if own_code(plan) else {}
     write_json(folder / PROVENANCE, {"digest": plan.digest, **origin, "changes": dict(plan.changes), **own})
-    _write_vessels(folder, plan)
+    vessels = {name: {"document": vessel.document, "file": vessel.file} for name, vessel in plan.vessels.items()}
+    write_json(folder / VESSELS, vessels)
     write_text(folder / STUDY, plan_text(plan))
 
 
@@ -244,7 +209,6 @@ def stored_plan(folder: Path) -> Plan:
 
     Raises ResultError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
     """
-    check_readable(folder)
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
     record = provenance(folder)
@@ -258,9 +222,12 @@ def stored_plan(folder: Path) -> Plan:
         file = folder / STUDY
         plan = build_plan(document, Path(record["file"]), vessels, record["sources"], record["changes"])
     except DocumentError as error:
-        other = "if the run is of another version, read its report.html, and run the study again into a new folder"
-        message = f"shipid {__version__} does not take it ({error.message}): {other}"
-        raise NotTaken(_needed_script(folder, record, document) or message, file=file, path=error.path) from None
+        remedy = "if the run is of another version, read its report.html, and run the study again into a new folder"
+        if "program" in record:
+            command = f"`{record['program']} study report {quote_argument(folder)}`"
+            remedy = f"open it by your script, which knows its methods and terms: {command}"
+        message = f"shipid {__version__} does not take it ({error.message}): {remedy}"
+        raise NotTaken(message, file=file, path=error.path) from None
     except (TypeError, KeyError, AttributeError, ValueError):
         raise ResultError("damaged: run the study again into a new folder", file=folder / VESSELS) from None
     if plan.digest != record["digest"]:
@@ -269,20 +236,6 @@ def stored_plan(folder: Path) -> Plan:
             file=folder,
         )
     return plan
-
-
-def _needed_script(folder: Path, record: Mapping[str, Any], document: documents.Document) -> str:
-    """How to open a run with terms and methods of a user that this process lacks; empty where it has all."""
-    kinds = {str(way.get("name")): str(way.get("kind")) for way in document.get("method", []) if isinstance(way, dict)}
-    lacking = sorted(record.get(TERM_CODE, {}).keys() - TERMS.keys())
-    lacking += sorted({kinds.get(name, name) for name in record.get(METHOD_CODE, {})} - METHODS.keys())
-    if not lacking:
-        return ""
-    words = (
-        f"{join_names(lacking)}, which a user wrote, {plural_word(len(lacking), 'is', 'are')} not known to this process"
-    )
-    script = f"open the run by the script that puts {plural_word(len(lacking), 'it', 'them')} into TERMS or METHODS"
-    return f"{words}: {script}: `{record.get('program', 'shipid')} study report {quote_argument(folder)}`"
 
 
 def provenance(folder: Path) -> dict[str, Any]:
@@ -422,7 +375,13 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     table = rows.melt(id_vars=keys, value_vars=list(METRICS), var_name="metric", value_name="value")
     table["unit"] = table["metric"].map(UNITS)
     write_table(folder / "results.parquet", table)
-    trials = [{"cell": row["cell"], **_flat(trial)} for _, row in rows.iterrows() for trial in row["trials"]]
+    trials = [
+        {"cell": row["cell"]}
+        | {key: value for key, value in trial.items() if key != "params"}
+        | trial.get("params", {})
+        for _, row in rows.iterrows()
+        for trial in row["trials"]
+    ]
     write_table(folder / "trials.parquet", pd.DataFrame(trials))
     keys = [unit.key for unit in plan.units]
     if journals := sorted(file for file in (folder / JOURNALS).glob("*.log") if file.stem in keys):
@@ -433,10 +392,6 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     if whole:
         seals.write_seal(folder, RESULTS, [folder / "results.parquet", folder / "trials.parquet"])
     return folder / "results.parquet"
-
-
-def _flat(trial: Mapping[str, Any]) -> dict[str, Any]:
-    return {**{k: v for k, v in trial.items() if k != "params"}, **trial.get("params", {})}
 
 
 def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], naive: np.ndarray) -> None:

@@ -109,8 +109,9 @@ class StructureComparison:
         rows = {str(row["structure"]): row for row in self.table.to_dict("records")}
         others = [name for name, row in rows.items() if name != self.chosen and row["equal"]]
         notes = [
-            f"structure {self.chosen} has the least error of the position over {_length_in_words(self.ahead)} on runs that the "
-            f"fit has not seen: {rows[self.chosen]['position']:.3g} m"
+            f"structure {self.chosen} has the least error of the position over "
+            f"{f'{self.ahead:g} s' if self.ahead else 'whole runs'} on runs that the fit has not seen: "
+            f"{rows[self.chosen]['position']:.3g} m"
         ]
         if len(self.runs) < FEWEST_RUNS:
             notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
@@ -145,10 +146,6 @@ class StructureComparison:
             f"shipid {__version__}, on {self.vessel.key}, digest {self.vessel.digest}",
         }
         return tomlkit.dumps(documents.plain_values(document))
-
-
-def _length_in_words(ahead: float) -> str:
-    return f"{ahead:g} s" if ahead else "whole runs"
 
 
 def write_chosen_structure(compared: StructureComparison, file: Path) -> Path:

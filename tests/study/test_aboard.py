@@ -23,7 +23,6 @@ from shipid.study.apply import table_of_stretch
 from shipid.units import percent_text
 from shipid.vessel.load import load_vessel
 from tests.export.strange import bands_of, drawn
-from tests.logs.conftest import as_dataset, turning
 
 STEP = 5.0
 
@@ -158,14 +157,6 @@ def test_the_band_is_that_of_the_predictor_and_its_promise_is_counted(banded, tm
     )
 
 
-def test_a_summary_says_that_nothing_is_promised_in_alarm(banded, tmp_path):
-    _, file = banded
-    played = play_aboard(file, saved(log(), tmp_path), level=0.9)
-    lines = summary(replace(played, instants=played.instants.assign(outside=True)))
-    (line,) = (line for line in lines if line.startswith("band of 90 %"))
-    assert line.endswith("whole paths that can be judged, all in alarm, where nothing is promised")
-
-
 def test_a_band_wider_than_a_ship_can_go_is_none(banded, tmp_path):
     """Wind that was never there in training gave bands of 5,653,307 m; where it was as in training, digits stay."""
     fitted, _ = banded
@@ -234,15 +225,12 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
     assert any("no whole path can be judged" in line for line in summary(short))
 
 
-def test_instants_too_far_apart_are_not_said_to_be_runs_too_short(tmp_path):
-    """Before, the runs were blamed, which are as long as the past and longer."""
+def test_a_log_without_the_past_that_is_needed_is_one_line(tmp_path):
     file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 3 s
     target = saved(log().assign(V_w=0.0, beta_w=0.0), tmp_path)
-    with pytest.raises(DataError, match=r"^--every: 10000: no instant so many s apart has the past of 3 s .* as 3$"):
-        play_aboard(file, target, every=1e4)
     assert len(play_aboard(file, target, every=3.0).instants)
-    with pytest.raises(DataError, match="no run is as long as the past of 3 s"):
-        play_aboard(file, saved(log().iloc[:1].assign(V_w=0.0, beta_w=0.0), tmp_path), every=1e4)
+    with pytest.raises(DataError, match="no instant has the past of 3 s that the predictor needs"):
+        play_aboard(file, target, every=1e4)
 
 
 def test_alarms_are_at_the_times_that_the_log_has():
@@ -272,23 +260,6 @@ def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
     assert second.instants.loc[before & (second.instants["t"] > 80), "reach"].isna().all()
     assert (first.gaps, second.gaps) == ("", "1 time without rows, the longest 50 s after t = 100 s of 'a'")
     assert any(second.gaps in line for line in summary(second))
-
-
-def test_errors_on_a_coarse_log_are_those_of_the_ship(tmp_path):
-    """In a turn with rows 5 s apart and a step of 1 s errors are as with rows of 1 s, not those to a chord."""
-    steady = Predictor(Physics(None, 10, 1.0), "alone", Unchanged({}), {}, {}).save(tmp_path / "cell.npz")
-    many, few = (
-        play_aboard(
-            steady, write_dataset(as_dataset(turning(np.arange(0.0, 101.0, apart), u=7.0)), tmp_path / "log.parquet")
-        )
-        for apart in (1.0, 5.0)
-    )
-    words = "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated"
-    assert (many.coarse, few.coarse) == ("", words)
-    assert words in summary(few)
-    both = few.points.merge(many.points, on=["run", "t", "ahead"]).dropna(subset=["error_x", "error_y"])
-    assert len(both) > 100
-    np.testing.assert_allclose(both["error_x"], both["error_y"], atol=0.1 * 7.0 * 0.05 * 5.0**2 / 8)
 
 
 def test_a_heading_that_wraps_changes_no_prediction():

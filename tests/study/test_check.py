@@ -60,7 +60,7 @@ def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, m
     assert not check.faults
     (line,) = check.lines
     assert line.startswith("0 faults; how far the run is cannot be said: ")
-    assert "mine, which a user wrote, is not known to this process: open the run by the script" in line
+    assert "open it by your script, which knows its methods and terms: `python my.py study report" in line
     part = store.part_folder(folder, next(iter(plan.parts)))
     (part / "test.npz").write_bytes(b"whole")
     seals.write_seal(part, "common", [part / "test.npz"])

@@ -33,67 +33,27 @@ def test_another_commit_of_the_same_version_has_another_digest(tmp_path: Path) -
     assert digest_of(tmp_path) not in (changed, code_digest())
 
 
-def test_what_a_method_of_a_user_imports_from_beside_it_is_part_of_its_code(tmp_path: Path) -> None:
-    """A helper that changed left the digest as it was, so cells of two methods were mixed without a word."""
-    files = {
-        "mine.py": "import json\nfrom laws import *\nfrom parts.inner import law\nclass Mine: ...\n",
-        "laws.py": "def load():\n    import slow.deep as deep\n",  # as late as when it is called
-        "slow/deep.py": "import laws\n",  # a folder without __init__.py, and a ring
-        "parts/__init__.py": "",
-        "parts/inner.py": "from . import even\nfrom .odd import x as law\nimport beside\n",
-        "parts/even.py": "",
-        "parts/odd.py": "from ..parts.low import x\nx = 1\n",
-        "parts/low.py": "x = 1\n",
-        "parts/beside.py": "",  # what a script in the folder of a package imports
-        "other.py": "",
-        "json/other.py": "",
-    }
-    for name, text in files.items():
-        place = tmp_path / name
-        place.parent.mkdir(exist_ok=True)
-        place.write_text(text, encoding="utf-8")
-
-    def code() -> str:
-        return users_code((type("Mine", (), {"__module__": "mine"}),))
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("inspect.getfile", lambda _: str(tmp_path / "mine.py"))
-        before = code()
-        for name, text in files.items():
-            (tmp_path / name).write_text(f"{text}# another\n", encoding="utf-8")
-            assert (code() == before) == name.endswith("other.py"), name
-            (tmp_path / name).write_text(text, encoding="utf-8")
-        assert code() == before
-        (tmp_path / "shipid").mkdir()
-        (tmp_path / "shipid/__init__.py").write_text("x = 2")  # a copy of shipid has a digest of its own
-        (tmp_path / "laws.py").write_text(f"{files['laws.py']}    import shipid.x\n", encoding="utf-8")
-        with_it = code()
-        (tmp_path / "shipid/__init__.py").write_text("x = 3")
-        assert code() == with_it
-        (tmp_path / "laws.py").write_text("def (", encoding="utf-8")
-        assert code() != before
-
-
-def test_other_installed_packages_are_no_part_of_a_method(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They lie beside its package, and so does all that is installed: a walk over that took minutes."""
-    place = tmp_path / "site-packages"
-    for name, text in {
-        "mine/__init__.py": "import numpy, mine.law",
-        "mine/law.py": "x = 1",
-        "numpy.py": "x = 1",
-    }.items():
-        (place / name).parent.mkdir(parents=True, exist_ok=True)
-        (place / name).write_text(text, encoding="utf-8")
-    monkeypatch.setattr("inspect.getfile", lambda _: str(place / "mine" / "__init__.py"))
-
-    def code() -> str:
-        return users_code((type("Mine", (), {"__module__": "mine"}),))
-
-    before = code()
-    (place / "numpy.py").write_text("x = 2", encoding="utf-8")
-    assert code() == before
-    (place / "mine/law.py").write_text("x = 2", encoding="utf-8")
-    assert code() != before
+@pytest.mark.parametrize(
+    ("module", "file", "beside", "elsewhere"),
+    [
+        ("mine", "mine.py", "helper.py", "folder/other.py"),
+        ("pack.mine", "pack/mine.py", "pack/inner/helper.py", "other.py"),
+    ],
+)
+def test_files_beside_that_of_a_method_are_part_of_its_code(
+    module: str, file: str, beside: str, elsewhere: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a helper that changed left the digest as it was, so that cells of two methods were mixed."""
+    for name in (file, beside, elsewhere):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("x = 1")
+    monkeypatch.setattr("inspect.getfile", lambda _: str(tmp_path / file))
+    digests = []
+    for name in (file, elsewhere, beside, file):
+        digests.append(users_code((type("Mine", (), {"__module__": module}),)))
+        (tmp_path / name).write_text(f"x = {len(digests)} + 1")
+    assert digests[1] == digests[2]
+    assert len(set(digests)) == 3
 
 
 def test_functions_of_a_user_have_a_digest_in_any_dress() -> None:

@@ -43,15 +43,3 @@ def test_simulate_writes_a_dataset_and_shows_the_envelope(tmp_path: Path) -> Non
     frame = read_dataset(file).frame
     assert np.allclose(frame.groupby("run")["t"].max(), 80.0)
     assert {"z", "phi", "theta", "V_w", "beta_w"} <= set(frame.columns)
-
-
-def test_the_first_manoeuvres_stay_when_more_are_asked_for() -> None:
-    """Each manoeuvre, its sea included, depends on its number alone."""
-    few, more = (
-        obtain_runs(read_plan("simulation-small", {"truth.manoeuvres": n, "split.test": 2, "grid.N_D": [4]}))
-        for n in (8, 11)
-    )
-    numbers = few.frame.select_dtypes("number").columns
-    np.testing.assert_allclose(
-        more.frame[numbers].to_numpy()[: len(few.frame)], few.frame[numbers], rtol=1e-9, atol=1e-9
-    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipid.answer.sentences import answer_sentences
-from shipid.data.dataset import Dataset, stretches_of_runs
+from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
@@ -24,8 +23,8 @@ from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
 from shipid.study.cells import accuracy_of
 from shipid.study.foundations import predictions
-from shipid.study.plan import Batch, Plan, fitted_families, judged_method, whole_unit
-from shipid.study.prepare import instants_of, prepare, rows_apart_from_test
+from shipid.study.plan import Plan, fitted_families, whole_unit
+from shipid.study.prepare import instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
 from tests.study.tiny import run_here
@@ -154,6 +153,7 @@ def test_an_observer_along_another_run_sees_no_moment_of_the_test(recorded: Reco
     )
 
 
+@pytest.mark.slow
 def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a shared clock the rows of the test are gone: errors on runs left out are as small as on separate clocks."""
     kept: list[Any] = []
@@ -174,6 +174,7 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
 
 
+@pytest.mark.slow
 def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:
     """Among its levels and fades none predicts the training runs better; the page says whose A moves with the data."""
     plan, dataset = study(recorded, [WRONG, SEEN])
@@ -189,19 +190,6 @@ def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(rec
         given = predictions(prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
         assert chosen <= position_error(given.paths, windows.future).mean() * 1.02, (waves, fade)
     assert known.seconds > 0
-
-
-def test_moments_of_the_test_are_cut_out_where_runs_share_a_clock(recorded: Recorded) -> None:
-    plan, dataset = study(recorded, BOTH)
-    prepared = prepare(plan, dataset)
-    assert rows_apart_from_test(dataset, prepared.test) is dataset  # every run has a separate clock
-    frame = dataset.frame.copy()
-    frame["t"] += 30.0 * (frame["run"].str[0].map(ord) - ord("a"))  # the next begins before one ends
-    test = replace(prepared.test, t=prepared.test.t + 150.0, shared_clock=True)
-    left = rows_apart_from_test(Dataset(frame, {**dataset.metadata, "clock": "shared"}), test).frame
-    assert set(left["run"]) == set("abcde")
-    assert left[left["run"] == "e"]["t"].max() < 150.0
-    assert len(left) == 4 * 41 + 30
 
 
 def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,25 +214,6 @@ def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monke
     assert not data.frame["t"].between(first, last).any()
 
 
-def test_what_is_not_identified_stays_as_it_was(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two families on one member: each has the numbers that it identifies, and the others of that member."""
-    some = {**FITTED, "name": "some", "identify": {**IDENTIFY, "parameters": PATHS[:1]}}
-    plan, dataset = study(recorded, [*BOTH, some])
-    prepared = prepare(plan, dataset)
-    right = plan.vessels["gunnerus-28.9"].parameters
-
-    def identify(_: Any, __: Any, ___: Any, settings: Any) -> Any:
-        values = {path: right[path] for path in settings.parameters}
-        return SimpleNamespace(status="ok", sentence="", seconds=0.0, values=values)
-
-    monkeypatch.setattr(solve, "identify", identify)
-    found = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")
-    for name, factors in {"wrong": [1.3, 1.3, 1.3], "fitted": [1, 1, 1], "some": [1, 1.3, 1.3]}.items():
-        variant = found[name].foundation.variant
-        assert variant is not None
-        assert [variant.values[path] / right[path] for path in PATHS] == pytest.approx(factors), name
-
-
 def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     """Compensated, identified alone, identified then compensated: rows, stored predictors and the report's paths."""
     plan, _ = study(recorded, BOTH)
@@ -265,31 +234,6 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
     assert not any("alone" in text and "+" in text for text, _ in answer_sentences(results))
 
 
-def test_what_cannot_be_identified_fails_in_its_cells(tmp_path: Path, recorded: Recorded) -> None:
-    """Whole runs that diverge under explicit Euler: one sentence, and all other cells are there.
-
-    The bounds keep the search where they diverge: elsewhere it depends on the solver's version whether they do.
-    """
-    far = {path: [50.0, 60.0] for path in PATHS}
-    bad = {**FITTED, "name": "bad", "identify": {**IDENTIFY, "step": 20.0, "horizon": 40.0, "bounds": far}}
-    plan, _ = study(recorded, [WRONG, bad])
-    run_here(plan, tmp_path / "run")
-    rows = store.read_rows(tmp_path / "run").set_index(["foundation", "method"])
-    for name, method in (("wrong", "drawn"), ("wrong", "alone"), ("none", "drawn")):
-        assert rows.loc[(name, method), "status"] == "ok"
-    for method in ("drawn", "alone"):
-        assert rows.loc[("bad", method), "status"] in ("failed", "diverged")
-        assert str(rows.loc[("bad", method), "sentence"]).startswith("identification: ")
-
-
-def test_a_hole_breaks_a_run(recorded: Recorded) -> None:
-    plan, dataset = study(recorded, BOTH)
-    test = prepare(plan, dataset).test
-    middle = replace(test, t=np.full(len(test), 15.0), shared_clock=True)  # five seconds ahead
-    parts = [rows["t"] for run, rows in stretches_of_runs(rows_apart_from_test(dataset, middle)) if run == "a"]
-    assert [(part.min(), part.max()) for part in parts] == [(0.0, 14.0), (21.0, 40.0)]
-
-
 def test_a_member_that_diverges_is_redrawn_once_for_it_and_its_identified_twin(recorded: Recorded) -> None:
     """Yaw damping of the wrong sign in nearly every draw; the identified family starts from the same member."""
     family = {"name": "wild", "base": "gunnerus-28.9", "seed": 2}
@@ -301,18 +245,6 @@ def test_a_member_that_diverges_is_redrawn_once_for_it_and_its_identified_twin(r
     assert variants[0] == variants[1]
     assert variants[0].counter > 0
     assert sum("redrawn" in note for note in prepared.notes) == variants[0].counter
-
-
-def test_values_that_the_vessel_refuses_fail_in_their_cells(
-    recorded: Recorded, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plan, dataset = study(recorded, BOTH)
-    prepared = prepare(plan, dataset)
-    solution = SimpleNamespace(status="ok", sentence="", seconds=1.0, values={"inertia.m": -1.0})
-    monkeypatch.setattr(solve, "identify", lambda *_: solution)
-    both = predictions(prepared, prepared.runs(plan.batches[0]), "cpu")["fitted"]
-    assert np.isnan(both.paths).all()
-    assert both.sentence.startswith("identification: ")
 
 
 @pytest.mark.parametrize(
@@ -328,13 +260,3 @@ def test_a_wrong_block_is_one_line(recorded: Recorded, block: dict[str, Any], pa
     with pytest.raises(DocumentError, match=message) as caught:
         study(recorded, [WRONG, {**FITTED, "identify": block}])
     assert caught.value.path == path
-
-
-def test_the_prediction_of_the_study_is_the_default(recorded: Recorded) -> None:
-    plan, _ = study(recorded, [WRONG, {**FITTED, "identify": {"parameters": PATHS}}])
-    settings = plan.foundations[1].identify
-    assert settings is not None
-    assert (settings.horizon, settings.step, settings.method) == (5.0, 1.0, "euler")
-    assert fitted_families(plan) == {"fitted"}
-    assert judged_method(plan) == "drawn"
-    assert Batch(3, 0) in plan.batches

@@ -24,6 +24,7 @@ from shipid.study.new import (
     SHARE_OF_RUN,
     _degraded_families,
     _family_name,
+    _true_path,
     _turning_orders,
     amounts_of_data,
     draft_study,
@@ -33,7 +34,7 @@ from shipid.study.new import (
 )
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain_runs, prepare
-from shipid.study.survey import separation_of_sources, survey_dataset
+from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
 from shipid.vessel.template import Particulars, first_guess
@@ -129,16 +130,26 @@ def test_families_have_names_that_a_study_may_use_each_once() -> None:
     assert len({name.lower() for name in names}) == len(names)
 
 
-def test_what_jitters_is_not_the_true_path(tmp_path: Path) -> None:
-    """Positions that scatter by 0.5 m leave the velocities by as much after 10 s as after 20 s: they give way."""
-    dataset = trial()
-    random = np.random.default_rng(5)
-    noise = {name: dataset.frame[name] + random.normal(0, 0.5, len(dataset.frame)) for name in ("north", "east")}
-    noisy = Dataset(dataset.frame.assign(**noise), dataset.metadata)
-    assert separation_of_sources(noisy, 20.0) == pytest.approx(
-        2 * 0.5, rel=0.1
-    )  # two coordinates, two instants: sqrt(4) sigma
-    assert drafted(tmp_path, noisy)[1]["data"]["path"] == "velocity"
+@pytest.mark.parametrize(
+    ("sigma", "adds_up", "speed", "path"),
+    [
+        (0.0, False, 1.0, "position"),
+        (0.3, False, 1.0, "velocity"),  # jitter of 0.7 % of the way: the tutorial's log
+        (0.02, False, 1.0, "position"),  # RTK: no floor that matters
+        (0.5, True, 1.0, "velocity"),  # sqrt(20) x 0.7 m: 4 % of the way
+        (0.03, True, 1.0, "position"),  # may be noise of the velocities
+        (0.0, False, 1.1, "position"),
+        (0.3, False, 1.1, "position"),
+    ],
+)
+def test_positions_that_scatter_are_not_the_true_path(sigma: float, adds_up: bool, speed: float, path: str) -> None:
+    """Jitter and scatter that adds up give way to the velocities, a wrong speed does not."""
+    dataset, random = trial(u=speed), np.random.default_rng(5)
+    noise = random.normal(0, sigma, (2, len(dataset.frame)))
+    noise = np.cumsum(noise, axis=1) if adds_up else noise
+    columns = {name: dataset.frame[name] + one for name, one in zip(("north", "east"), noise, strict=True)}
+    log = Dataset(dataset.frame.assign(**columns), dataset.metadata)
+    assert _true_path(log, 20.0, 4.35).value == path
 
 
 def test_a_log_that_fails_its_checks_is_named_before_the_vessel(tmp_path: Path) -> None:

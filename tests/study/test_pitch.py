@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shipid.answer.pages import write_pages
 from shipid.identification.settings import Identify
 from shipid.identification.solve import identify
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.plan import Plan, read_plan
 from shipid.study.results import Results, read_results
-from shipid.vessel.load import load_vessel
 from tests.study.tiny import run_here
 
 SHIP = """
@@ -120,13 +117,3 @@ def test_the_correction_takes_the_pitch_as_an_input(finished: tuple[Plan, Result
     other = dict(instants.columns) | {"cpp.pitch": instants.columns["cpp.pitch"] + 0.2}
     moved = predictor.predict(replace(instants, columns=other)) - predictor.predict(instants)
     assert np.abs(moved).max() > 1e-3
-
-
-def test_the_report_shows_the_pitch(finished: tuple[Plan, Results]) -> None:
-    page = write_pages(finished[1].folder).read_text(encoding="utf-8")
-    assert "pitch" in page
-    assert "pitch" in (finished[1].folder / store.ENVELOPE).read_text(encoding="utf-8")
-
-
-def test_a_vessel_with_a_pitch_names_its_command(finished: tuple[Plan, Results]) -> None:
-    assert load_vessel(str(Path(finished[0].file).parent / "cpp.toml")).units["thruster.cpp.k_P"] == "-"

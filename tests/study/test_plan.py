@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,7 +12,6 @@ import pytest
 
 from shipid.document import bundled_documents, bundled_documents_folder
 from shipid.errors import DocumentError
-from shipid.hybrid.features import Memory
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
@@ -21,8 +19,6 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.plan import (
     _sources,
     build_plan,
-    completed_plan,
-    default_folder,
     digest_without_seed,
     drawn_conditions,
     fitted_families,
@@ -67,80 +63,6 @@ def test_bundled_studies_expand(name: str, foundations: int, alone: int, batches
     assert plan.study.question.endswith("?")
 
 
-def test_every_bundled_study_is_tested() -> None:
-    worlds = {"simulation", "simulation-small", "constant-orders", "changing-orders", "calm", "zigzags"}
-    of_methods = {"methods", "methods-full-scale", "paper-recipe", "paper-small"}
-    assert set(bundled_documents("studies")) == {"quick", "full-scale", *worlds, *of_methods}
-
-
-@pytest.mark.parametrize("name", ["quick", "full-scale", "zigzags", "constant-orders", "changing-orders"])
-def test_the_default_looks_back_and_loses_no_window_of_a_simulation(name: str) -> None:
-    plan = read_plan(name)
-    judged = next(way.method for way in plan.methods if way.name == judged_method(plan))
-    assert isinstance(judged, PathDrawn)
-    assert judged.choose
-    assert {"history", "turned", "error"} <= judged.memory.model_fields_set
-    assert past_steps(plan) == judged.past == 20.0
-    assert plan.study.truth is None or plan.study.truth.run_up == past_steps(plan)
-
-
-def test_the_line_of_the_page_takes_the_memory_alone_away() -> None:
-    line = next(one for one in (ROOT / "docs" / "memory.md").read_text("utf-8").splitlines() if "run quick" in one)
-    changes = tomllib.loads(line.partition("--set '")[2].partition("'")[0])
-    drawn, memory = (plan.methods[0].method for plan in (read_plan("quick", changes), read_plan("quick")))
-    assert memory.model_copy(update={"choose": False, "memory": Memory()}) == drawn
-    assert past_steps(read_plan("quick", changes)) == past_steps(read_plan("quick"))
-
-
-def test_the_chain_of_the_paper_is_bundled_small() -> None:
-    """Families of +-60 and +-40 % of symbolic physics, networks trained by PyTorch, trials proposed by TPE."""
-    plan = read_plan("paper-small")
-    (way,) = plan.methods
-    assert isinstance(way.method, PathTrained)
-    assert way.method.memory == Memory()
-    blocks = {family.name: [block.factor for block in family.perturb] for family in plan.study.family}
-    assert blocks == {"nominal": [], "moderate": [(0.4, 1.6)], "high": [(0.6, 1.4)] * 3}
-    full = read_plan("paper-recipe").study
-    assert plan.study.family == full.family
-    assert full.truth is not None
-    assert plan.study.truth == full.truth.model_copy(update={"manoeuvres": 50})
-
-
-def test_changing_orders_differ_from_constant_ones_in_the_orders_alone() -> None:
-    """Weather, sea, start, models and amounts are those of the other, and a past comes before the first instant.
-
-    Where orders hold, an observer's force and current last; where they change, neither is taken over.
-    """
-    constant, changing = read_plan("constant-orders").study, read_plan("changing-orders").study
-    assert constant.truth is not None
-    assert changing.truth is not None
-    assert constant.truth.run_up == 20.0
-    assert constant.truth.model_copy(update={"manoeuvre": changing.truth.manoeuvre}) == changing.truth
-    small = read_plan("simulation-small").study
-    for name in ("method", "grid", "split", "prediction"):
-        assert getattr(constant, name) == getattr(changing, name), name
-    for one, other in zip(constant.family, changing.family, strict=True):
-        if one.observer is not None:
-            assert one.observer == {"waves": [0.01], "fade": 1e6}, one.name
-            one = one.model_copy(update={"observer": {"waves": [0.01], "current": 0.0, "fade": 0.0}})
-        assert one == other, one.name
-    assert constant.grid == small.grid
-    assert constant.split == small.split
-    assert constant.prediction.model_copy(update={"integrator": "euler"}) == small.prediction
-
-
-@pytest.mark.parametrize("name", ["constant-orders", "changing-orders"])
-def test_worlds_of_memory_have_every_member_with_and_without_an_observer(name: str) -> None:
-    plan = read_plan(name)
-    plain = [one for one in plan.foundations if one.base is not None and one.observer is None]
-    observed = [one for one in plan.foundations if one.observer is not None]
-    assert [one.variant for one in plain] == [one.variant for one in observed]
-    assert len(plan.foundations) == 2 * 5 + 1
-    assert past_steps(plan) == 20
-    assert judged_method(plan) == "memory"
-    assert plan.cells == (3 * 11 - 1) * 3 * 2  # physics alone does not meet `none`
-
-
 def test_the_first_instant_comes_after_the_run_up() -> None:
     few = {"truth.manoeuvres": 4, "split.test": 1, "grid.N_D": [2], "truth.step": 0.5}
     plan = read_plan("zigzags", {"truth.run_up": 32.0, **few})
@@ -175,14 +97,6 @@ def test_orders_and_weather_make_pairs_of_runs_and_nothing_else_does(tmp_path: P
             warnings.simplefilter("ignore")
             assert drawn_conditions(replace(plan, study=other)) != draws, key
     assert drawn_conditions(tiny_plan(tmp_path, {"truth.manoeuvre.0.n_rpm": [60.0, 200.0]})) != draws
-
-
-def test_another_source_is_another_study(tmp_path: Path) -> None:
-    """Logs of one name with another digest: kept results are not taken for theirs."""
-    plan = tiny_plan(tmp_path)
-    logs = [completed_plan(replace(plan, sources={"log": digest})) for digest in ("aa", "bb")]
-    assert len({one.digest for one in (plan, *logs)}) == 3
-    assert default_folder(logs[0]) != default_folder(logs[1])
 
 
 def test_inaccurate_family_is_what_was_fixed_beforehand() -> None:
@@ -227,15 +141,6 @@ def test_the_simulation_study_is_the_grid_of_the_paper() -> None:
     nominal = wide["nominal"]
     assert nominal is not None
     assert not nominal.values
-
-
-def test_seed_0_is_the_world_as_written(tmp_path: Path) -> None:
-    plain, zero = tiny_plan(tmp_path), tiny_plan(tmp_path, {"seed": 0})
-    assert zero.study == plain.study
-    assert [m.variant and m.variant.values for m in zero.foundations] == [
-        m.variant and m.variant.values for m in plain.foundations
-    ]
-    assert zero.batches == plain.batches
 
 
 def test_another_world_has_other_manoeuvres_families_data_and_training(tmp_path: Path) -> None:
@@ -349,32 +254,12 @@ def test_digest_follows_every_vessel(tmp_path: Path, role: str) -> None:
     assert tiny_plan(tmp_path, change).digest != before
 
 
-def test_stored_text_is_the_same_study(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"grid.N_D": [3, 5], "description": 'a "quoted" word'})
-    again = tmp_path / "again.toml"
-    again.write_text(plan_text(plan))
-    assert read_plan(again).digest == plan.digest
-
-
 def test_truth_takes_its_blocks(tmp_path: Path) -> None:
     lag = {"kind": "first_order", "T": 2.0, "rate": 0.1}
     plan = tiny_plan(tmp_path, {"truth.set": {"thruster.port.actuator.n": lag}})
     assert plan.truth is not None
     assert plan.truth.parameters["thruster.port.actuator.n.T"] == 2.0
     assert all("actuator" not in path for model in plan.foundations if model.vessel for path in model.vessel.parameters)
-
-
-def test_families_of_the_quick_study_share_damping_factors_by_rule() -> None:
-    """Draws hang on family and member; damping alone differs in `moderate`, mass and propellers too in `high`."""
-    models = {model.name: model.variant for model in read_plan("quick").foundations if model.variant}
-    for name, variant in models.items():
-        assert all(0.4 <= factor <= 1.6 for factor in variant.factors.values())
-        others = [path for path in variant.factors if not path.startswith("hull.derivatives.")]
-        assert bool(others) == name.startswith("high")
-    high = models["high-1"].factors
-    assert high["thruster.port.D_p"] == high["thruster.starboard.D_p"]
-    assert 0.6 <= high["inertia.m"] <= 1.4
-    assert models["moderate-1"].factors != models["moderate-2"].factors
 
 
 def test_work_is_cut_where_cells_share_hardly_anything(tmp_path: Path) -> None:

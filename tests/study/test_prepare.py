@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,10 @@ import tomlkit
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
-from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DivergenceError, DocumentError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.physics import Physics
-from shipid.predictor import Predictor, limits_of
+from shipid.predictor import Predictor
 from shipid.study import prepare as module
 from shipid.study.envelope import input_envelope
 from shipid.study.plan import Plan, read_plan, whole_unit
@@ -104,45 +102,6 @@ def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> N
             assert sorted(validated) == sorted(prepared.runs(batch))
 
 
-def test_a_method_in_closed_form_leaves_out_each_run_once(tiny: tuple[Plan, Dataset, Prepared]) -> None:
-    plan, _, prepared = tiny
-    for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
-        pairs = prepared.folds(batch, windows, "runs")
-        assert len(pairs) == batch.N_D
-        for train, validation in pairs:
-            assert len(set(windows.run[validation])) == 1
-            assert sorted([*train, *validation]) == list(range(len(windows)))
-        assert sorted(index for _, validation in pairs for index in validation) == list(range(len(windows)))
-
-
-@pytest.mark.parametrize("kind", ["path-drawn", "path-trained"])
-def test_on_one_clock_no_moment_is_shared(recorded: Callable[..., tuple[Plan, Dataset]], kind: str) -> None:
-    """Runs of 20 s that start 15 s after one another: windows that overlap another part are left out and reported."""
-    t = np.arange(21.0)
-    runs = {f"r{k}": {"t": t + 15.0 * k, "u": 2.0 + 0.1 * k + 0.01 * t, "port.n": 1.0 + 0.1 * k} for k in range(8)}
-    dataset = logged(runs, t, clock="shared")
-    changes = {"split": {"test": ["r3"], "folds": 2}, "grid": {"N_D": [7]}, "family": [ONE_FAMILY]}
-    plan, _ = recorded(dataset, **changes, method=[{"name": "one", "kind": kind}])
-    prepared = prepare(plan, dataset)
-    batch = plan.batches[0]
-
-    def moments(windows: Windows) -> list[tuple[float, float]]:
-        return list(zip(windows.t, windows.t + windows.horizon, strict=True))
-
-    def shared(one: Windows, other: Windows) -> bool:
-        return any(a <= d and c <= b for (a, b), (c, d) in product(moments(one), moments(other)))
-
-    everything = cut_windows(dataset, horizon=5)
-    left_out = len(everything) - len(prepared.pool) - len(prepared.test)
-    assert left_out > 0
-    assert any(note.startswith(f"{left_out} windows that touch the test") for note in prepared.notes)
-    assert shared(everything.select(everything.run != "r3"), prepared.test)
-    assert not shared(prepared.pool, prepared.test)
-    for train, validation in prepared.folds(batch, prepared.pool, plan.methods[0].method.validation):
-        assert not shared(prepared.pool.select(train), prepared.pool.select(validation))
-
-
 def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     """Midpoint rule with 2,000 steps a second; r = 0 included."""
     windows = tiny[2].test.select(slice(0, 12))
@@ -153,13 +112,6 @@ def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, Prepared]) -
     rate = np.stack([u * np.cos(r * time) - v * np.sin(r * time), u * np.sin(r * time) + v * np.cos(r * time)], axis=-1)
     path = np.cumsum(rate, axis=0)[steps - 1 :: steps] / steps
     np.testing.assert_allclose(constant_motion(windows), path, atol=1e-6)
-
-
-def test_samples_are_the_first_of_each_run(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"prediction.samples": 3})
-    prepared = prepare(plan, obtain_runs(plan))
-    for windows in (prepared.pool, prepared.test):
-        assert all((windows.t[windows.run == run] == [0.0, 1.0, 2.0]).all() for run in windows.spans)
 
 
 def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
@@ -268,33 +220,6 @@ def test_hidden_states_follow_the_earlier_orders() -> None:
     assert window_memory(SHIP, dataset, windows) is None
 
 
-def test_hidden_states_are_those_of_the_truth() -> None:
-    """The actuators of a simulated truth, once the first order is reached, are what the log's orders say."""
-    ship, dataset = stepped(order=1.6, T=1.5, rate=0.2)
-    n = dataset.frame["port.n"][dataset.frame["run"] == "a"].to_numpy()
-    start = {name: np.array([2.0 if name == "u" else 0.0]) for name in ("north", "east", "psi", "u", "v", "r")}
-    orders = {name: n[:-1, None] if name.endswith(".n") else np.zeros(1) for name in dataset.commands}
-    still = {name: np.zeros(1) for name in ("V_w", "beta_w")}
-    keep = ("actual.port.n",)
-    path = rollout(ship, start, orders, still, step=1.0, num_steps=30, method="rk4", keep=keep, engine="casadi")
-    windows = cut_windows(dataset, horizon=5)
-    memory = window_memory(ship, dataset, windows)
-    assert memory is not None
-    one = windows.run == "a"
-    np.testing.assert_allclose(memory["port.n"][one], path["actual.port.n"][: one.sum(), 0, 0], rtol=1e-12)
-
-
-def test_a_stretch_of_one_row_has_its_order_reached() -> None:
-    ship, dataset = stepped(order=2.0, T=4.0, rate=1.0)
-    flags = dataset.frame["flags"].copy()
-    flags[[1, 2]] = 1
-    broken = Dataset(dataset.frame.assign(flags=flags), {**dataset.metadata, "flags": ["break"]})
-    windows = cut_windows(broken, horizon=5)
-    memory = window_memory(ship, broken, windows)
-    assert memory is not None
-    assert memory["port.n"][0] == 1.0
-
-
 def test_perturbed_lags_have_separate_hidden_states(
     tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]]
 ) -> None:
@@ -388,22 +313,6 @@ def test_files_are_looked_for_beside_the_study(
     assert obtain_runs(plan).runs == dataset.runs
 
 
-def test_a_mapping_is_looked_for_beside_the_study(
-    tmp_path: Path, recorded: Callable[..., tuple[Plan, Dataset]], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bad = Path(__file__).parents[1] / "bad" / "logs"
-    for name in ("plain.toml", "good.csv"):
-        (tmp_path / name).write_bytes((bad / name).read_bytes())
-    plan, _ = recorded(
-        logged({"a": {}, "b": {}}, np.arange(21.0)),
-        split={"test": 1},
-        data={"mapping": "plain.toml", "log": "good.csv"},
-    )
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path / "elsewhere")
-    assert obtain_runs(plan).runs == ["good"]
-
-
 def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset, Prepared]) -> None:
     """Per D_4, D_6 and test, from the windows that each sees."""
     plan, _, prepared = tiny
@@ -423,15 +332,6 @@ def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset
         for quantity, values in (("u", u), ("u_rw", u_rw)):
             row = rows[name, quantity]
             assert (row["min"], row["mean"], row["max"]) == pytest.approx((values.min(), values.mean(), values.max()))
-
-
-def test_limits(tiny: tuple[Plan, Dataset, Prepared]) -> None:
-    _, dataset, prepared = tiny
-    limits = limits_of(prepared.pool, prepared.commands)
-    assert set(limits) == {"u", "v", "r", "V_w", *dataset.commands}
-    rows = dataset.frame[~dataset.frame["run"].isin(list(prepared.test.spans)) & (dataset.frame["t"] <= 15)]
-    for name, (low, high) in limits.items():
-        assert (low, high) == pytest.approx((rows[name].min(), rows[name].max()))
 
 
 @pytest.mark.slow
@@ -469,25 +369,6 @@ def test_a_test_run_that_is_a_copy_of_one_that_trains_is_named(
     for test in ("b", "f"):
         plan, dataset = recorded(twice, split={"test": [test]}, prediction={"ahead": 5.0})
         assert not [words for words in prepare(plan, dataset).notes if words.startswith("test runs that move")]
-
-
-def test_copies_among_test_runs_and_among_runs_that_train_are_named(
-    recorded: Callable[..., tuple[Plan, Dataset]],
-) -> None:
-    """Nothing was said of a test of one manoeuvre that counted as five, nor of a copy that validates what it trains."""
-    log = weaving()
-    again = [
-        log.frame[log.frame["run"] == "a"].assign(run=f"again {k}", t=lambda rows, k=k: rows["t"] + 1e4 * k)
-        for k in (1, 2)
-    ]
-    thrice = Dataset(pd.concat([log.frame, *again], ignore_index=True), {**log.metadata, "clock": "run"})
-    plan, dataset = recorded(thrice, split={"test": ["a", "c", "again 2", "again 1"]}, prediction={"ahead": 5.0})
-    (note,) = (words for words in prepare(plan, dataset).notes if "copies" in words)
-    assert re.match(r"test runs that move as other test runs do \('again .' as '(a|again .)', 'again .' as ", note)
-    assert "intervals are too narrow" in note
-    plan, dataset = recorded(thrice, split={"test": ["b", "c"]}, prediction={"ahead": 5.0})
-    (note,) = (words for words in prepare(plan, dataset).notes if "copies" in words)
-    assert note.startswith("runs that train and move as others that train do ('again 1' as 'a', 'again 2' as ")
 
 
 def test_a_ship_at_rest_is_no_copy(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:

@@ -70,16 +70,6 @@ def test_half_a_line_and_foreign_lines_do_no_harm(tmp_path: Path) -> None:
     assert watch.look() == running
 
 
-def test_journals_of_a_folder_that_has_several(tmp_path: Path) -> None:
-    """One for each unit of work, in a folder; two runs may be numbered alike inside."""
-    plan = tiny_plan(tmp_path, {"method.0.trials": 5})
-    for name in ("one", "two"):
-        (tmp_path / JOURNALS).mkdir(exist_ok=True)
-        Journal(tmp_path / JOURNALS / f"{name}.log").add({f"{name}+drawn-N0004-s0": [row(0, 1.0)]}, SPACE)
-    watch = Watch(plan, tmp_path)
-    assert {search.cell for search in watch.look()} == {"one+drawn-N0004-s0", "two+drawn-N0004-s0"}
-
-
 def test_parts_of_a_study_have_cells_of_the_same_names(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"method.0.trials": 5, "repeat": {"split.seed": [0, 1]}})
     cell, watch = "right+drawn-N0004-s0", Watch(plan, tmp_path)

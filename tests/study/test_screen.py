@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,25 +10,21 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from shipid.data.dataset import Dataset
 from shipid.engine import engines, native
-from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.files import write_table
+from shipid.errors import DocumentError, ShipidError
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error, summarise_errors
 from shipid.study import screen as module
 from shipid.study.plan import Plan
-from shipid.study.prepare import obtain_runs, partition, prepare, window_memory
+from shipid.study.prepare import obtain_runs, partition, window_memory
 from shipid.study.screen import (
     accuracy_quantiles,
     drawn_families,
     drivers_of_accuracy,
     join_blocks,
-    notes_on_windows,
     screen,
 )
 from shipid.vessel.perturb import Family, draw_members
-from tests.study.test_commands import weaving
 from tests.study.tiny import tiny_plan
 
 
@@ -63,7 +58,7 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
     """With a C compiler, where errors are summed on the way, and without one."""
     if not compiled:
         for place in (native, engines):
-            monkeypatch.setattr(place, "compiler", lambda: None)
+            monkeypatch.setattr(place, "find_compiler", lambda: None)
     frame, expected = screened(plan, 5), by_paths(plan, 5)
     assert list(frame["member"]) == [row["member"] for row in expected]
     np.testing.assert_allclose(frame["A"], [row["mean"] for row in expected], rtol=1e-12)
@@ -84,40 +79,12 @@ def test_single_precision_gives_six_digits(plan: Plan) -> None:
     pd.testing.assert_frame_equal(single.drop(columns=["A", "A_90"]), double.drop(columns=["A", "A_90"]))
 
 
-def test_members_are_those_of_the_study(plan: Plan) -> None:
-    """A member keeps its number and draw whatever the size of the family."""
-    prepared = prepare(plan, obtain_runs(plan))
-    factors_of = {
-        model.name: model.variant.factors for model in prepared.foundations if model.family == "wrong" and model.variant
-    }
-    frame = screened(plan, 7).set_index("member")
-    assert len(factors_of) == 2
-    for name, factors in factors_of.items():
-        assert dict(frame.loc[name, list(factors)]) == factors
-
-
 def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = screened(plan, 7)
     monkeypatch.setattr(module, "MEMBERS_OF_BLOCK", 3)
     pd.testing.assert_frame_equal(screened(plan, 7), whole, check_exact=True)
     monkeypatch.setattr(module, "NUMBERS_OF_BLOCK", 1)
     assert [len(block) for block in screen(plan, obtain_runs(plan), drawn_families(plan, "wrong"), 3)] == [1, 1, 1]
-
-
-def test_members_with_other_lags_start_from_another_memory(tmp_path: Path) -> None:
-    """Each lag has separate hidden states at the start of a window: those of the orders before."""
-    vessel = tmp_path / "lagged.toml"
-    lag = "kind = 'first_order'\nT = 2.0\nrate = 0.2\n"
-    vessel.write_text(
-        "extends = 'gunnerus-28.9'\n" + "".join(f"[thruster.{s}.actuator.n]\n{lag}" for s in ("port", "starboard"))
-    )
-    rules = [{"parameters": ["thruster.*.actuator.n.T"], "factor": [0.5, 3.0]}]
-    family = [{"name": "wrong", "base": str(vessel), "members": 2, "perturb": rules}]
-    plan = tiny_plan(
-        tmp_path, {"family": family, "truth.vessel": str(vessel), "truth.manoeuvre.0.actuators_at": "rest"}
-    )
-    plan.vessels["gunnerus-28.9"] = plan.vessels[str(vessel)]  # type: ignore[index]
-    np.testing.assert_allclose(screened(plan, 3)["A"], [row["mean"] for row in by_paths(plan, 3)], rtol=1e-12)
 
 
 def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
@@ -159,21 +126,6 @@ def test_chance_drives_nothing(members: int) -> None:
     assert members < 100 or (len(driven), set(driven)) == (200, {"p3"})
 
 
-def test_a_parameter_left_alone_has_the_factor_one(tmp_path: Path) -> None:
-    rules = [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]
-    more = [{"parameters": ["inertia.I_z"], "factor": [0.9, 1.1]}]
-    family = [
-        {"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": rules},
-        {"name": "other", "base": "gunnerus-28.9", "members": 2, "perturb": more},
-    ]
-    plan = tiny_plan(tmp_path, {"family": family})
-    frame = join_blocks(list(screen(plan, obtain_runs(plan), drawn_families(plan), 2)))
-    assert list(frame["family"]) == ["wrong", "wrong", "other", "other"]
-    assert list(frame["inertia.I_z"][:2]) == [1, 1]
-    assert list(frame["inertia.m"][2:]) == [1, 1]
-    assert list(accuracy_quantiles(frame)["family"]) == ["wrong", "other"]
-
-
 @pytest.mark.parametrize(
     ("name", "remedy"), [("wrnog", "is no family: did you mean 'wrong'"), ("right", "draws no factor from a range")]
 )
@@ -181,36 +133,6 @@ def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) ->
     with pytest.raises(DocumentError, match=remedy) as caught:
         drawn_families(plan, name)
     assert "\n" not in str(caught.value)
-
-
-def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    frame = pd.DataFrame({"A": [1.0, 2.0]})
-
-    def interrupted(_: pd.DataFrame, file: Path, **__: Any) -> None:
-        Path(file).write_text("A\n1.0")
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(pd.DataFrame, "to_csv", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            write_table(tmp_path / "rows.csv", frame)
-    assert list(tmp_path.iterdir()) == []
-    for ending, read in ((".csv", pd.read_csv), (".parquet", pd.read_parquet)):
-        write_table(tmp_path / f"rows{ending}", frame)
-        pd.testing.assert_frame_equal(read(tmp_path / f"rows{ending}"), frame)
-    with pytest.raises(DataError, match=r"ending in \.parquet or \.csv"):
-        write_table(tmp_path / "rows.txt", frame)
-
-
-def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
-    """Logs without wind, and windows that touch the test in time."""
-    families_ = [
-        {"name": "wide", "base": "gunnerus-28.9", "perturb": [{"parameters": ["inertia.m"], "factor": [0.9, 1.1]}]}
-    ]
-    plan, dataset = recorded(weaving(), split={"test": 2}, family=families_)
-    assert notes_on_windows(plan, partition(plan, dataset), drawn_families(plan)) == [
-        "R/V Gunnerus, 28.9 m: V_w, beta_w not measured, assumed 0"
-    ]
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import re
 import shutil
 import sys
-from contextlib import suppress
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,12 +16,10 @@ import pytest
 from shipid.answer.pages import write_pages
 from shipid.errors import ResultError
 from shipid.files import read_json, write_json
-from shipid.hybrid.alone import Alone
-from shipid.hybrid.methods import METHODS
 from shipid.physics import TERMS
 from shipid.study import seals, store
 from shipid.study.check import check_folder
-from shipid.study.plan import Batch, Unit, build_plan, read_plan, run_command
+from shipid.study.plan import Batch, Unit, read_plan, run_command
 from shipid.study.results import read_results
 from tests.study.test_run import skeg_plan
 from tests.study.tiny import TINY, make_run, tiny_plan
@@ -51,47 +45,6 @@ def test_a_folder_of_another_user_is_named_before_anything_is_computed(
         ResultError, match=r"run: is a folder that this user may not write into: let this user, or copy"
     ):
         make_run(tmp_path / "run", plan)
-
-
-@pytest.mark.parametrize("name", [store.STUDY, store.VESSELS, store.PROVENANCE])
-def test_a_file_that_this_user_may_not_read_is_named_and_never_replaced(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run replaced it, and the others called it damaged."""
-    plan, folder = tiny_plan(tmp_path), tmp_path / "run"
-    make_run(folder, plan)
-    held = {file: file.read_bytes() for file in folder.iterdir()}
-    really = Path.open
-
-    def closed(file: Path, *how: Any, **named: Any) -> Any:
-        if file == folder / name:
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(file))
-        return really(file, *how, **named)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "open", closed)
-        for look in (partial(make_run, plan=plan), check_folder, write_pages):
-            with pytest.raises(ResultError, match=rf"{name}: cannot be read \(Permission denied\): let this user"):
-                look(folder)
-    assert {file: file.read_bytes() for file in folder.iterdir()} == held
-
-
-def closed_to_me(monkeypatch: pytest.MonkeyPatch, *places: Path) -> None:
-    """Let this user write and list none of some places, whoever runs the tests."""
-    access = os.access
-    monkeypatch.setattr(os, "access", lambda place, mode: Path(place) not in places and access(place, mode))
-
-
-@pytest.mark.parametrize("name", ["batches", "seals", "trials"])
-def test_a_folder_in_it_that_this_user_may_not_list_is_named(
-    name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A check of seals that nobody may list found no fault."""
-    folder = shutil.copytree(tiny_run, tmp_path / "run")
-    (folder / name).mkdir(exist_ok=True)
-    closed_to_me(monkeypatch, folder / name)
-    with pytest.raises(ResultError, match=rf"{name}: is a folder that this user may not read: let this user read it"):
-        check_folder(folder)
 
 
 @pytest.mark.parametrize("name", ["cells", "trials"])
@@ -154,21 +107,13 @@ def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
         store.stored_plan(tmp_path / "run")
 
 
-@pytest.mark.parametrize("wrong", [None, 3, "x", [3], {"a": 1}])
 @pytest.mark.parametrize("key", ["digest", "sources", "sessions", "notes", "wall_seconds"])
-def test_an_entry_of_the_provenance_that_is_none_is_one_line(
-    key: str, wrong: Any, tiny_run: Path, tmp_path: Path
-) -> None:
-    """As after an edit by hand; some are sound."""
+def test_an_entry_of_the_provenance_that_is_none_is_one_line(key: str, tiny_run: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(tiny_run, tmp_path / "run")
-    record = read_json(folder / store.PROVENANCE)
-    write_json(folder / store.PROVENANCE, {**record, key: wrong})
+    write_json(folder / store.PROVENANCE, {**read_json(folder / store.PROVENANCE), key: None})
     for look in (check_folder, read_results, lambda folder: store.note_session(folder, {"shipid": "0"})):
-        with suppress(ResultError):
-            look(folder)
-    if wrong is None:
         with pytest.raises(ResultError, match=f"provenance.json: {key}: is not what shipid writes there"):
-            check_folder(folder)
+            look(folder)
 
 
 @pytest.mark.parametrize("name", store.FOLDERS)
@@ -178,16 +123,6 @@ def test_a_file_where_a_folder_of_a_run_belongs_is_named(name: str, tiny_run: Pa
     (folder / name).write_text("")
     with pytest.raises(ResultError, match=f"{name}: is no folder, where one belongs: move it away, and resume"):
         make_run(folder, store.stored_plan(folder))
-
-
-def test_a_link_to_an_empty_folder_is_a_place_for_a_run(tmp_path: Path) -> None:
-    (tmp_path / "disk").mkdir()
-    (tmp_path / "run").symlink_to("disk")
-    plan = tiny_plan(tmp_path)
-    make_run(tmp_path / "run", plan)
-    assert (tmp_path / "run").is_symlink()
-    assert store.stored_plan(tmp_path / "disk").digest == plan.digest
-    assert not list(tmp_path.glob(".shipid-*"))
 
 
 def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(tmp_path: Path) -> None:
@@ -208,29 +143,18 @@ def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(
     assert caught.value.file == str(ship / store.VESSELS)
 
 
-def test_a_folder_with_a_term_and_a_method_of_a_user_names_the_script(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_with_a_term_of_a_user_names_the_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It said that the run is of another version, and to compute it again."""
     monkeypatch.setattr(sys, "argv", ["mine.py", "study", "run"])
-    monkeypatch.setitem(METHODS, "own", type("Own", (Alone,), {"__module__": __name__}))
     _, plan = skeg_plan(tmp_path, monkeypatch)
-    plan = build_plan({**plan.document, "method": [{"name": "mine", "kind": "own"}]}, Path(plan.file))
     folder = tmp_path / "run"
     make_run(folder, plan)
     assert store.stored_plan(folder).digest == plan.digest
-    monkeypatch.setattr(sys, "argv", ["shipid", "study", "report"])
-    script, words = "mine.py", r"hull\.skeg and own, which a user wrote, are not known"
-    remedy = rf"that puts them into TERMS or METHODS: `python {script} study report {re.escape(str(folder))}`$"
-    monkeypatch.delitem(METHODS, "own")
-    with monkeypatch.context() as without:
-        without.delitem(TERMS, "hull.skeg")
-        with pytest.raises(store.NotTaken, match=rf"{words}.*{remedy}") as caught:
-            store.stored_plan(folder)
-        assert "\n" not in str(caught.value)
-        assert remedy.partition("`")[2].partition(" study")[0] in check_folder(folder).lines[-1]
-    with pytest.raises(store.NotTaken, match=r"toml: .*: own, which a user wrote, is not known.* puts it into TERMS"):
+    monkeypatch.delitem(TERMS, "hull.skeg")
+    words = rf"hull\.skeg.*open it by your script, .*`python mine.py study report {re.escape(str(folder))}`$"
+    with pytest.raises(store.NotTaken, match=words):
         store.stored_plan(folder)
+    assert "study report" in check_folder(folder).lines[-1]
 
 
 def test_rows_are_those_of_the_finished_batches(tmp_path: Path) -> None:
@@ -260,18 +184,6 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
     wide = table[table["metric"] == "H"].set_index("cell")["value"]
     np.testing.assert_array_equal(wide.loc[rows["cell"]], rows["H"])
     assert set(table.loc[table["metric"] == "seconds", "unit"]) == {"s"}
-
-
-def test_tables_lose_their_seal_when_a_unit_is_stored_after_them(tmp_path: Path) -> None:
-    """As where a damaged unit is computed again: else the run counts as ended, with tables that do not hold it."""
-    for name in ("results.parquet", "trials.parquet"):
-        (tmp_path / name).write_bytes(b"tables")
-    seals.write_seal(tmp_path, store.RESULTS, [tmp_path / "results.parquet", tmp_path / "trials.parquet"])
-    batch = Batch(4, 0)
-    unit = Unit(batch, (("right", "drawn"),), batch.key)
-    store.write_unit(tmp_path, unit, [store.Cell({"cell": "right+drawn-4-0"})])
-    assert store.finished_units(tmp_path, [unit]) == [unit]
-    assert not seals.is_sealed(tmp_path, store.RESULTS)
 
 
 def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path) -> None:

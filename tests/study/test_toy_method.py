@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from shipid.answer.findings_simulation import smooth_by_construction
-from shipid.answer.memory import taken
+from shipid.answer.frames import provenance_words
 from shipid.answer.pages import report_content
 from shipid.data.dataset import read_dataset
 from shipid.hybrid.alone import Unchanged
@@ -23,7 +22,7 @@ from shipid.study.apply import predict_log
 from shipid.study.plan import judged_method, model_label, plain_rival
 from shipid.study.prepare import prepare
 from shipid.study.progress import Watch
-from shipid.study.results import provenance_words, read_results
+from shipid.study.results import read_results
 from tests.documented import module
 from tests.study.tiny import run_here, tiny_plan
 
@@ -95,8 +94,6 @@ def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monk
     mine = plan.methods[1]
     assert (mine.method.traits, mine.method.num_trials()) == (Traits(), None)
     assert plain_rival(plan) is None
-    assert not any(taken(mine, foundation) for foundation in plan.foundations)
-    assert not smooth_by_construction(mine.method, plan.study.prediction.horizon)
     Watch(plan, tmp_path)
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")

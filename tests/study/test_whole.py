@@ -16,7 +16,7 @@ import pytest
 
 from shipid.answer.pages import write_pages
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
-from shipid.data.windows import Instants, Windows, cut_windows, from_frame
+from shipid.data.windows import Windows, cut_windows, from_frame
 from shipid.errors import DocumentError
 from shipid.hybrid.features import Inputs, Memory, input_group
 from shipid.hybrid.methods import METHODS
@@ -114,7 +114,7 @@ def observed_once() -> Iterator[None]:
             seen[key] = run_observer(vessel, dataset, observer)
         return seen[key]
 
-    with patch.object(apply, "observe", once):
+    with patch.object(apply, "run_observer", once):
         yield
 
 
@@ -266,16 +266,6 @@ def test_no_input_sees_a_later_row(known: bool) -> None:
         np.testing.assert_allclose(changed[name][before], values[before], rtol=0.0, atol=1e-12, err_msg=name)
         if not name.startswith(tuple(f"{command.partition('.')[0]}." for command in spared)):
             assert not np.allclose(changed[name][~before], values[~before]), name
-
-
-def test_planned_orders_are_no_input_of_held_commands() -> None:
-    dataset = windy()
-    windows = cut_windows(dataset, horizon=5)
-    table = Inputs(tuple(dataset.commands)).table(Physics(None, 5, 1.0), windows.instants())
-    assert not any(".planned-" in name for name in table)
-    instants = Instants(windows.columns, planned=windows.planned)
-    held = Predictor(Physics(load_vessel("gunnerus-28.9"), 5, 1.0), "alone", METHODS["alone"].corrector({}))
-    np.testing.assert_array_equal(held.predict(instants), held.predict(windows.instants()))
 
 
 @pytest.mark.parametrize("past", [0.0, 8.0])
