@@ -170,8 +170,8 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     won = [int(which_significant(lead.above).sum()) for lead in leads]
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
-        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown to "
-        f"beat no physics ({grid.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown "
+        f"to beat no physics ({grid.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
         f"that most keep the lead is {keeps}: {later}"
     )
     numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
@@ -239,8 +239,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
     names = f" ({listed_names([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
     evidence = (
         f"at N_D = {grid.amounts[-1]}, {better.sum()} of {len(better)} high models "
-        f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
-        f"{plural_word(len(worst), 'is', 'are')} shown to be worse{names}"
+        f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), "
+        f"{len(worst)} {plural_word(len(worst), 'is', 'are')} shown to be worse{names}"
     )
     numbers = {
         f"share of high models shown to lead at N_D = {grid.amounts[-1]}": float(better.mean()),
@@ -261,8 +261,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         more = _chance_of_mean(of_worst - calm)
         moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
         evidence += (
-            f"; over {orders} nested orders H of these varies by {percent_text(of_worst.mean())}, of moderate models by "
-            f"{percent_text(calm.mean())}"
+            f"; over {orders} nested orders H of these varies by {percent_text(of_worst.mean())}, of moderate models "
+            f"by {percent_text(calm.mean())}"
         )
         numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
     one_sided = all_significant(lead.above) or all_significant(lead.below)

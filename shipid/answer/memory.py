@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.frames import insert_gaps, shown_runs
+from shipid.evidence import CellErrors, compare_cells
 from shipid.observer import filter_bank, run_observer
 from shipid.predictor import Predictor
 from shipid.study import store

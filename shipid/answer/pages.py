@@ -37,7 +37,6 @@ REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "memory": memory.memory_frame,
     "coverage": bands.coverage_frame,
     "coverage_groups": bands.groups_frame,
-    "coverage_runs": bands.worst_frame,
     "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
     "intervals": intervals_frame,

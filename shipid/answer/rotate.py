@@ -14,7 +14,7 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals, judge_rivals
+from shipid.answer.findings import FULL_SCALE_RULES, Rivals, judge_rivals
 from shipid.answer.verdict import JudgedClaim, leave_undecided
 from shipid.data.checks import copies_of_earlier_runs
 from shipid.data.dataset import Dataset

@@ -160,7 +160,7 @@ def band_radii(scores: Array, place: NDArray[np.int64]) -> Array:
 
 
 def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
-    order = _rising_order(scores)
+    order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")
     at = np.cumsum(runs.weight[rising_ranks]) - runs.weight[rising_ranks] / 2
@@ -172,13 +172,6 @@ def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
     rising: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
     return rising
-
-
-def _rising_order(values: Array) -> NDArray[np.int64]:
-    """Indices (S,) that sort values, equal ones in their order: a stable sort, at a sixth of its time without ties."""
-    order = np.argsort(values)
-    rising = values[order]
-    return order if np.all(rising[:-1] < rising[1:]) else np.argsort(values, kind="stable")
 
 
 def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:

@@ -26,8 +26,8 @@ PLAN_PARTS = 3  # of the horizon, in which a method sees planned commands
 def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
     """Planned commands as few numbers: the mean command less the present one in each part of the horizon.
 
-    The parts are nearly equal, `PLAN_PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
-    ..., so that the side and the sign of the command hold for its plan.
+    The parts are nearly equal, `PLAN_PARTS` of them or one a step. `port.alpha` (T, S) gives
+    `port.planned-1.alpha` (S,), ..., so that the side and the sign of the command hold for its plan.
     """
     means: dict[str, Array] = {}
     for name, values in planned.items():

@@ -219,7 +219,7 @@ class _ForceLoss:
         return values
 
     def solve(self, ridge: float, start: Array | None) -> tuple[Array, int]:
-        """Minimise the loss from a start (default: the weights of `first_output_weights`); weights and the number of iterations."""
+        """Minimise the loss from a start, by default `first_output_weights`; weights and the number of iterations."""
         from scipy.optimize import minimize  # a study is read without it
 
         def loss(weights: Array) -> tuple[float, Array]:

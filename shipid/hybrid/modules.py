@@ -37,11 +37,7 @@ from shipid.vessel.schema import term_blocks, upstream_signals
 
 Array = NDArray[np.float64]
 ALARM_MOMENTS = 2000  # moments from which the radius of the alarm is taken, about
-MODULE_ORDER = (
-    "rudders",
-    "thrusters",
-    "hull",
-)  # in which modules are switched off: a rudder needs the wash of its propeller
+MODULE_ORDER = "rudders", "thrusters", "hull"  # in which they are switched off: a rudder needs its propeller's wash
 
 
 def modules_of(vessel: Vessel | None) -> dict[str, tuple[str, ...]]:
@@ -67,7 +63,7 @@ def physics_without_modules(physics: Physics) -> list[Physics]:
 
 
 def module_accelerations(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
-    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as `step_alone` gives it."""
+    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as of `step_alone`."""
     after = np.stack([whole, *(step_alone(one, at) for one in reduced)], axis=1)
     return (after[:, :-1] - after[:, 1:]) / step
 

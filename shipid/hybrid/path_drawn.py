@@ -107,7 +107,7 @@ class PathDrawn(Searched):
 
     @property
     def memories(self) -> tuple[int, ...]:
-        """What validation chooses from, as places in `MEMORIES`: each of `MEMORY_CHOICES` without what the memory lacks."""
+        """What validation chooses from, as places in `MEMORIES`: all choices without what the memory lacks."""
         memory = self.memory
         of_kind = dict(zip(MEMORY_KINDS, (memory.history or memory.turned, memory.error, memory.observer), strict=True))
         choices = (*MEMORY_CHOICES, *OBSERVER_CHOICES) if self.memory.observer else MEMORY_CHOICES

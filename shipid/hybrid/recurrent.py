@@ -173,8 +173,7 @@ class RecurrentProblem(LearningProblem):
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""
-        from shipid.hybrid.gated import train_gated  # a study is read without PyTorch
-        from shipid.hybrid.training import Length
+        from shipid.hybrid.training import Length, train_gated  # a study is read without PyTorch
 
         method, training = self.method, self.task.folds[fold][0]
         reader, parts = self._reader(training), []

@@ -42,12 +42,8 @@ Seeing = tuple[SeenInputs, Tensor]
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
 SPARE_TRIALS = 4  # further trials whose errors without each run are kept
-LEAST_PIVOT = (
-    0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
-)
-ROUNDING = (
-    1e-3  # by which a sum of squares must be greater to be so for sure: a hundred times what `LEAST_PIVOT` leaves
-)
+LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
+ROUNDING = 1e-3  # by which a sum of squares must be greater for sure: a hundred times what `LEAST_PIVOT` leaves
 
 
 @dataclass(frozen=True)

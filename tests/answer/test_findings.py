@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from shipid.answer.findings import BAND_RULES as BANDS
+from shipid.answer.findings import FULL_SCALE_RULES as CLAIMS
 from shipid.answer.findings import judge_findings
-from shipid.answer.findings_bands import BAND_RULES as BANDS
-from shipid.answer.findings_full_scale import FULL_SCALE_RULES as CLAIMS
 from shipid.study.results import Results, read_results
 from tests.answer.byhand import RIVALS, grid
 from tests.study.tiny import run_here, tiny_plan

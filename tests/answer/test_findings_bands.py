@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings_bands import BAND_RULES, BandEvidence, Promise, Widths, judge_held_share
+from shipid.answer.findings import BAND_RULES, BandEvidence, Promise, Widths, judge_held_share
 from tests.answer.made_up import Size, table
 
 LEVEL = 0.9

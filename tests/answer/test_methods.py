@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 import shipid
-from shipid.answer.comparison import CellErrors
 from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS, method_table
+from shipid.evidence import CellErrors
 from shipid.study.schema import Claims
 
 
