@@ -94,16 +94,12 @@ class Rivals:
         less, more = sorted((self.good, self.bad), key=lambda model: self.table.mean(model, PHYSICS_ONLY))
         return less, more
 
-    def metres(self, model: str, place: int) -> str:
-        """Error of a model at an amount, or alone, in words."""
-        return length_in_metres(self.table.mean(model, place))
-
 
 def _judge_gain(rivals: Rivals) -> Judgement:
     table, last, models = rivals.table, rivals.last, (rivals.good, rivals.bad)
     gains = table.compare([[(1.0, model, PHYSICS_ONLY), (-1.0, model, last)] for model in models])
     parts = [
-        f"{m} {rivals.metres(m, PHYSICS_ONLY)} -> {rivals.metres(m, last)}, {difference_with_interval(gains, k)} less"
+        f"{m} {table.metres(m, PHYSICS_ONLY)} -> {table.metres(m, last)}, {difference_with_interval(gains, k)} less"
         for k, m in enumerate(models)
     ]
     good, bad = (table.mean(model, last) / table.mean(model, PHYSICS_ONLY) for model in models)
@@ -118,7 +114,7 @@ def _judge_equal(rivals: Rivals) -> Judgement:
     about = table.compare([[(1 + ABOUT, one, PHYSICS_ONLY), (-1.0, other, last)] for one, other in sides])
     by = table.compare([[(1.0, less, PHYSICS_ONLY), (-1.0, more, last)]])
     evidence = (
-        f"inaccurate and compensated {rivals.metres(more, last)}, accurate alone {rivals.metres(less, PHYSICS_ONLY)}: "
+        f"inaccurate and compensated {table.metres(more, last)}, accurate alone {table.metres(less, PHYSICS_ONLY)}: "
         f"{difference_with_interval(by)} less{'' if apart else f'; {EQUAL_A}'}"
     )
     decided = verdict_of(all_significant(about.above), all_significant(about.below))
@@ -317,8 +313,8 @@ def judge_width_trend(widths: Widths) -> Judgement:
         wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
         apart = all_significant(table.compare([[(1.0, bad, PHYSICS_ONLY), (-1.0, good, PHYSICS_ONLY)]]).above)
         evidence = (
-            f"at N_D = {table.amounts[last]} the mean radius of the band is {length_in_metres(table.mean(bad, last))} "
-            f"for {bad}, {length_in_metres(table.mean(good, last))} for {good}: {difference_with_interval(wider)} more"
+            f"at N_D = {table.amounts[last]} the mean radius of the band is {table.metres(bad, last)} "
+            f"for {bad}, {table.metres(good, last)} for {good}: {difference_with_interval(wider)} more"
             f"{'' if apart else f'; {EQUAL_A}'}"
         )
         decided = verdict_of(apart and all_significant(wider.above), apart and any_significant(wider.below))

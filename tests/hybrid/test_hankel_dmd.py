@@ -65,9 +65,3 @@ def test_trials_that_would_have_no_effect_are_refused():
         HankelDMD(trials=2)
     assert "\n" not in str(caught.value)
     assert HankelDMD(budget=10.0).num_trials() is None
-
-
-@pytest.mark.parametrize("wrong", [{"delays": ()}, {"samples": 0}, {"samples": -1}])
-def test_settings_that_no_fit_can_have(wrong):
-    with pytest.raises(DocumentError, match=next(iter(wrong))):
-        HankelDMD(**wrong)

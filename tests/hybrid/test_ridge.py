@@ -9,7 +9,6 @@ from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.ridge import (
     LEAST_PIVOT,
-    SPARE_TRIALS,
     _BestTrials,
     _coordinates_with_axes,
     _fold_blocks,
@@ -80,9 +79,6 @@ def tuned(columns, targets, setup, *, commands=TWINS, folds=FOLDS, seed=3):
 
 def predicted(fits, columns):
     return {key: compensation(one.corrector, columns) for key, one in fits.items()}
-
-
-# What is left out.
 
 
 def part_of(features, targets):
@@ -229,24 +225,6 @@ def test_all_windows_choose_the_ridge_of_a_part_or_one_that_is_smaller_by_its_sh
     assert _ridges_for_all([0.5], 0.1, np.array([0])).tolist() == [0]
 
 
-def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
-    """The networks are solved with all windows, so that what a part chooses costs little, on the paths and in bands."""
-    whole, part = (
-        tune(columns, TWINS, targets, FOLDS, recipe(trials=20, averaged=3, search_windows=most), seed=0)["rough"]
-        for most in (1000, 60)
-    )
-    judged = [np.square(one.left_out[:, ALL]).mean() for one in (whole, part)]
-    assert judged[1] == pytest.approx(judged[0], rel=0.1)
-    assert [trial["number"] for trial in part.trials] == list(range(20))
-    assert [trial["state"] for trial in part.trials].count("stopped") == 20 - 3 - SPARE_TRIALS
-    ended = [trial for trial in part.trials if trial["state"] == "complete"]
-    known = {trial["number"]: trial["value"] for trial in whole.trials}
-    assert all(trial["value"] >= known[trial["number"]] * (1 - 1e-6) for trial in ended)  # of fewer ridges
-    assert sum(trial["value"] == pytest.approx(known[trial["number"]], rel=1e-5) for trial in ended) > len(ended) / 2
-    best = sorted(ended, key=lambda trial: trial["value"])[:3]
-    assert best[0]["params"] == part.corrector.hyperparameters
-
-
 @pytest.mark.parametrize("search_windows", [1000, 40])
 @pytest.mark.parametrize("mirror", [0.0, 1.0])
 def test_errors_left_out_are_those_of_a_model_without_the_run(columns, targets, mirror, search_windows):
@@ -341,9 +319,6 @@ def test_the_compensator_is_the_mean_of_the_best_trials(columns, targets):
     assert len(tuned(columns, targets, recipe(averaged=9))["rough"].corrector.networks) == 6
 
 
-# Port and starboard.
-
-
 @pytest.mark.parametrize("commands", [TWINS, RUDDER])
 def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
     seen, new = drawn(commands), drawn(commands, seed=9)
@@ -355,15 +330,6 @@ def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
     np.testing.assert_allclose(there, here * [1.0, -1.0], atol=1e-12)
     plain = tuned(seen, {"any": paths}, recipe(mirror=0.0), commands=commands)["any"].corrector
     assert np.abs(compensation(plain, mirrored(new)) - compensation(plain, new) * [1.0, -1.0]).max() > 0.01
-
-
-# Company, order, luck.
-
-
-# What is learned.
-
-
-# Time.
 
 
 @pytest.mark.parametrize(("horizon", "terms"), [(30, 8), (15, 1), (50, 12), (2, 8), (1, 8)])
@@ -378,6 +344,3 @@ def test_shapes_are_orthonormal_and_hold_all_polynomials_from_0(horizon, terms):
         above = t ** (terms + 1)
         assert np.abs(basis @ (basis.T @ above) - above).max() > 1e-10
         assert np.abs(basis @ (basis.T @ np.ones(horizon)) - 1.0).max() > 1e-3  # an error starts from 0
-
-
-# Odd data.

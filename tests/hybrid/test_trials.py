@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import islice
 from typing import ClassVar
 
 import numpy as np
@@ -130,10 +129,3 @@ def test_a_trial_that_is_no_number_has_diverged(value, state):
     row = trial_row(3, {"ridge": 0.5}, value, 0.0, epochs=7)
     assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
     assert row["seconds"] > 0
-
-
-def test_with_a_budget_there_is_always_another_trial():
-    method = Counting(trials=3, budget=10.0)
-    assert len(list(islice(trial_points(method), 9))) == 9
-    assert len(diverged_result(method, trial_points(method)).trials) == 1
-    assert len(diverged_result(Counting(trials=3), trial_points(Counting(trials=3))).trials) == 3

@@ -48,7 +48,7 @@ def past(simulation: ReportContent) -> ReportContent:
         names = {key: row[key] for key in ("comparison", "model", "without", "with", "N_D")}
         time.append(pd.DataFrame({**names, "run": "M001", "t": t, "error_without": 1.0 + t / 100, "error_with": 1.3}))
     frames = {"observer": along(), "memory": sums, "memory_over_time": pd.concat(time, ignore_index=True)}
-    return replace(simulation, frames={**frames, "orders": pd.DataFrame({"run": "M001", "t": [5.0, 30.0]})})
+    return replace(simulation, frames=frames)
 
 
 @pytest.fixture
