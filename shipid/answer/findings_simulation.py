@@ -358,8 +358,8 @@ def _pairs_with_better_physics(grid: ErrorGrid, k: int) -> list[SavingPair]:
         SavingPair(
             ((1.0, other, PHYSICS_ONLY), (-1.0, model, k)),
             mean(model, PHYSICS_ONLY) / mean(other, PHYSICS_ONLY),
-            f"{model} ({table.metres(model, PHYSICS_ONLY)} alone) with {table.amounts[k]} runs {table.metres(model, k)} "
-            f"against {other} alone, {table.metres(other, PHYSICS_ONLY)}",
+            f"{model} ({table.metres(model, PHYSICS_ONLY)} alone) with {table.amounts[k]} runs "
+            f"{table.metres(model, k)} against {other} alone, {table.metres(other, PHYSICS_ONLY)}",
             ((1.0, model, PHYSICS_ONLY), (-1.0, other, PHYSICS_ONLY)),
         )
         for model in grid.moderate

@@ -111,13 +111,12 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
+    judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
     best = None
     for circle in (True, False):
         fitted = _fit_scores(runs, apart, normal, circle)
         whole = _radii_of_runs(fitted.scores.max(axis=0), runs)
-        size = (
-            float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[_place_of_middle_level(runs.count)]
-        )
+        size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[judged]
         if best is None or size < TIGHTER * best[0]:
             best = size, fitted, whole
     assert best is not None
@@ -281,8 +280,3 @@ def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:
     known, place = np.unique(names, return_inverse=True)
     sizes = np.bincount(place, minlength=len(known))
     return _RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
-
-
-def _place_of_middle_level(count: int) -> int:
-    """Index in `LEVELS` of 0.9, or of the highest level that so many runs can promise."""
-    return min(90, 100 * count // (count + 1)) - 1

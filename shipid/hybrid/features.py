@@ -148,21 +148,19 @@ class Inputs:
             for name in (*MOTIONS, *self.commands):
                 component, dot, signal = name.rpartition(".")
                 label = f"{component}{dot}past-{seconds:g}.{signal}"
-                columns[label] = self._before(instants, name, seconds, step) - instants.columns[name]
+                columns[label] = value_before(instants, name, seconds, step) - instants.columns[name]
         for seconds in self.memory.turned:
-            before = self._before(instants, "psi", seconds, step)
+            before = value_before(instants, "psi", seconds, step)
             columns[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
         return columns
 
-    @staticmethod
-    def _before(instants: Instants, name: str, seconds: float, step: float) -> Array:
-        steps = count_steps(seconds, step)
-        if name not in instants.past or len(instants.past[name]) < steps:
-            held = len(instants.past.get(name, ())) * step
-            raise DataError(
-                f"the method needs {seconds:g} s of the past of this column, there are {held:g} s", path=name
-            )
-        return np.asarray(instants.past[name][-steps])
+
+def value_before(instants: Instants, name: str, seconds: float, step: float) -> Array:
+    """Values (S,) of a column so long before the instants; DataError where their past is shorter."""
+    steps, held = count_steps(seconds, step), len(instants.past.get(name, ()))
+    if held < steps:
+        raise DataError(f"the method needs {seconds:g} s of the past, there are {held * step:g} s", path=name)
+    return np.asarray(instants.past[name][-steps])
 
 
 def input_group(name: str) -> str:
@@ -207,9 +205,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     """
     steps = count_steps(seconds, physics.step)
     past, columns = instants.past, instants.columns
-    if "x" not in past or len(past["x"]) < steps:
-        held = len(past.get("x", ())) * physics.step
-        raise DataError(f"the method needs {seconds:g} s of the past, there are {held:g} s", path="memory.error")
+    value_before(instants, "x", seconds, physics.step)
     then = {name: values[-steps] for name, values in past.items()}
     given = {name: values[-steps:] for name, values in past.items() if "." in name}
     before = replace(physics, horizon=steps)

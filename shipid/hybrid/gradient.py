@@ -17,10 +17,9 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.journal import distributions, frozen_trial
 from shipid.hybrid.method import Fitted, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.search import Search
+from shipid.hybrid.search import Search, best_trials, trial_row
 from shipid.hybrid.settings import Searched, seed_of
 from shipid.hybrid.training import Length, StackSettings, train_stack
-from shipid.hybrid.trials import best_trials, trial_row
 
 Stack = Mapping[str, Mapping[str, float]]
 """Models that train together: name -> hyperparameters."""

@@ -22,11 +22,10 @@ from shipid.document import LEAST_NUMBER
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_values
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import ridge_values
 from shipid.hybrid.units import solve_ridges
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel

@@ -284,7 +284,7 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool)
             parse_model(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)
         ]
     except (DocumentError, TypeError) as error:
-        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.trials.trial_row") from None
+        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.search.trial_row") from None
     if one.left_out is not None and np.shape(as_float_array(f"{where}: left_out", one.left_out, DataError)) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
     if one.corrector is None:

@@ -30,7 +30,7 @@ from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import Stepped, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs, Units, solve_ridges
+from shipid.hybrid.units import SeenInputs, Units, apply_blocks, solve_ridges
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import term_blocks, upstream_signals
@@ -145,9 +145,7 @@ class ModulesCorrector(Stored):
         """Factor of each module (S, K)."""
         table = feature_table(at.columns, self.commands)
         even, _ = self.units.parts(table)
-        count = 1 if self.weights.ndim == 2 else len(self.weights)
-        weights = self.weights.reshape(count, *self.weights.shape[-2:]).swapaxes(1, 2)
-        raw = (even.reshape(count, -1, even.shape[1]) @ weights).reshape(len(even), -1)
+        raw = apply_blocks(even, self.weights.swapaxes(-1, -2))
         scale: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
         return scale
 

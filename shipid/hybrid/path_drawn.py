@@ -16,8 +16,8 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.search import ridge_values, setting_at_share
 from shipid.hybrid.settings import Probability, Scale, Searched, spread_points
-from shipid.hybrid.trials import ridge_values, setting_at_share
 
 RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory

@@ -77,6 +77,14 @@ class Units(Stored):
         return np.concatenate([one, (plain + image) / 2], axis=1), (plain - image) / 2
 
 
+def apply_blocks(features: Array, weights: Array) -> Array:
+    """Return features (S, M) @ weights (M, K); of weights (R, M, K) each takes one of R blocks of features (R S, M)."""
+    if weights.ndim == 2:
+        return features @ weights
+    blocks: Array = features.reshape(len(weights), -1, features.shape[1]) @ weights
+    return blocks.reshape(len(features), -1)
+
+
 def solve_ridges(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:
     """Weights (R, M, K) that minimise mean |targets - features W|^2 + ridge |penalty W|^2 for R ridges.
 

@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 import pytest
 
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.alone import Alone, Unchanged
+from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS, method_kind, method_of
+from shipid.hybrid.settings import Searched
 
 
 class Bare(Method):
@@ -21,10 +22,13 @@ class Bare(Method):
         return {}
 
 
-class Mine(Alone):
+class Mine(Searched):
     """A method with all that is asked."""
 
     corrector: ClassVar[type[Any]] = Unchanged
+
+    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+        return {}
 
 
 def of(**parts: Any) -> type[Method]:

@@ -15,7 +15,7 @@ from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, input_table_key, shared_tables
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.trials import trial_row
+from shipid.hybrid.search import trial_row
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
 

@@ -85,7 +85,6 @@ def test_the_observer_says_its_numbers(past: ReportContent) -> None:
     assert "1.50 on average" in figure.takeaway
     assert f"{100 * np.exp(-1.5):.0f} % is left 30 s ahead" in figure.how
     plot = views(figure)["0"][0]
-    assert [shape.x0 for shape in plot.layout.shapes] == [5.0, 30.0]
     force = next(trace for trace in plot.data if trace.name == "ahead")
     assert force.y == pytest.approx(-2.0)  # cm/s^2
     moment = next(trace for trace in plot.data if trace.name == "yaw")
