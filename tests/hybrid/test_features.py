@@ -50,13 +50,6 @@ def test_columns_that_differ_by_rounding_are_one_and_vary_by_more(columns):
     assert "u" not in chosen
 
 
-def test_constant_columns_are_dropped_and_motions_never_merged(columns):
-    columns["port.n"][:] = 2.4
-    columns["v"] = columns["u"].copy()
-    chosen = choose_features(feature_table(columns, COMMANDS[:2]))
-    assert list(chosen) == ["u", "v", "r", "port.alpha", "u_rw", "v_rw"]
-
-
 def test_relative_wind_by_hand():
     columns = {name: np.array([value]) for name, value in {"u": 4.0, "v": 0.5, "r": 0.0, "V_w": 6.0}.items()}
     head = feature_table(columns | {"psi": np.zeros(1), "beta_w": np.array([np.pi])}, ())

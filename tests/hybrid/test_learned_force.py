@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -61,13 +60,6 @@ def test_it_learns_most_of_a_wrong_resistance(windows: Windows) -> None:
     best = min(fit.trials, key=lambda row: row["value"])
     assert fit.corrector.hyperparameters == best["params"]
     assert [row["params"]["ridge"] for row in fit.trials] == pytest.approx([1e-2, 1e-4])  # from stiff to soft
-
-
-@pytest.mark.parametrize(
-    ("given", "count"), [({}, 3), ({"ridge": 0.1}, 1), ({"trials": 2}, 2), ({"budget": 9.0}, None)]
-)
-def test_each_ridge_is_a_trial(given: dict[str, Any], count: int | None) -> None:
-    assert LearnedForce(**given).num_trials() == count
 
 
 def test_the_force_is_bounded_by_what_the_ship_is() -> None:

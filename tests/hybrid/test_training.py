@@ -104,15 +104,6 @@ def test_early_stopping_keeps_the_best_epoch(problem):
     np.testing.assert_array_equal(stopped.layers[0][0][0], kept.layers[0][0][0])
 
 
-@pytest.mark.parametrize("rate", [0.1, 0.5, 0.9])
-def test_drop_out_keeps_the_expectation(rate):
-    mask = training.draw_dropout((0.0, rate), (400, 500), [torch.Generator().manual_seed(k) for k in (0, 1)])
-    assert (mask[0] == 1).all()
-    share = (mask[1] == 0).double().mean().item()
-    assert share == pytest.approx(rate, abs=0.005)
-    assert mask[1].double().mean().item() == pytest.approx(1.0, abs=5 * (rate / (1 - rate) / 2e5) ** 0.5)
-
-
 def test_a_diverged_member_harms_nobody(problem):
     x, y = problem
     broken = y.copy()
