@@ -93,9 +93,7 @@ def observer_figure(content: ReportContent) -> PageFigure | None:
         f"{_fade_words(frame)}",
         alternative=f"Lines over the time of one test run, one below the other: {listed_names(words, 6)}.",
         height=OBSERVER_MARGIN + len(rows) * (OBSERVER_ROW + OBSERVER_GAP),
-        draw=lambda run: [
-            _draw_observer(frame[frame.run.eq(run)], rows)
-        ],
+        draw=lambda run: [_draw_observer(frame[frame.run.eq(run)], rows)],
         controls=[Control("Test run", runs)],
         chips=[
             Chip("key:measured", "measured", OBSERVER_INKS["measured"], "dot"),
