@@ -26,7 +26,7 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.trials import trial_row
+from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _split_folds, fit
 from shipid.vessel.load import Vessel, load_vessel

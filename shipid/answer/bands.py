@@ -1,11 +1,10 @@
-"""Bands of a study: what share of test paths they hold, by model, kind of manoeuvre, step, speed and run.
+"""Bands of a study: what share of test paths they hold, by model, kind of manoeuvre and step.
 
 A share, or coverage, is the mean over runs: a long run counts as much as a short one, as the promise does.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -25,7 +24,6 @@ from shipid.units import level_text, percent_text, plural_word
 Array = np.ndarray
 REPORTED_LEVELS = (0.5, 0.8, 0.9, 0.95)
 """Nominal levels that the report compares with what was measured."""
-SPEEDS = 3  # groups of equal size
 NEW_KIND = "no run of this kind calibrated the band: nothing is promised"
 
 
@@ -77,18 +75,14 @@ def coverage_frame(results: Results) -> pd.DataFrame:
 
 @lru_cache(maxsize=1)
 def groups_frame(results: Results) -> pd.DataFrame:
-    """Coverage at the level of the study at the largest N_D, by kind of manoeuvre, time ahead and speed.
+    """Coverage at the level of the study at the largest N_D, by kind of manoeuvre and time ahead.
 
-    Columns: model, by (`kind`, `ahead`, `speed`), group, coverage, low, high, width [m], runs (test runs in the group),
+    Columns: model, by (`kind`, `ahead`), group, coverage, low, high, width [m], runs (test runs in the group),
     note (a kind that too few runs calibrated). The band is the one for all kinds: the coverage is that
     of a ship whose kind of manoeuvre is not given. By time ahead: share of the positions at that step alone.
     """
     level, test, rows = results.plan.study.bands.level, results.test, []
     kind = np.array([results.kinds[str(run)] for run in test.run])
-    speed = np.hypot(test.columns["u"], test.columns["v"])
-    edges = np.quantile(speed, np.linspace(0, 1, SPEEDS + 1))
-    decimals = max(0, 1 - math.floor(math.log10(max(float(edges[-1]), 1e-3))))  # two digits of the greatest speed
-    part = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, SPEEDS - 1)
     steps = np.unique(np.linspace(0, test.horizon - 1, 5).round().astype(int))
     for row, region, errors in _largest_regions(results):
         bands, held, radius = results.bands[row["cell"]], region.holds(errors), region.radius.mean(axis=0)
@@ -101,9 +95,6 @@ def groups_frame(results: Results) -> pd.DataFrame:
             elif not bands.promises(level, name):
                 note = f"{count_runs(known)} of this kind calibrated the band: too few"
             groups.append(("kind", name, kind == name, held, radius, note))
-        for place in np.unique(part):
-            label = f"{edges[place]:.{decimals}f} to {edges[place + 1]:.{decimals}f} m/s"
-            groups.append(("speed", label, part == place, held, radius, ""))
         for step in steps:
             label = f"{(step + 1) * test.step:g} s"
             groups.append(("ahead", label, everywhere, reach[step], region.radius[step], ""))
@@ -116,7 +107,7 @@ def groups_frame(results: Results) -> pd.DataFrame:
 
 
 def answer_on_bands(results: Results) -> list[tuple[str, str]]:
-    """What bands promise and held, and which kinds of manoeuvre had too few runs, each with the anchor of its figure.
+    """What bands promise and held, and for which manoeuvres they promise nothing, each with the anchor of its figure.
 
     Means over the models at the largest N_D that has bands, without families whose numbers were set from test runs.
     """
@@ -139,14 +130,9 @@ def answer_on_bands(results: Results) -> list[tuple[str, str]]:
     )
     groups = groups_frame(results)
     new = set(groups.loc[groups["note"].eq(NEW_KIND), "group"])
-    few = {*groups.loc[groups["by"].eq("kind") & groups["note"].ne(""), "group"]} - new
     sentences = [(sentence, "coverage")]
     if new:
         text = f"Nothing is promised for {listed_names(sorted(new))}: no such run calibrated the bands."
-        sentences.append((text, "coverage-groups"))
-    if few:
-        kinds = listed_names(sorted(few))
-        text = f"Too few runs calibrate a band of {level_text(level)} for one kind of manoeuvre alone: {kinds}."
         sentences.append((text, "coverage-groups"))
     return sentences
 
@@ -156,21 +142,6 @@ def of_methods(results: Results, names: Sequence[str]) -> str:
     if len(results.plan.methods) == 1:
         return ""
     return f" of the {plural_word(len(names), 'method')} {listed_names([repr(str(name)) for name in names])}"
-
-
-def worst_frame(results: Results) -> pd.DataFrame:
-    """Test runs that pay: share of their paths in the band of the study's level, at the largest N_D, lowest first.
-
-    Columns: model, run, kind, coverage, reach (the greatest error over its band, 1 is the border).
-    """
-    rows = []
-    for row, region, errors in _largest_regions(results):
-        reach = region.reach(errors).max(axis=0)
-        for run in results.test.spans:
-            mine = reach[results.test.run == run]
-            rows.append((row["model"], run, results.kinds[run], float((mine <= 1).mean()), float(mine.max())))
-    frame = pd.DataFrame(rows, columns=["model", "run", "kind", "coverage", "reach"])
-    return frame.sort_values(["coverage", "reach"], ascending=[True, False])
 
 
 def refused_frame(results: Results) -> pd.DataFrame:

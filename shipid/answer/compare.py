@@ -20,13 +20,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid import document as documents
-from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.findings import judge_findings
 from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
 from shipid.arguments import as_path
 from shipid.document import Document
 from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
-from shipid.evidence import which_significant, world_interval
+from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
 from shipid.files import quote_argument
 from shipid.metrics import error_of_windows, position_error
 from shipid.study.declared import NO_METHOD, NO_MODEL

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.answer.verdict import length_in_metres
 from shipid.evidence import Differences, paired_difference, training_noise
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
@@ -71,6 +72,10 @@ class ErrorTable:
     def mean(self, model: str, place: int) -> float:
         """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
         return float(self.by_run(model, place) @ self.weights)
+
+    def metres(self, model: str, place: int) -> str:
+        """Error of a model at an amount, or of its physics alone, in words."""
+        return length_in_metres(self.mean(model, place))
 
     def interval(self, model: str, place: int) -> tuple[float, float]:
         """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""

@@ -1,13 +1,370 @@
-"""Verdicts on what a study claims: R1-R4 at full scale, S1-S7 on the map H(A, N_D), B1-B2 on bands."""
+"""Findings of a study: which claims it judges, R1-R4 at full scale, and B1-B2 on bands.
+
+R1-R4 (method, section 5) judge accurate and inaccurate physics at the largest amount of data, from paired differences
+over test manoeuvres; "shown" means a 95 % interval free of 0.
+
+R1 : both models have H below A.
+R2 : H of the inaccurate model is less than 10 % above A of the accurate one: the one whose A is smaller on the test,
+    whichever the study calls accurate. Where that is not shown of either, it must hold of both.
+R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap are above 0, where a gap is the error
+    of the model with the larger A less that of the other.
+R4 : at every step ahead no physics has a larger error than every other predictor, physics alone included; refuted
+    if one of them is worse over the whole horizon.
+
+For B1 and B2 the width of a band of the study's level is its mean radius [m] over the horizon, a mean over windows of
+each test manoeuvre; it is judged as errors are (`shipid.evidence`).
+
+B1 : at every N_D that has bands the width rises along ln A over the physics models, and it would hardly do so if the
+    models had their A in any other order. At full scale, with one accurate and one inaccurate model: at the largest N_D
+    the band of the model whose A is shown to be larger is wider, whichever the study calls accurate.
+B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models; each
+    test manoeuvre counts the same, however long it is, as in the promise.
+    Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level. Manoeuvres of
+    a kind that no run of calibration has are left out.
+"""
 
 from __future__ import annotations
 
-from shipid.answer.findings_bands import BAND_RULES, band_findings
-from shipid.answer.findings_full_scale import FULL_SCALE_RULES, full_scale_findings
-from shipid.answer.findings_simulation import SIMULATION_RULES, simulation_findings
-from shipid.answer.verdict import JudgedClaim, leave_undecided
-from shipid.study.plan import unfair_reason
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from shipid.answer.bands import cell_regions, of_methods
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
+from shipid.answer.findings_simulation import (
+    SIMULATION_RULES,
+    simulation_findings,
+    trend_over_accuracy,
+    trend_verdict,
+)
+from shipid.answer.verdict import (
+    EQUAL_A,
+    ClaimRule,
+    JudgedClaim,
+    Judgement,
+    Undecided,
+    count_manoeuvres,
+    difference_with_interval,
+    judge_claims,
+    least_to_greatest,
+    leave_undecided,
+    length_in_metres,
+    quoted_model,
+    too_few_manoeuvres,
+    verdict_of,
+)
+from shipid.evidence import Differences, all_significant, any_significant, paired_difference, share_interval
+from shipid.metrics import coverage_share, position_error, rank_correlation
+from shipid.report.wording import listed_names
+from shipid.study.declared import NO_MODEL
+from shipid.study.plan import judged_method, unfair_reason
 from shipid.study.results import Results
+from shipid.units import level_text, percent_text
+
+Array = NDArray[np.float64]
+ABOUT = 0.10  # R2: "about as good" means a mean error at most 10 % above
+BROKEN_BY = 0.05  # B2: a share that lies so far below its level is a broken promise
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """What R1-R4 compare at one amount of data.
+
+    table : errors by test manoeuvre; its last amount counts.
+    good, bad : the accurate and the inaccurate model.
+    steps : predictor -> (T, R) mean error [m] at every step ahead; `none` and all others that do not see the test.
+    """
+
+    table: ErrorTable
+    good: str
+    bad: str
+    steps: dict[str, Array]
+
+    @property
+    def last(self) -> int:
+        """Place of the amount of data that counts."""
+        return len(self.table.amounts) - 1
+
+    @property
+    def by_accuracy(self) -> tuple[str, str]:
+        """The model with the smaller A on the test, and the other: the names of the study say nothing of the test."""
+        less, more = sorted((self.good, self.bad), key=lambda model: self.table.mean(model, PHYSICS_ONLY))
+        return less, more
+
+
+def _judge_gain(rivals: Rivals) -> Judgement:
+    table, last, models = rivals.table, rivals.last, (rivals.good, rivals.bad)
+    gains = table.compare([[(1.0, model, PHYSICS_ONLY), (-1.0, model, last)] for model in models])
+    parts = [
+        f"{m} {table.metres(m, PHYSICS_ONLY)} -> {table.metres(m, last)}, {difference_with_interval(gains, k)} less"
+        for k, m in enumerate(models)
+    ]
+    good, bad = (table.mean(model, last) / table.mean(model, PHYSICS_ONLY) for model in models)
+    decided = verdict_of(all_significant(gains.above), any_significant(gains.below))
+    return decided, "; ".join(parts), {"H / A, accurate": good, "H / A, inaccurate": bad}
+
+
+def _judge_equal(rivals: Rivals) -> Judgement:
+    table, last, (less, more) = rivals.table, rivals.last, rivals.by_accuracy
+    apart = all_significant(table.compare([[(1.0, more, PHYSICS_ONLY), (-1.0, less, PHYSICS_ONLY)]]).above)
+    sides = [(less, more)] if apart else [(less, more), (more, less)]
+    about = table.compare([[(1 + ABOUT, one, PHYSICS_ONLY), (-1.0, other, last)] for one, other in sides])
+    by = table.compare([[(1.0, less, PHYSICS_ONLY), (-1.0, more, last)]])
+    evidence = (
+        f"inaccurate and compensated {table.metres(more, last)}, accurate alone {table.metres(less, PHYSICS_ONLY)}: "
+        f"{difference_with_interval(by)} less{'' if apart else f'; {EQUAL_A}'}"
+    )
+    decided = verdict_of(all_significant(about.above), all_significant(about.below))
+    return decided, evidence, {"H inaccurate / A accurate": table.mean(more, last) / table.mean(less, PHYSICS_ONLY)}
+
+
+def _judge_gap(rivals: Rivals) -> Judgement:
+    table, last, (less, more) = rivals.table, rivals.last, rivals.by_accuracy
+    gap = [(1.0, more, PHYSICS_ONLY), (-1.0, less, PHYSICS_ONLY)]
+    gaps = table.compare([[*gap, (sign, more, last), (-sign, less, last)] for sign in (-1.0, 1.0)])
+    before, after = (abs(table.mean(rivals.bad, at) - table.mean(rivals.good, at)) for at in (PHYSICS_ONLY, last))
+    counts = 0 if gaps.mean[0] < gaps.mean[1] else 1  # the gap of H has the sign of that of A, or not
+    evidence = (
+        f"gap {length_in_metres(before)} before, {length_in_metres(after)} after: "
+        f"{difference_with_interval(gaps, counts)} less"
+    )
+    decided = verdict_of(all_significant(gaps.above), any_significant(gaps.below))
+    return decided, evidence, {"gap before [m]": before, "gap after [m]": after}
+
+
+def _judge_worst(rivals: Rivals) -> Judgement:
+    table, names = rivals.table, list(rivals.steps)
+    means = np.stack([error @ table.weights for error in rivals.steps.values()])
+    most = np.bincount(means.argmax(axis=0), minlength=len(names))
+    share, worst = float(most[names.index(NO_MODEL)] / most.sum()), quoted_model(names[int(most.argmax())])
+    pure, others = rivals.steps[NO_MODEL], [error for name, error in rivals.steps.items() if name != NO_MODEL]
+
+    over_horizon = [error.mean(axis=0)[None] for error in (pure, *others)]
+    each, whole = _lead_of_others(table, pure, others), _lead_of_others(table, over_horizon[0], over_horizon[1:])
+    evidence = (
+        f"{quoted_model(NO_MODEL)} is worst at {percent_text(share)} of the steps, physics alone included; "
+        f"most often worst: {worst}"
+        if len(pure) > 1
+        else f"worst over the horizon, physics alone included: {worst}"
+    )
+    decided = verdict_of(all_significant(each.above), any_significant(whole.below))
+    return decided, evidence, {"share of steps where it is worst": share}
+
+
+def _lead_of_others(table: ErrorTable, pure: Array, others: list[Array]) -> Differences:
+    """How much smaller [m] than errors (T, R) without physics those of other predictors are, step by step."""
+    noise = [np.hypot(pure @ table.weights, error @ table.weights) for error in others]
+    ahead = np.concatenate([pure - error for error in others])
+    return paired_difference(ahead, table.counts, float(table.noise[-1]) * np.concatenate(noise))
+
+
+FULL_SCALE_RULES = {
+    "R1": ClaimRule("compensated physics beats the physics alone, accurate or not", _judge_gain),
+    "R2": ClaimRule("the inaccurate model, compensated, is about as good as the accurate physics alone", _judge_equal),
+    "R3": ClaimRule("the gap between accurate and inaccurate physics shrinks after compensation", _judge_gap),
+    "R4": ClaimRule(f"{quoted_model(NO_MODEL)} is worst over the whole horizon", _judge_worst),
+}
+
+
+def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[JudgedClaim]:
+    """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval, which needs a remedy."""
+    few = too_few_manoeuvres(rivals.table.runs)
+    return judge_claims(FULL_SCALE_RULES, rivals, f"{few}: {remedy}" if few else count_manoeuvres(rivals.table.runs))
+
+
+def full_scale_findings(results: Results) -> list[JudgedClaim]:
+    """R1-R4 on the test manoeuvres of a study."""
+    claims = results.plan.study.claims
+    assert claims is not None
+    names = {one.family: one.name for one in results.plan.foundations if one.family in claims.roles.values()}
+    good, bad = names[str(claims.accurate)], names[str(claims.inaccurate)]
+    table = error_table(results, (good, bad))
+    if any(name not in table.H for name in (good, bad, NO_MODEL)):
+        return leave_undecided(FULL_SCALE_RULES, "a cell that it needs has failed or is missing")
+    if any(name not in table.A for name in (good, bad)):
+        return leave_undecided(
+            FULL_SCALE_RULES, "the physics of a claim is identified again in every cell, so it has no single A"
+        )
+    return judge_rivals(Rivals(table, good, bad, _errors_by_step(results, table.amounts[-1])))
+
+
+def _errors_by_step(results: Results, N_D: int) -> dict[str, Array]:
+    """(T, R) errors by step of every predictor at an amount of data, mean over seeds, and of physics alone."""
+    aside = {one.name for one in results.plan.foundations if one.family in results.aside}
+    names = np.unique(results.test.run)
+
+    def by_step(path: Array) -> Array:
+        error = position_error(path, results.test.future)
+        return np.stack([error[:, results.test.run == name].mean(axis=1) for name in names], axis=1)
+
+    parts: dict[str, list[Array]] = {}
+    cells = results.judged_cells
+    for row in cells[cells["N_D"] == N_D].itertuples():
+        if row.cell in results.paths and row.model not in aside:
+            parts.setdefault(str(row.model), []).append(by_step(results.paths[str(row.cell)]))
+    for model, path in results.physics.items():
+        if model not in (NO_MODEL, *aside) and np.isfinite(path).all():
+            parts[f"{model} alone"] = [by_step(path)]
+    return {name: np.mean(errors, axis=0) for name, errors in parts.items()}
+
+
+@dataclass(frozen=True)
+class Widths:
+    """What B1 compares: widths in place of H, at the amounts of data at which every model has a band.
+
+    physics : models with physics. rivals : whether they are the accurate and the inaccurate model.
+    """
+
+    table: ErrorTable
+    physics: tuple[str, ...]
+    rivals: bool = False
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What B2 judges: the share (S,) of models whose band of a level holds the path of a window, and its run (S,).
+
+    kinds : (S,) kind of manoeuvre of each window. calibrated : kinds that calibrated every band; None if unknown.
+    """
+
+    held: Array
+    run: NDArray[np.str_]
+    level: float
+    kinds: NDArray[np.str_] | None = None
+    calibrated: frozenset[str] | None = None
+
+
+@dataclass(frozen=True)
+class BandEvidence:
+    """What B1 and B2 judge, and the shares of paths that the bands of B1 hold."""
+
+    widths: Widths
+    promise: Promise
+    shares: Sequence[float] = ()
+
+
+def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[JudgedClaim]:
+    """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
+
+    rivals : as in `Widths`.
+    """
+    if not results.complete:
+        return leave_undecided(BAND_RULES, results.missing)
+    level, run, of = (
+        results.plan.study.bands.level,
+        results.test.run,
+        of_methods(results, [judged_method(results.plan)]),
+    )
+    widths, held = {}, {}
+    for row, by_level, apart in cell_regions(results, [level]):
+        region, cell = by_level[level], str(row["cell"])
+        widths[cell], held[cell] = results.by_run(region.radius.mean(axis=0)), region.holds(apart)
+    errors, cells = error_table(results, physics), results.judged_cells
+    cells = cells[cells["foundation"].isin(errors.H)]  # a model with a failed cell may have no band
+    table = _width_table(errors, cells[~cells["N_D"].isin(cells["N_D"][~cells["cell"].isin(widths)])], widths)
+    sound = tuple(name for name in physics if name in table.H and name in table.A)
+    if not table.amounts or len(sound) < 2:
+        return leave_undecided(BAND_RULES, f"no two models with physics{of} have a band of {level_text(level)}")
+    cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
+    of_model = {str(name): [held[cell] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
+    kinds = np.array([results.kinds[str(name)] for name in run])
+    known = [frozenset(results.bands[cell].kinds) for cell in cells["cell"] if results.bands[cell].kinds]
+    case = BandEvidence(
+        Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals),
+        Promise(
+            np.mean([one for ones in of_model.values() for one in ones], axis=0),
+            run,
+            level,
+            kinds,
+            frozenset.intersection(*known) if known else None,
+        ),
+        [coverage_share(np.mean(of_model[name], axis=0), run) for name in sound],
+    )
+    notes = (f"bands{of}" if of else "", too_few_manoeuvres(table.runs))
+    return judge_claims(BAND_RULES, case, "; ".join(note for note in notes if note))
+
+
+def _width_table(errors: ErrorTable, cells: pd.DataFrame, widths: Mapping[str, Array]) -> ErrorTable:
+    """Widths [m] of cells by test manoeuvre in place of H."""
+    amounts = tuple(N for N in errors.amounts if N in set(cells["N_D"]))
+    H = {
+        str(name): np.array([[widths[cell] for cell in mine["cell"][mine["N_D"] == N]] for N in amounts])
+        for name, mine in cells.sort_values("seed", kind="stable").groupby("foundation")
+    }
+    return replace(errors, amounts=amounts, H=H)
+
+
+def _judge_widths(bands: BandEvidence) -> Judgement:
+    decided, evidence, numbers = judge_width_trend(bands.widths)
+    if not numbers:
+        return decided, evidence, numbers
+    hold = least_to_greatest(percent_text(min(bands.shares)), percent_text(max(bands.shares)))
+    return decided, f"{evidence}; these bands hold {hold} of whole paths", numbers
+
+
+def judge_width_trend(widths: Widths) -> Judgement:
+    """Verdict on B1, without the shares that the bands hold."""
+    table, models, last = widths.table, widths.physics, len(widths.table.amounts) - 1
+    if widths.rivals:
+        good, bad = sorted(models, key=lambda model: table.mean(model, PHYSICS_ONLY))
+        wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
+        apart = all_significant(table.compare([[(1.0, bad, PHYSICS_ONLY), (-1.0, good, PHYSICS_ONLY)]]).above)
+        evidence = (
+            f"at N_D = {table.amounts[last]} the mean radius of the band is {table.metres(bad, last)} "
+            f"for {bad}, {table.metres(good, last)} for {good}: {difference_with_interval(wider)} more"
+            f"{'' if apart else f'; {EQUAL_A}'}"
+        )
+        decided = verdict_of(apart and all_significant(wider.above), apart and any_significant(wider.below))
+        return decided, evidence, {"ratio of widths": table.mean(bad, last) / table.mean(good, last)}
+    A, each = trend_over_accuracy(table, models)
+    slopes = table.compare(each)
+    order = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
+    rises = [rank_correlation(A, values) for values in order]
+    ends = [f"{difference_with_interval(slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
+    evidence = (
+        f"for twice the A the mean radius rises by {' and by '.join(ends)}; rank correlation of width and A "
+        f"{least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
+    )
+    numbers = {"least rank correlation of width and A": min(rises)}
+    numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(slopes.mean[last])}
+    return trend_verdict(slopes, A, order), evidence, numbers
+
+
+def _judge_promise(bands: BandEvidence) -> Judgement:
+    """Judge test runs of the kinds that runs of calibration have: bands promise nothing for others."""
+    promise, left_out = bands.promise, ""
+    if promise.kinds is not None and promise.calibrated is not None:
+        like = np.isin(promise.kinds, list(promise.calibrated))
+        these, count = sorted(set(promise.kinds[~like])), len(set(promise.run[~like]))
+        if count:
+            left_out = f"no run of the kind {listed_names(these)} calibrated them, so they promise nothing for "
+            left_out += count_manoeuvres(count)
+        if not like.any():
+            raise Undecided(left_out)
+        promise = replace(promise, held=promise.held[like], run=promise.run[like])
+    decided, evidence, numbers = judge_held_share(promise)
+    return decided, f"{evidence}; {left_out}" if left_out else evidence, numbers
+
+
+def judge_held_share(promise: Promise) -> Judgement:
+    """Verdict on B2 over all of these test runs."""
+    low, high = share_interval(promise.held, promise.run)
+    share, sizes = coverage_share(promise.held, promise.run), np.unique(promise.run, return_counts=True)[1]
+    few, level = too_few_manoeuvres(len(sizes)), promise.level
+    interval = "" if few else f" [{percent_text(low)}, {percent_text(high)}]"
+    each = "" if (sizes == sizes[0]).all() else ", each counts the same"
+    hold = f"bands of {level_text(level)} hold {percent_text(share)}{interval} of whole paths"
+    decided = "undecided" if few else verdict_of(low >= level - BROKEN_BY, high < level)
+    return decided, f"{hold} ({count_manoeuvres(len(sizes))}{each})", {f"share at {level_text(level)}": share}
+
+
+BAND_RULES: dict[str, ClaimRule[BandEvidence]] = {
+    "B1": ClaimRule("more accurate physics gives a narrower band", _judge_widths),
+    "B2": ClaimRule("bands hold the share of whole paths that they promise", _judge_promise),
+}
 
 
 def judge_findings(results: Results) -> list[JudgedClaim]:

@@ -99,21 +99,12 @@ class ErrorGrid:
         """Members of both families."""
         return (*self.moderate, *self.high)
 
-    @property
-    def amounts(self) -> tuple[int, ...]:
-        """N_D, rising."""
-        return self.table.amounts
-
     def members(self, family: str) -> tuple[str, ...]:
         """Members of a family with a result in every cell, of both for `physics`; Undecided without one."""
         names: tuple[str, ...] = getattr(self, family)
         if not names:
             raise Undecided(f"no {family} model has a result in every cell")
         return names
-
-    def metres(self, model: str, place: int) -> str:
-        """H of a model, or A where its physics is alone, in words."""
-        return length_in_metres(self.table.mean(model, place))
 
 
 def simulation_findings(results: Results) -> list[JudgedClaim]:
@@ -160,7 +151,7 @@ def _range_of(differences: Differences) -> str:
 
 
 def _judge_lead(grid: ErrorGrid) -> Judgement:
-    moderate, amounts, table = grid.members("moderate"), grid.amounts, grid.table
+    moderate, amounts, table = grid.members("moderate"), grid.table.amounts, grid.table
     count, most = len(moderate), len(moderate) // 2 + 1
     leads = [table.lead(NO_MODEL, moderate, place) for place in range(len(amounts))]
     begins = verdict_of(all_significant(leads[0].above), any_significant(leads[0].below))
@@ -170,8 +161,8 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     won = [int(which_significant(lead.above).sum()) for lead in leads]
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
-        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown to "
-        f"beat no physics ({grid.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
+        f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown "
+        f"to beat no physics ({grid.table.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
         f"that most keep the lead is {keeps}: {later}"
     )
     numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
@@ -179,8 +170,8 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
 
 
 def _judge_fall(grid: ErrorGrid) -> Judgement:
-    weights = -doubling_weights(np.log(np.array(grid.amounts, dtype=float)))
-    models, (first, *_, last) = [*grid.physics, NO_MODEL], grid.amounts
+    weights = -doubling_weights(np.log(np.array(grid.table.amounts, dtype=float)))
+    models, (first, *_, last) = [*grid.physics, NO_MODEL], grid.table.amounts
     falls = grid.table.compare([[(float(w), model, k) for k, w in enumerate(weights)] for model in models])
     fallen = which_significant(falls.above)
     end = len(weights) - 1
@@ -216,7 +207,7 @@ def trend_verdict(slopes: Differences, A: Array, order: Array) -> Verdict:
 def _judge_rise(grid: ErrorGrid) -> Judgement:
     table, models = grid.table, grid.physics
     A, each = trend_over_accuracy(table, models)
-    last, (first_N, *_, last_N) = len(each) - 1, grid.amounts
+    last, (first_N, *_, last_N) = len(each) - 1, grid.table.amounts
     slopes = table.compare([*each, [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]])
     H = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
     rises = [rank_correlation(A, values) for values in H]
@@ -227,24 +218,24 @@ def _judge_rise(grid: ErrorGrid) -> Judgement:
         f"({len(A)} models)"
     )
     numbers = {"least rank correlation of H and A": min(rises)}
-    numbers |= {f"rise for twice the A at N_D = {grid.amounts[k]} [m]": float(slopes.mean[k]) for k in (0, last)}
+    numbers |= {f"rise for twice the A at N_D = {grid.table.amounts[k]} [m]": float(slopes.mean[k]) for k in (0, last)}
     return trend_verdict(slopes, A, np.vstack([H, H[0] - H[last]])), evidence, numbers
 
 
 def _judge_harm(grid: ErrorGrid) -> Judgement:
-    high, table, place = grid.members("high"), grid.table, len(grid.amounts) - 1
+    high, table, place = grid.members("high"), grid.table, len(grid.table.amounts) - 1
     lead = table.lead(NO_MODEL, high, place)
     better, worse = which_significant(lead.above), which_significant(lead.below)
     worst = [model for model, behind in zip(high, worse, strict=True) if behind]
-    names = f" ({listed_names([f'{model} {grid.metres(model, place)}' for model in worst])})" if worst else ""
+    names = f" ({listed_names([f'{model} {grid.table.metres(model, place)}' for model in worst])})" if worst else ""
     evidence = (
-        f"at N_D = {grid.amounts[-1]}, {better.sum()} of {len(better)} high models "
-        f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.metres(NO_MODEL, place)}), {len(worst)} "
-        f"{plural_word(len(worst), 'is', 'are')} shown to be worse{names}"
+        f"at N_D = {grid.table.amounts[-1]}, {better.sum()} of {len(better)} high models "
+        f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.table.metres(NO_MODEL, place)}), "
+        f"{len(worst)} {plural_word(len(worst), 'is', 'are')} shown to be worse{names}"
     )
     numbers = {
-        f"share of high models shown to lead at N_D = {grid.amounts[-1]}": float(better.mean()),
-        f"share of high models shown to be worse at N_D = {grid.amounts[-1]}": float(worse.mean()),
+        f"share of high models shown to lead at N_D = {grid.table.amounts[-1]}": float(better.mean()),
+        f"share of high models shown to be worse at N_D = {grid.table.amounts[-1]}": float(worse.mean()),
     }
     orders = table.H[NO_MODEL].shape[1]
     if orders < FEWEST_ORDERS or not grid.moderate:
@@ -261,8 +252,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         more = _chance_of_mean(of_worst - calm)
         moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
         evidence += (
-            f"; over {orders} nested orders H of these varies by {percent_text(of_worst.mean())}, of moderate models by "
-            f"{percent_text(calm.mean())}"
+            f"; over {orders} nested orders H of these varies by {percent_text(of_worst.mean())}, of moderate models "
+            f"by {percent_text(calm.mean())}"
         )
         numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
     one_sided = all_significant(lead.above) or all_significant(lead.below)
@@ -321,9 +312,9 @@ def _judge_savings(grid: ErrorGrid) -> Judgement:
     grid.members("moderate")
     if len(grid.physics) < 2:
         raise Undecided("one physics model: there is no other to compare it with")
-    small = [k for k, amount in enumerate(grid.amounts) if amount <= grid.amounts[-1] / 2]
+    small = [k for k, amount in enumerate(grid.table.amounts) if amount <= grid.table.amounts[-1] / 2]
     if not small:
-        raise Undecided(f"no N_D is at most half of the largest, {grid.amounts[-1]}")
+        raise Undecided(f"no N_D is at most half of the largest, {grid.table.amounts[-1]}")
     kinds = {
         "no physics with more runs": _pairs_with_more_data(grid, small),
         "more accurate physics alone": _pairs_with_better_physics(grid, small[-1]),
@@ -347,13 +338,13 @@ def _judge_savings(grid: ErrorGrid) -> Judgement:
 
 def _pairs_with_more_data(grid: ErrorGrid, small: Sequence[int]) -> list[SavingPair]:
     """Every moderate model with a small amount against no physics with the next larger one."""
-    mean, amounts = grid.table.mean, grid.amounts
+    mean, amounts = grid.table.mean, grid.table.amounts
     return [
         SavingPair(
             ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
             amounts[k + 1] / amounts[k] - mean(model, k) / mean(NO_MODEL, k + 1),
-            f"{model} with {amounts[k]} runs {grid.metres(model, k)} against {amounts[k + 1]} runs without "
-            f"physics, {grid.metres(NO_MODEL, k + 1)}",
+            f"{model} with {amounts[k]} runs {grid.table.metres(model, k)} against {amounts[k + 1]} runs without "
+            f"physics, {grid.table.metres(NO_MODEL, k + 1)}",
         )
         for model in grid.moderate
         for k in small
@@ -362,13 +353,13 @@ def _pairs_with_more_data(grid: ErrorGrid, small: Sequence[int]) -> list[SavingP
 
 def _pairs_with_better_physics(grid: ErrorGrid, k: int) -> list[SavingPair]:
     """Every moderate model with the largest small amount against every more accurate physics alone."""
-    mean = grid.table.mean
+    table, mean = grid.table, grid.table.mean
     return [
         SavingPair(
             ((1.0, other, PHYSICS_ONLY), (-1.0, model, k)),
             mean(model, PHYSICS_ONLY) / mean(other, PHYSICS_ONLY),
-            f"{model} ({grid.metres(model, PHYSICS_ONLY)} alone) with {grid.amounts[k]} runs {grid.metres(model, k)} "
-            f"against {other} alone, {grid.metres(other, PHYSICS_ONLY)}",
+            f"{model} ({table.metres(model, PHYSICS_ONLY)} alone) with {table.amounts[k]} runs "
+            f"{table.metres(model, k)} against {other} alone, {table.metres(other, PHYSICS_ONLY)}",
             ((1.0, model, PHYSICS_ONLY), (-1.0, other, PHYSICS_ONLY)),
         )
         for model in grid.moderate
@@ -387,7 +378,7 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
         evidence = "the compensation is a polynomial of time, which is smooth whatever it learned"
         return "not testable", f"{evidence}; 'path-trained' is not", {}
     cells, names = results.judged_cells, np.unique(results.test.run)
-    cells = cells[cells["N_D"] == grid.amounts[0]]
+    cells = cells[cells["N_D"] == grid.table.amounts[0]]
 
     def by_run(path: Array) -> Array:
         return np.array([path_roughness(path[:, results.test.run == name]) for name in names])
@@ -399,8 +390,8 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     decided, numbers = compare_roughness(by_run(results.test.future), pure, together, results.windows)
     rough, cooperative, true = (length_in_metres(value) for value in numbers.values())
     evidence = (
-        f"at N_D = {grid.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, true "
-        f"paths {true} ({count_manoeuvres(len(names))})"
+        f"at N_D = {grid.table.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, "
+        f"true paths {true} ({count_manoeuvres(len(names))})"
     )
     return decided, evidence, numbers
 

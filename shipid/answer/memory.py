@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.answer.frames import insert_gaps, shown_runs
+from shipid.evidence import CellErrors, compare_cells
 from shipid.observer import filter_bank, run_observer
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -23,7 +23,6 @@ Array = np.ndarray
 Added = Literal["memory", "observer", "both"]
 CellName = tuple[str, str]  # foundation and method
 PHYSICS_ALONE = "physics alone"
-NEW_ORDER = 0.05  # share of a command's range in a run that counts as a new order
 NOT_COMPARED = ("memory", "choose", "history_scale", "error_scale", "observer_scale")  # settings of memory itself
 OBSERVER_COLUMNS = [
     *("u", "v", "r", "observer.u", "observer.v", "observer.r", "observer.X", "observer.Y", "observer.N"),
@@ -186,18 +185,6 @@ def observer_frame(results: Results) -> pd.DataFrame:
         model=name, fade=filter_bank(vessel, settings).fade, ahead=results.test.horizon * results.test.step
     )
     return insert_gaps(table, ["run", "model", "fade", "ahead"])
-
-
-def orders_frame(results: Results) -> pd.DataFrame:
-    """Moments of new orders in the shown test runs: run, t [s]; a command jumps, or begins to move as fast."""
-    frames = []
-    for run in shown_runs(results):
-        rows = results.dataset.frame[results.dataset.frame["run"] == run]
-        values = rows[results.dataset.commands].to_numpy(dtype=float)
-        moved = (np.abs(np.diff(values, axis=0)) > NEW_ORDER * np.ptp(values, axis=0) + 1e-9).any(axis=1)
-        begins = moved & ~np.concatenate([[False], moved[:-1]])
-        frames += [(run, float(t)) for t in rows["t"].to_numpy()[1:][begins]]
-    return pd.DataFrame(frames, columns=["run", "t"])
 
 
 def _observed_exemplar(results: Results) -> tuple[str, Predictor] | None:

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.answer.comparison import CellErrors, compare_cells
 from shipid.arguments import check_class
-from shipid.evidence import ROUNDING, world_interval
+from shipid.evidence import ROUNDING, CellErrors, compare_cells, world_interval
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import judged_method, learns_from_runs

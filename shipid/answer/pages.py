@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +14,7 @@ from shipid.answer.error_table import intervals_frame
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
 from shipid.errors import ResultError
-from shipid.files import temporary_folder, write_table, write_text
+from shipid.files import write_table, write_text
 from shipid.metrics import summarise_errors
 from shipid.report import AnswerSentence, ReportContent, ReportFinding, write_report, write_summary
 from shipid.report.comparison import write_comparison
@@ -26,18 +25,14 @@ from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, judged_method, model_label, plan_text, run_command
 from shipid.study.results import Results, read_results
 
-log = logging.getLogger(__name__)
-
 Say = Callable[[str], object]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "observer": memory.observer_frame,
-    "orders": memory.orders_frame,
     "kinds": frames.kinds_frame,
     "memory": memory.memory_frame,
     "coverage": bands.coverage_frame,
     "coverage_groups": bands.groups_frame,
-    "coverage_runs": bands.worst_frame,
     "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
     "intervals": intervals_frame,
@@ -100,41 +95,27 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     Raises ResultError if the folder holds no run or cannot be written.
     """
     folder = as_path("folder", folder)
-    store.stored_plan(folder)
-    store.check_writable(folder)
-    with sole_writer(folder, PAGES, wait=True):
-        return _write_all_pages(folder, say)
-
-
-def _write_all_pages(folder: Path, say: Say | None) -> Path:
-    """Write the pages, alone; those of an unfinished run are as old as the results that were read for them."""
     plan = store.stored_plan(folder)
-    with temporary_folder(folder) as place:
-        read = place.stat().st_mtime_ns
-    with threadpool_limits(1, user_api="blas"):  # products are small: on a busy machine threads cost half of the time
-        report, whole = _write_pages_of_parts(plan, folder, say) if plan.parts else _write_pages_of_run(folder, say)
-    if not whole:
-        os.utime(report, ns=(read, read))
-    return report
+    store.check_writable(folder)
+    # Products are small: on a busy machine threads cost half of the time.
+    with sole_writer(folder, PAGES, wait=True), threadpool_limits(1, user_api="blas"):
+        return _write_pages_of_parts(plan, folder, say) if plan.parts else _write_pages_of_run(folder, say)
 
 
-def _write_pages_of_run(folder: Path, say: Say | None) -> tuple[Path, bool]:
-    """The pages of one run, and whether all of its cells are in them."""
+def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
+    """Write the pages of one run."""
     results = read_results(folder, say)
     store.write_results(folder, results.plan, results.cells, whole=results.complete)
     content = report_content(results, say)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
-    report = write_report(content, folder / REPORT, say)
-    log.debug("report written: %s", report)
-    return report, results.complete
+    return write_report(content, folder / REPORT, say)
 
 
-def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Path, bool]:
-    """The pages of all parts that have results and one that compares methods over them, and whether all is in it."""
+def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> Path:
+    """Write the pages of all parts that have results, and one that compares methods over them."""
     cells: list[pd.DataFrame] = []
     notes: dict[str, str] = {}
-    whole: list[bool] = []
     for name, part in plan.parts.items():
         mine = store.check_part(folder, name, part.plan)
         if not (mine / store.STUDY).is_file() or not store.finished_units(mine, part.plan.units):
@@ -142,7 +123,6 @@ def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Pa
             continue
         write_pages(mine, say)
         results = read_results(mine)
-        whole.append(results.complete)
         cells.append(methods.method_cells(results, part.condition, name))
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
@@ -158,4 +138,4 @@ def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> tuple[Pa
         command=run_command(plan),
     )
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
-    return write_comparison(content, folder / REPORT), len(whole) == len(plan.parts) and all(whole)
+    return write_comparison(content, folder / REPORT)

@@ -14,9 +14,8 @@ import pandas as pd
 
 from shipid import document as documents
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals, judge_rivals
+from shipid.answer.findings import FULL_SCALE_RULES, Rivals, judge_rivals
 from shipid.answer.verdict import JudgedClaim, leave_undecided
-from shipid.data.checks import copies_of_earlier_runs
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, suggest_name
 from shipid.study import store
@@ -56,14 +55,6 @@ def choose_turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[
         message = f"only {chosen.pop()!r} matches: take turns with two or more of {', '.join(runs)}"
         raise DocumentError(message, path="--tests")
     return [run for run in runs if run in chosen]
-
-
-def repeated_runs_in_words(plan: Plan, dataset: Dataset) -> str:
-    """Say which runs move as others do, so that a turn tests a run that trains; empty where none does."""
-    same = copies_of_earlier_runs(dataset, all_windows(plan, dataset).spans)
-    pairs = ", ".join(f"{run!r} as {other!r}" for run, other in same.items())
-    words = f"runs that move as others do ({pairs}): where one tests the other trains, so its errors say nothing of new"
-    return f"{words} runs: leave out copies" if same else ""
 
 
 def rotate_test_runs(

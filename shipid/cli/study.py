@@ -271,8 +271,6 @@ def study_rotate(
         answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
         answer.rows("turns", over, text_table(heads, rows))
         answer.say(f"constant u, v, r: {four_digits(naive)} m", naive=naive)
-        if words := rotate.repeated_runs_in_words(plan, dataset):
-            answer.say(words, copied=words)
         if saw := families_set_from(plan, wanted):
             answer.say(
                 f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw

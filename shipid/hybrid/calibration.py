@@ -111,13 +111,12 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
+    judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
     best = None
     for circle in (True, False):
         fitted = _fit_scores(runs, apart, normal, circle)
         whole = _radii_of_runs(fitted.scores.max(axis=0), runs)
-        size = (
-            float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[_place_of_middle_level(runs.count)]
-        )
+        size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[judged]
         if best is None or size < TIGHTER * best[0]:
             best = size, fitted, whole
     assert best is not None
@@ -160,7 +159,7 @@ def band_radii(scores: Array, place: NDArray[np.int64]) -> Array:
 
 
 def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
-    order = _rising_order(scores)
+    order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")
     at = np.cumsum(runs.weight[rising_ranks]) - runs.weight[rising_ranks] / 2
@@ -172,13 +171,6 @@ def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
     rising: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
     return rising
-
-
-def _rising_order(values: Array) -> NDArray[np.int64]:
-    """Indices (S,) that sort values, equal ones in their order: a stable sort, at a sixth of its time without ties."""
-    order = np.argsort(values)
-    rising = values[order]
-    return order if np.all(rising[:-1] < rising[1:]) else np.argsort(values, kind="stable")
 
 
 def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
@@ -288,8 +280,3 @@ def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:
     known, place = np.unique(names, return_inverse=True)
     sizes = np.bincount(place, minlength=len(known))
     return _RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
-
-
-def _place_of_middle_level(count: int) -> int:
-    """Index in `LEVELS` of 0.9, or of the highest level that so many runs can promise."""
-    return min(90, 100 * count // (count + 1)) - 1

@@ -26,8 +26,8 @@ PLAN_PARTS = 3  # of the horizon, in which a method sees planned commands
 def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
     """Planned commands as few numbers: the mean command less the present one in each part of the horizon.
 
-    The parts are nearly equal, `PLAN_PARTS` of them or one a step. `port.alpha` (T, S) gives `port.planned-1.alpha` (S,),
-    ..., so that the side and the sign of the command hold for its plan.
+    The parts are nearly equal, `PLAN_PARTS` of them or one a step. `port.alpha` (T, S) gives
+    `port.planned-1.alpha` (S,), ..., so that the side and the sign of the command hold for its plan.
     """
     means: dict[str, Array] = {}
     for name, values in planned.items():
@@ -148,21 +148,19 @@ class Inputs:
             for name in (*MOTIONS, *self.commands):
                 component, dot, signal = name.rpartition(".")
                 label = f"{component}{dot}past-{seconds:g}.{signal}"
-                columns[label] = self._before(instants, name, seconds, step) - instants.columns[name]
+                columns[label] = value_before(instants, name, seconds, step) - instants.columns[name]
         for seconds in self.memory.turned:
-            before = self._before(instants, "psi", seconds, step)
+            before = value_before(instants, "psi", seconds, step)
             columns[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
         return columns
 
-    @staticmethod
-    def _before(instants: Instants, name: str, seconds: float, step: float) -> Array:
-        steps = count_steps(seconds, step)
-        if name not in instants.past or len(instants.past[name]) < steps:
-            held = len(instants.past.get(name, ())) * step
-            raise DataError(
-                f"the method needs {seconds:g} s of the past of this column, there are {held:g} s", path=name
-            )
-        return np.asarray(instants.past[name][-steps])
+
+def value_before(instants: Instants, name: str, seconds: float, step: float) -> Array:
+    """Values (S,) of a column so long before the instants; DataError where their past is shorter."""
+    steps, held = count_steps(seconds, step), len(instants.past.get(name, ()))
+    if held < steps:
+        raise DataError(f"the method needs {seconds:g} s of the past, there are {held * step:g} s", path=name)
+    return np.asarray(instants.past[name][-steps])
 
 
 def input_group(name: str) -> str:
@@ -207,9 +205,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     """
     steps = count_steps(seconds, physics.step)
     past, columns = instants.past, instants.columns
-    if "x" not in past or len(past["x"]) < steps:
-        held = len(past.get("x", ())) * physics.step
-        raise DataError(f"the method needs {seconds:g} s of the past, there are {held:g} s", path="memory.error")
+    value_before(instants, "x", seconds, physics.step)
     then = {name: values[-steps] for name, values in past.items()}
     given = {name: values[-steps:] for name, values in past.items() if "." in name}
     before = replace(physics, horizon=steps)

@@ -16,11 +16,10 @@ from optuna.trial import TrialState
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.journal import distributions, frozen_trial
-from shipid.hybrid.method import Array, Fitted, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.search import Search
+from shipid.hybrid.method import Fitted, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.search import Search, best_trials, trial_row
 from shipid.hybrid.settings import Searched, seed_of
 from shipid.hybrid.training import Length, StackSettings, train_stack
-from shipid.hybrid.trials import best_trials, trial_row
 
 Stack = Mapping[str, Mapping[str, float]]
 """Models that train together: name -> hyperparameters."""
@@ -33,20 +32,15 @@ def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) 
     best trial. Foundations with the same inputs and the same architecture in a trial train as one stack. The sampler of
     a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
     """
-    trainer, search, space = (
-        _StackTrainer(task, method, inputs, length),
-        Search(task, task.cases, method),
-        method.space(),
-    )
-    studies = {key: _memory_study(rows, distributions(space)) for key, rows in search.rows.items()}
-    best = {
-        key: (inf, _TrialOutcome(-1)) for key in studies
-    }  # value and networks of the best trial that was trained here
+    trainer, search = _StackTrainer(task, method, inputs, length), Search(task, task.cases, method)
+    space = distributions(method.space())
+    studies = {key: _memory_study(rows, space) for key, rows in search.rows.items()}
+    best = {key: (inf, _TrialOutcome(-1)) for key in studies}  # of the trials that were trained here
     for number, _ in search.left(count()):
         for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
             seed = seed_of(task.seed, key, number)
             study.sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)
-        trials = {key: study.ask(distributions(space)) for key, study in studies.items()}
+        trials = {key: study.ask(space) for key, study in studies.items()}
         fixed = {name: getattr(method, name) for name in method.SEARCHED}
         rows: dict[str, Row] = {}
         for stack in trainer.stacks({key: fixed | trial.params for key, trial in trials.items()}):
@@ -54,7 +48,9 @@ def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) 
             outcomes = trainer.train(stack, number)
             for key, one in outcomes.items():
                 rows[key] = trial_row(number, stack[key], one.value, start, one.epochs)
-                best[key] = min(best[key], (rows[key]["value"], one), key=lambda pair: _comparable_value(pair[0]))
+                best[key] = min(
+                    best[key], (rows[key]["value"], one), key=lambda pair: inf if np.isnan(pair[0]) else pair[0]
+                )
             for key in stack:
                 rows[key]["seconds"] /= len(stack)
         for key, trial in trials.items():
@@ -63,11 +59,6 @@ def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) 
             studies[key].tell(trial, *told)
         search.record({key: rows[key] for key in studies})
     return {key: trainer.fitted(key, search.rows, best[key][1]) for key in studies}
-
-
-def _comparable_value(value: float) -> float:
-    """A value by which trials are compared: one that is no number comes last."""
-    return value if value == value else inf
 
 
 def _memory_study(rows: Sequence[Row], space: Mapping[str, BaseDistribution]) -> optuna.Study:
@@ -110,7 +101,9 @@ class _StackTrainer:
         made: dict[str, list[tuple[Network, float, int]]] = {key: [] for key in stack}
         for i, (training, validation) in enumerate(self.task.folds):
             entropy = self.task.seed, number, i
-            features, normaliser = _inputs_of(table, training)
+            seen = {name: values[training] for name, values in table.items()}
+            features = choose_features(seen)
+            normaliser = Normaliser.fit(seen, tuple(features))
             trained = train_stack(
                 normaliser.apply(table),
                 outputs,
@@ -138,13 +131,6 @@ class _StackTrainer:
             stacks = self.stacks({name: mine[number]["params"] for name, mine in rows.items()})
             best = self.train(next(stack for stack in stacks if key in stack), number)[key]
         return Fitted(Compensator(self.inputs, best.networks, kept[0]["params"]), rows[key], seconds)
-
-
-def _inputs_of(table: Mapping[str, Array], training: Index) -> tuple[dict[str, tuple[str, ...]], Normaliser]:
-    """Features and their statistics by the training windows alone."""
-    seen = {name: values[training] for name, values in table.items()}
-    features = choose_features(seen)
-    return features, Normaliser.fit(seen, tuple(features))
 
 
 def _stack_settings(members: Sequence[Mapping[str, float]], length: Length) -> StackSettings:

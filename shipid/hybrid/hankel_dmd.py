@@ -28,7 +28,7 @@ from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale
 from shipid.hybrid.stepping import Stepped, Stepper, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs, solve_ridges
+from shipid.hybrid.units import SeenInputs, apply_blocks, solve_ridges
 
 Array = NDArray[np.float64]
 MISSED_NAMES = ("missed.u", "missed.v", "missed.r")
@@ -50,10 +50,7 @@ class LinearLaw(Stored):
     def __call__(self, table: Mapping[str, Array]) -> Array:
         """Missing acceleration (S, 3) [m/s^2, rad/s^2] for inputs (S,)."""
         z = self.normaliser.apply(table)
-        full = np.concatenate([z, np.ones((len(z), 1))], axis=1)
-        if self.weights.ndim == 2:
-            return full @ self.weights
-        return np.asarray((full.reshape(len(self.weights), -1, full.shape[1]) @ self.weights).reshape(-1, 3))
+        return apply_blocks(np.concatenate([z, np.ones((len(z), 1))], axis=1), self.weights)
 
 
 def delayed_inputs(

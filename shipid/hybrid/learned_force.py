@@ -22,11 +22,10 @@ from shipid.document import LEAST_NUMBER
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_values
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import ridge_values
 from shipid.hybrid.units import solve_ridges
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -219,7 +218,7 @@ class _ForceLoss:
         return values
 
     def solve(self, ridge: float, start: Array | None) -> tuple[Array, int]:
-        """Minimise the loss from a start (default: the weights of `first_output_weights`); weights and the number of iterations."""
+        """Minimise the loss from a start, by default `first_output_weights`; weights and the number of iterations."""
         from scipy.optimize import minimize  # a study is read without it
 
         def loss(weights: Array) -> tuple[float, Array]:

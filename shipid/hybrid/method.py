@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, model_validator
 
-from shipid.arguments import as_float_array, check_mapping, check_number
+from shipid.arguments import as_float_array
 from shipid.checked import CheckedModel
 from shipid.data.windows import Instants, Windows, locked_view
 from shipid.document import parse_model
@@ -284,30 +284,16 @@ def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool)
             parse_model(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)
         ]
     except (DocumentError, TypeError) as error:
-        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.trials.trial_row") from None
-    check_number(f"{where}: seconds", one.seconds, DataError)
-    if not isinstance(one.sentence, str):
-        raise DataError(f"{where}: sentence must be a text, not {type(one.sentence).__name__}")
+        raise DataError(f"{where}: {error}: make trials by shipid.hybrid.search.trial_row") from None
     if one.left_out is not None and np.shape(as_float_array(f"{where}: left_out", one.left_out, DataError)) != shape:
         raise DataError(f"{where}: left_out must be {shape}, not {np.shape(one.left_out)}")
     if one.corrector is None:
         return
     if learns and not any(row.state == "complete" for row in rows):
         raise DataError(f"{where}: a corrector needs a trial that is complete, or give Fitted(None, ...)")
-    _check_corrector(where, one.corrector)
-
-
-def _check_corrector(where: str, corrector: Corrector) -> None:
-    """ShipidError where an object lacks what a corrector has, DataError for numbers that are none."""
-    with locate_errors(where, type(corrector)):
-        if fault := fault_of_corrector(corrector):
+    with locate_errors(where, type(one.corrector)):
+        if fault := fault_of_corrector(one.corrector):
             raise ShipidError(f"{where}: {fault}")
-        chosen, past = corrector.hyperparameters, corrector.past
-    check_mapping(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
-    for key, value in chosen.items():
-        check_number(f"{where}: hyperparameters of the corrector: {key}", value, DataError)
-    if not 0 <= check_number(f"{where}: past of the corrector", past, DataError) < np.inf:
-        raise DataError(f"{where}: past of the corrector must be seconds, from 0 on, not {past!r}")
 
 
 def widen_range(low: float, high: float) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,7 +19,6 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
-from shipid.users import locate_errors
 
 METHODS: dict[str, type[Method]] = {
     "alone": Alone,
@@ -47,10 +45,6 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     if fault := fault_of_method(known):
         raise DocumentError(f"METHODS[{kind!r}]: {fault}", path=f"{path}.kind")
     method: Method = parse_model(known, dict(settings), None, path)
-    with locate_errors(f"{known.__name__}.past", known):
-        past = method.past
-    if not isinstance(past, (int, float)) or not 0 <= past < math.inf:
-        raise DocumentError(f"{known.__name__}.past must be seconds, from 0 on, not {past!r}", path=f"{path}.kind")
     return method
 
 

@@ -30,18 +30,14 @@ from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import Stepped, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs, Units, solve_ridges
+from shipid.hybrid.units import SeenInputs, Units, apply_blocks, solve_ridges
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import term_blocks, upstream_signals
 
 Array = NDArray[np.float64]
 ALARM_MOMENTS = 2000  # moments from which the radius of the alarm is taken, about
-MODULE_ORDER = (
-    "rudders",
-    "thrusters",
-    "hull",
-)  # in which modules are switched off: a rudder needs the wash of its propeller
+MODULE_ORDER = "rudders", "thrusters", "hull"  # in which they are switched off: a rudder needs its propeller's wash
 
 
 def modules_of(vessel: Vessel | None) -> dict[str, tuple[str, ...]]:
@@ -67,7 +63,7 @@ def physics_without_modules(physics: Physics) -> list[Physics]:
 
 
 def module_accelerations(reduced: list[Physics], at: Instants, whole: Array, step: float) -> Array:
-    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as `step_alone` gives it."""
+    """What each of K modules adds to the acceleration over one step, (S, K, 3); `whole` (S, 3) as of `step_alone`."""
     after = np.stack([whole, *(step_alone(one, at) for one in reduced)], axis=1)
     return (after[:, :-1] - after[:, 1:]) / step
 
@@ -149,9 +145,7 @@ class ModulesCorrector(Stored):
         """Factor of each module (S, K)."""
         table = feature_table(at.columns, self.commands)
         even, _ = self.units.parts(table)
-        count = 1 if self.weights.ndim == 2 else len(self.weights)
-        weights = self.weights.reshape(count, *self.weights.shape[-2:]).swapaxes(1, 2)
-        raw = (even.reshape(count, -1, even.shape[1]) @ weights).reshape(len(even), -1)
+        raw = apply_blocks(even, self.weights.swapaxes(-1, -2))
         scale: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
         return scale
 

@@ -19,12 +19,11 @@ from shipid.data.windows import Instants
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem
+from shipid.hybrid.search import LearningProblem, windows_of_folds
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import Stepped, StepProblem, stepped_paths
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import windows_of_folds
-from shipid.hybrid.units import SeenInputs, Units, solve_ridges
+from shipid.hybrid.units import SeenInputs, Units, apply_blocks, solve_ridges
 
 Array = NDArray[np.float64]
 
@@ -43,14 +42,7 @@ class OutputWeights(Stored):
     def acceleration(self, table: Mapping[str, Array]) -> Array:
         """Missing acceleration (S, 3) [m/s^2, rad/s^2] for inputs (S,); of R networks for R S inputs, in R blocks."""
         even, odd = self.units.parts(table)
-        if self.surge.ndim == 2:
-            return np.concatenate([even @ self.surge, odd @ self.sway_yaw], axis=1)
-        count = len(self.surge)
-        stacked = [
-            part.reshape(count, -1, part.shape[1]) @ weight
-            for part, weight in ((even, self.surge), (odd, self.sway_yaw))
-        ]
-        return np.concatenate(stacked, axis=2).reshape(-1, 3)
+        return np.concatenate([apply_blocks(even, self.surge), apply_blocks(odd, self.sway_yaw)], axis=1)
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.search import ridge_values, setting_at_share
 from shipid.hybrid.settings import Probability, Scale, Searched, spread_points
-from shipid.hybrid.trials import ridge_values, setting_at_share
 
 RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory
@@ -107,7 +107,7 @@ class PathDrawn(Searched):
 
     @property
     def memories(self) -> tuple[int, ...]:
-        """What validation chooses from, as places in `MEMORIES`: each of `MEMORY_CHOICES` without what the memory lacks."""
+        """What validation chooses from, as places in `MEMORIES`: all choices without what the memory lacks."""
         memory = self.memory
         of_kind = dict(zip(MEMORY_KINDS, (memory.history or memory.turned, memory.error, memory.observer), strict=True))
         choices = (*MEMORY_CHOICES, *OBSERVER_CHOICES) if self.memory.observer else MEMORY_CHOICES

@@ -93,7 +93,8 @@ class Physics:
     ) -> tuple[Array, Array]:
         """Paths (T, V, S, 2) [m] in the frame (11) of V variants, `parameters` (V, P), and which diverged (V, S).
 
-        What the vessel feels and the columns do not hold, such as wind that was not measured, is zero: see `missing_columns`.
+        What the vessel feels and the columns do not hold, such as wind that was not measured, is zero:
+        see `missing_columns`.
         """
         result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
         return np.stack(_positions_in_frame(instants, north, east), axis=-1), result.diverged

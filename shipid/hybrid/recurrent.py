@@ -24,10 +24,9 @@ from shipid.hybrid.compensator import Normaliser, flatten_paths, smooth_basis, u
 from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
 from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, mean_squared_error
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stored import Stored
-from shipid.hybrid.trials import mean_squared_error
 from shipid.hybrid.units import SeenInputs
 
 Array = NDArray[np.float64]
@@ -173,8 +172,7 @@ class RecurrentProblem(LearningProblem):
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""
-        from shipid.hybrid.gated import train_gated  # a study is read without PyTorch
-        from shipid.hybrid.training import Length
+        from shipid.hybrid.training import Length, train_gated  # a study is read without PyTorch
 
         method, training = self.method, self.task.folds[fold][0]
         reader, parts = self._reader(training), []

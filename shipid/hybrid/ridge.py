@@ -30,9 +30,8 @@ from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.method import Array, Fitted, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.products import gram_matrix, hidden_layer, matrix_product, sums_of_squares
-from shipid.hybrid.search import CLOSING_TRIALS, Search
+from shipid.hybrid.search import CLOSING_TRIALS, Search, diverged_result, trial_row, windows_of_folds
 from shipid.hybrid.settings import Point, Searched, seed_of
-from shipid.hybrid.trials import diverged_result, trial_row, windows_of_folds
 from shipid.hybrid.units import SeenInputs, Units
 
 Mask = NDArray[np.bool_]
@@ -42,12 +41,8 @@ Seeing = tuple[SeenInputs, Tensor]
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
 SPARE_TRIALS = 4  # further trials whose errors without each run are kept
-LEAST_PIVOT = (
-    0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are then right to about 1e-5
-)
-ROUNDING = (
-    1e-3  # by which a sum of squares must be greater to be so for sure: a hundred times what `LEAST_PIVOT` leaves
-)
+LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
+ROUNDING = 1e-3  # by which a sum of squares must be greater for sure: a hundred times what `LEAST_PIVOT` leaves
 
 
 @dataclass(frozen=True)
@@ -226,7 +221,8 @@ class _RidgeTuning:
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
         self.every = _JudgingWindows.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
         rows = part_of_runs(task.windows.run[self.windows], recipe.search_windows)
-        self.whole = len(rows) == len(self.windows) or _lacks_a_part(task.folds, self.windows[rows])
+        lacks = any(not np.isin(part, self.windows[rows]).any() for fold in task.folds for part in fold)
+        self.whole = len(rows) == len(self.windows) or lacks  # no fold may lose all windows of a part
         self.first = self.every if self.whole else _JudgingWindows.of(task, self.windows, rows, sound, self.basis)
         self.finalists = method.num_chosen() + SPARE_TRIALS
         self.best = {key: _BestTrials(method.num_chosen()) for key in sound}
@@ -335,11 +331,6 @@ class _RidgeTuning:
                 left_out=partial(_without_each_fold, others[:, :, k], kept, k),
             )
         return verdicts
-
-
-def _lacks_a_part(folds: Sequence[tuple[Index, Index]], chosen: Index) -> bool:
-    """Whether a fold has no training or no validation window among some windows."""
-    return any(not np.isin(part, chosen).any() for fold in folds for part in fold)
 
 
 def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
@@ -466,17 +457,12 @@ def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor
 
 def _coordinates_with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Coordinate]:
     """Coordinates that are made of the same features."""
-    eigenvalues, axes = _decompose_gram(features)
+    eigenvalues, axes = torch.linalg.eigh(gram_matrix(features))
+    eigenvalues = eigenvalues.clamp(min=0.0)  # rounding makes none negative
     return [
         _Coordinate(features, eigenvalues, axes, side, matrix_product(axes.T, matrix_product(features.T, side)))
         for side in outputs
     ]
-
-
-def _decompose_gram(features: Tensor) -> tuple[Tensor, Tensor]:
-    """Eigenvalues and axes of the Gram matrix; rounding makes no eigenvalue negative."""
-    eigenvalues, axes = torch.linalg.eigh(gram_matrix(features))
-    return eigenvalues.clamp(min=0.0), axes
 
 
 class _LeftOutErrors:
@@ -522,11 +508,11 @@ def _left_out_errors(
     errors. The sums of a ridge that is passed over, or not asked, are infinite.
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
-    pieces = [
-        _SidePiece(sides, slice(end - len(block.out), end), block, _left_out_solver(part, block))
-        for sides, part in _join_alike_sides(parts)
-        for end, block in zip(ends, blocks, strict=True)
-    ]
+    pieces = []
+    for sides, part in _join_alike_sides(parts):
+        for end, block in zip(ends, blocks, strict=True):
+            solver = (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
+            pieces.append(_SidePiece(sides, slice(end - len(block.out), end), block, solver))
     num_models = targets.shape[1] // terms
     sums = targets.new_full((len(ridges), num_models), torch.inf)
     others = targets.new_full((len(ridges), ends[-1], num_models), torch.inf)
@@ -600,10 +586,6 @@ class _SidePiece:
         if of_side is None:
             return slice(None)
         return [place * width + column for place in range(len(self.sides)) for column in of_side]
-
-
-def _left_out_solver(part: _Coordinate, block: _FoldBlock) -> _FewRows | _ManyRows:
-    return (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
 
 
 def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tuple[Array, Tensor]:

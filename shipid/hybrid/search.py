@@ -1,4 +1,4 @@
-"""The search of a method: which trials are left, how many fit into a budget, and the skeleton of most methods.
+"""The search of a method: its trials, which are left, how many fit into a budget, and the skeleton of most methods.
 
 Trials are numbered, and whatever is random in one is seeded by its number. So a search that was interrupted goes on
 from its journal and gives the digits of one that was not. A budget becomes a number of trials by the time of the first
@@ -8,17 +8,20 @@ ones; the number is written down before it is used, and read back.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
+from math import ceil, exp, floor, log
 from statistics import fmean
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shipid.hybrid.method import Fitted, Index, Row, Task
-from shipid.hybrid.settings import Point, Searched
-from shipid.hybrid.trials import best_trials, fit_each, mean_squared_error, trial_points, trial_row, windows_of_folds
+from shipid.hybrid.method import Corrector, Fitted, Index, Row, Task
+from shipid.hybrid.settings import Point, Searched, seed_of, spread_points
 
+Array = NDArray[np.float64]
 Any_ = TypeVar("Any_")
 TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
 CLOSING_TRIALS = 1  # trials that the last fit costs, about
@@ -120,6 +123,95 @@ class Search:
             self.journal.decide(list(self.cells.values()), self.count)
 
 
+def trial_points(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+    """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
+
+    A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
+    a budget says how many are made. Where nothing is searched they differ in what is drawn at random.
+    """
+    ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
+    fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in {*ranges, *idle}}
+    for shares in spread_points(max(len(ranges), 1), None if method.budget else method.trials):
+        point = {name: setting_at_share(method, name, share) for share, name in zip(shares, ranges, strict=False)}
+        yield {**fixed, **point}
+
+
+def setting_at_share(method: Searched, name: str, share: float) -> float:
+    """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
+    low, high = method.ranges()[name]
+    if name in method.LINEAR:
+        return low + share * (high - low)
+    value = exp(log(low) + share * (log(high) - log(low)))
+    return min(max(round(value), ceil(low)), floor(high)) if name in method.COUNTS else value
+
+
+def ridge_values(ridge: float | tuple[float, float], count: int) -> list[float]:
+    """Ridges that every trial is solved with, evenly spread by their logarithm."""
+    return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
+
+
+def diverged_result(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
+    """The result where the physics is not finite: no corrector, every trial diverged."""
+    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
+    some = islice(points, 1 if method.budget else None)
+    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
+
+
+def ridge_trial(
+    task: Task, name: str, ridges: Sequence[float], samples: int, solve: Callable[[Index, Sequence[float]], Corrector]
+) -> tuple[float, float]:
+    """The ridge with the least mean squared error [m^2] of the path per coordinate, over all folds, and that error.
+
+    solve : (indices of training windows, R ridges) -> R correctors in one, which takes R S instants in R blocks.
+    samples : validation windows of a fold that are judged, at most.
+    """
+    errors, physics = np.zeros(len(ridges)), task.cases[name].physics
+    for fold, (training, validation) in enumerate(task.folds):
+        corrector = solve(training, ridges)
+        judged = draw_windows(validation, samples, seed_of(task.seed, fold))
+        instants = task.instants(name).select(np.tile(judged, len(ridges)))
+        paths = np.split(corrector.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
+        errors += [mean_squared_error(path, task.windows.future[:, judged]) for path in paths]
+    best = int(errors.argmin())
+    return ridges[best], float(errors[best]) / len(task.folds)
+
+
+def trial_row(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
+    """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
+    complete = bool(np.isfinite(value))
+    return {
+        "number": number,
+        "params": dict(params),
+        "value": value if complete else np.nan,
+        "seconds": time.process_time() - start,
+        "epochs": epochs,
+        "state": "complete" if complete else "diverged",
+    }
+
+
+def best_trials(rows: Iterable[Row]) -> list[Row]:
+    """Trials that ended with a value, the best first; of equal ones the earlier."""
+    return sorted((row for row in rows if row["state"] == "complete"), key=lambda row: float(row["value"]))
+
+
+def windows_of_folds(task: Task) -> Index:
+    """Indices of the windows that train or validate in any fold."""
+    return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
+
+
+def draw_windows(windows: Index, most: int, seed: int) -> Index:
+    """At most so many of the windows, drawn without replacement, in order."""
+    if len(windows) <= most:
+        return windows
+    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
+
+
+def mean_squared_error(paths: Array, future: Array) -> float:
+    """Mean squared error [m^2] per coordinate; infinite where a path is not finite."""
+    value = float(np.square(paths - future).mean())
+    return value if np.isfinite(value) else float("inf")
+
+
 @dataclass(frozen=True)
 class TrialWorth:
     """What a trial is worth: mean squared validation error [m^2] per coordinate, all its settings, and its epochs."""
@@ -174,10 +266,15 @@ class SearchedAlone(Searched):
         return trial_points(self, self.IDLE)
 
     def fit(self, task: Task) -> dict[str, Fitted]:
-        """Search for every foundation; the best trials make its corrector."""
-        return fit_each(task, self, self.points, lambda name: self._fit(task, name))
+        """Search for every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
+        every, fitted = windows_of_folds(task), {}
+        for name, case in task.cases.items():
+            finite = np.isfinite(case.paths[:, every]).all()
+            fitted[name] = self._fit(task, name) if finite else diverged_result(self, self.points())
+        return fitted
 
     def _fit(self, task: Task, name: str) -> Fitted:
+        """Search for one foundation; the best trials make its corrector."""
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
         for number, point in search.left(self.points()):
             start = time.process_time()

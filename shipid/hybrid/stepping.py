@@ -24,9 +24,8 @@ from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth
+from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_trial, ridge_values
 from shipid.hybrid.settings import Point, Scale
-from shipid.hybrid.trials import ridge_trial, ridge_values
 from shipid.physics.signals import measurable_signals
 
 Array = NDArray[np.float64]

@@ -9,7 +9,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.errors import ResultError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import choose_features, input_group, select_inputs
 from shipid.hybrid.mirror import mirror_matrix as mirror_of
@@ -78,11 +77,12 @@ class Units(Stored):
         return np.concatenate([one, (plain + image) / 2], axis=1), (plain - image) / 2
 
 
-def stored_array(arrays: Mapping[str, Array], name: str) -> Array:
-    """An array of a saved method; ResultError where it is missing."""
-    if name not in arrays:
-        raise ResultError("missing in the saved method", path=name)
-    return arrays[name]
+def apply_blocks(features: Array, weights: Array) -> Array:
+    """Return features (S, M) @ weights (M, K); of weights (R, M, K) each takes one of R blocks of features (R S, M)."""
+    if weights.ndim == 2:
+        return features @ weights
+    blocks: Array = features.reshape(len(weights), -1, features.shape[1]) @ weights
+    return blocks.reshape(len(features), -1)
 
 
 def solve_ridges(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:

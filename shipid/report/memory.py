@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -77,7 +77,7 @@ def observer_figure(content: ReportContent) -> PageFigure | None:
     frame = content.frame("observer")
     if frame.empty:
         return None
-    runs, orders = names_in(frame), content.frame("orders")
+    runs = names_in(frame)
     known = bool(frame[["observer.current_north", "observer.current_east"]].abs().max().max() > LEAST_CURRENT)
     rows = [title for title in OBSERVER_ROWS if title != CURRENT_TITLE or known]
     current = "; current towards {}" if known else ""
@@ -90,12 +90,10 @@ def observer_figure(content: ReportContent) -> PageFigure | None:
         "slow disturbances over the inertia of the ship, so they are accelerations; they hold wind, waves' drift and "
         "what the model lacks. The test is the mean squared error of the prediction of each measurement over its "
         "expected square: 1 where the assumptions hold, above it where the observer is too sure. "
-        f"{_fade_words(frame)} Dotted upright lines are new orders.",
+        f"{_fade_words(frame)}",
         alternative=f"Lines over the time of one test run, one below the other: {listed_names(words, 6)}.",
         height=OBSERVER_MARGIN + len(rows) * (OBSERVER_ROW + OBSERVER_GAP),
-        draw=lambda run: [
-            _draw_observer(frame[frame.run.eq(run)], orders.t[orders.run.eq(run)] if len(orders) else (), rows)
-        ],
+        draw=lambda run: [_draw_observer(frame[frame.run.eq(run)], rows)],
         controls=[Control("Test run", runs)],
         chips=[
             Chip("key:measured", "measured", OBSERVER_INKS["measured"], "dot"),
@@ -131,8 +129,8 @@ def _takeaway_observer(frame: pd.DataFrame, runs: Sequence[str], current: bool) 
     return f"Along {counted_text(len(runs), 'test run')}, {', '.join(parts)}, and {test}."
 
 
-def _draw_observer(frame: pd.DataFrame, moments: Iterable[float], rows: Sequence[str]) -> go.Figure:
-    """A row for each signal, from the top; dotted lines over the whole height at the moments of new orders."""
+def _draw_observer(frame: pd.DataFrame, rows: Sequence[str]) -> go.Figure:
+    """A row for each signal, from the top."""
     traces, axes, total = [], {}, len(rows) * (OBSERVER_ROW + OBSERVER_GAP)
     for place, title in enumerate(rows, start=1):
         factor, columns = OBSERVER_ROWS[title]
@@ -144,10 +142,8 @@ def _draw_observer(frame: pd.DataFrame, moments: Iterable[float], rows: Sequence
             traces.append(make_line(name, frame.t, factor * frame[column], [f"key:{key}"], unit, line=ink, **tie))
         low = (len(rows) - place) * (OBSERVER_ROW + OBSERVER_GAP) / total
         axes[f"yaxis{place}"] = make_axis(title, domain=[low, low + OBSERVER_ROW / total], anchor="x", nticks=4)
-    rule = {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "layer": "below"}
-    rules = [{**rule, "x0": t, "x1": t, "line": {"color": MUTED, "width": 1, "dash": "dot"}} for t in moments]
     x = make_axis("time in the run [s]", anchor=f"y{len(rows)}")
-    return make_plot(traces, x, axes.pop("yaxis1"), hovermode="x unified", shapes=rules, **axes)
+    return make_plot(traces, x, axes.pop("yaxis1"), hovermode="x unified", **axes)
 
 
 def memory_gain(content: ReportContent) -> PageFigure | None:

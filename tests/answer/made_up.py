@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings_bands import Widths, judge_width_trend
-from shipid.answer.findings_full_scale import FULL_SCALE_RULES, Rivals
+from shipid.answer.findings import FULL_SCALE_RULES, Rivals, Widths, judge_width_trend
 from shipid.answer.findings_simulation import SIMULATION_RULES, ErrorGrid, compare_roughness
 from shipid.answer.verdict import Verdict
 from shipid.study.declared import NO_MODEL

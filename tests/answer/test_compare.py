@@ -83,20 +83,6 @@ def test_paired_differences_by_hand(made: Made) -> None:
     assert comparison.loc[("bad", "alone", 0), ["low", "high"]].tolist() == [0, 0], "physics alone is not trained"
 
 
-def test_only_seeds_that_differ_bring_noise_of_training(made: Made) -> None:
-    """One of two seeds is identical: the noise of the other alone, a half of its weight, is in the interval."""
-    seeds = {(name, N_D, seed): error for (name, N_D, _), error in grid(H).items() for seed in (0, 1)}
-    one = made(seeds, runs=8)
-    half, whole = ({**seeds, **{("bad", 10, seed): 2.0 + 1e-9 for seed in apart}} for apart in ((1,), (0, 1)))
-    widths = []
-    for cells in (half, whole):
-        row = compare_results([placed(one, "a"), placed(made(cells, runs=8), "b")]).errors.query("family == 'bad'")
-        row = row[row["N_D"] == 10].iloc[0]
-        assert row["verdict"] == ""
-        widths.append(row["high"] - row["low"])
-    assert widths[1] / widths[0] == pytest.approx(2**0.5, rel=1e-3)
-
-
 def test_the_same_orders_on_another_ship_are_pairs(made: Made) -> None:
     one, other = made(grid(H), runs=8), made(grid(H), runs=8)
     moved = replace(other.test, columns={**other.test.columns, "u": other.test.columns["u"] + 1.0})

@@ -5,11 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
-
-from shipid.answer.compare import document_differences, whole_document
-from shipid.document import bundled_documents
-from shipid.study.plan import read_plan
+from shipid.answer.compare import document_differences
 from tests.study.tiny import tiny_plan
 
 
@@ -47,12 +43,3 @@ def test_one_name_for_two_ships_and_other_sessions(tmp_path: Path) -> None:
     )
     paths = set(changes_["path"])
     assert paths == {"vessel.gunnerus-28.9.digest", "vessel.gunnerus-28.9.inertia.m", "computed with.python"}
-
-
-@pytest.mark.parametrize("name", bundled_documents("studies"))
-def test_every_bundled_study_is_whole(name: str) -> None:
-    """A study says the same as itself with every default written out."""
-    plan = read_plan(name)
-    whole = whole_document(plan)
-    assert list(whole["method"]) == [way.name for way in plan.methods]
-    assert document_differences([plan, plan]).empty

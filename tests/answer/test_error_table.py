@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.answer.error_table import PHYSICS_ONLY, error_table, intervals_frame
-from shipid.evidence import TRAINING, WORTH, paired_difference
+from shipid.evidence import paired_difference
 from tests.answer.byhand import grid
 
 H = {"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}
@@ -46,24 +46,6 @@ def test_an_interval_of_an_error_is_that_of_its_difference_to_0_without_what_is_
     assert skewed.compare([[(1.0, "bad", 1)]]).low[0] < 0, "most of the error is in one manoeuvre"
     low, high = skewed.interval("bad", 1)
     assert low == 0 < skewed.mean("bad", 1) < high
-
-
-def test_intervals_are_about_the_mean_over_seeds_and_more_seeds_narrow_them(made: Any) -> None:
-    """One seed or four that are alike: what another training would give counts half with four, by its root."""
-    one, four = (
-        intervals_frame(made({(name, 10, seed): H[name][0] for name in H for seed in range(count)}, runs=8))
-        for count in (1, 4)
-    )
-    for frame in (one, four):
-        assert frame["model"].tolist() == list(H)
-        assert (frame["N_D"] == 10).all()
-        middle = (frame["low"] + frame["high"]) / 2
-        np.testing.assert_allclose(middle, [H[name][0] for name in H], rtol=0.05)
-    noise = [TRAINING, TRAINING * np.sqrt(WORTH / (WORTH + 3 * len(H)) / 4)]  # four seeds of each model do not differ
-    hard = np.linspace(0.9, 1.1, 8)
-    expected = np.hypot(hard.std(ddof=1) / np.sqrt(8), noise)
-    widths = [(frame["high"] - frame["low"]).to_numpy() for frame in (one, four)]
-    np.testing.assert_allclose(widths[1] / widths[0], expected[1] / expected[0])
 
 
 def test_physics_alone_takes_no_training_and_makes_that_of_others_no_smaller(made: Any) -> None:

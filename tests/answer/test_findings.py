@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from shipid.answer.findings import BAND_RULES as BANDS
+from shipid.answer.findings import FULL_SCALE_RULES as CLAIMS
 from shipid.answer.findings import judge_findings
-from shipid.answer.findings_bands import BAND_RULES as BANDS
-from shipid.answer.findings_full_scale import FULL_SCALE_RULES as CLAIMS
-from shipid.study.results import Results, read_results
-from tests.answer.byhand import RIVALS, grid
-from tests.study.tiny import run_here, tiny_plan
+from shipid.study.results import Results
+from tests.answer.byhand import grid
 
 RUNS = 8  # test manoeuvres, all alike but for a tenth
 
@@ -114,17 +112,6 @@ def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> Non
             }
 
 
-def test_data_driven_that_is_worst_at_most_steps(made: Any) -> None:
-    curves = {("none", 30, 0): [9.0, 9.0, 9.0, 1.0]}
-    results = made(one(1.0, 1.9, 7.0), curves=curves, runs=RUNS)
-    assert verdicts(results)["R4"] == "undecided"
-    assert "worst at 75 % of the steps" in judge_findings(results)[3]["evidence"]
-    assert 'most often worst: "no physics"' in judge_findings(results)[3]["evidence"], "`none` would mean nobody"
-    results = made(one(1.0, 1.9, 3.0), runs=RUNS)
-    assert "worst at 0 % of the steps" in judge_findings(results)[3]["evidence"]
-    assert "most often worst: bad alone" in judge_findings(results)[3]["evidence"]
-
-
 def test_evidence_names_the_numbers_and_their_intervals(made: Any) -> None:
     evidence = {finding["id"]: finding["evidence"] for finding in judge_findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
     assert evidence["R1"].startswith("good 2.00 m -> 1.00 m, 1.00 m [0.9")
@@ -146,24 +133,3 @@ def test_no_claims_no_findings(made: Any) -> None:
     assert judge_findings(made(one(1.0, 2.0, 9.0), claims=None)) == []
     assert judge_findings(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (30,)))) == []
     assert judge_findings(made(one(1.0, 2.0, 9.0), claims={"nominal": "good"})) == []
-
-
-def test_both_sets_of_findings_can_be_asked_for(made: Any) -> None:
-    cells = grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})
-    claims = judge_findings(made(cells, claims={**RIVALS, "moderate": "good", "high": "bad"}, runs=RUNS))
-    assert [finding["id"] for finding in claims] == [*CLAIMS, *(f"S{k}" for k in range(1, 8)), *BANDS]
-
-
-def test_a_judged_method_that_is_never_without_physics_leaves_those_of_a_growing_N_D_undecided(tmp_path: Path) -> None:
-    """Before, a traceback after the whole computation."""
-    small = {"kind": "path-drawn", "trials": 1, "units": 8, "terms": 4}
-    methods = [
-        {"name": "both", "families": ["right", "wrong"], **small},
-        {"name": "pure", "families": ["none"], **small},
-    ]
-    plan = tiny_plan(tmp_path, {"method": methods, "claims": {"moderate": "right", "high": "wrong"}})
-    run_here(plan, tmp_path / "run")
-    found = [one for one in judge_findings(read_results(tmp_path / "run")) if one["id"].startswith("S")]
-    assert len(found) == 7
-    assert {one["verdict"] for one in found} == {"undecided"}
-    assert all("'both' is not run without physics" in one["evidence"] for one in found)

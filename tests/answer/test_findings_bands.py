@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings_bands import BAND_RULES, BandEvidence, Promise, Widths, judge_held_share
+from shipid.answer.findings import BAND_RULES, BandEvidence, Promise, Widths, judge_held_share
 from tests.answer.made_up import Size, table
 
 LEVEL = 0.9
@@ -89,10 +89,6 @@ def test_a_promise_is_kept_from_5_points_below_the_level_on(shares: tuple[float,
     assert promise(np.concatenate(inside), np.repeat(np.arange(40).astype(str), 25))[0] == expected
 
 
-def test_few_test_manoeuvres_decide_nothing() -> None:
-    assert held(np.random.default_rng(5), 0.97, runs=4) == "undecided"
-
-
 @pytest.mark.parametrize(("bad", "expected"), [(2.0, "confirmed"), (0.5, "refuted")])
 def test_of_two_models_the_less_accurate_has_the_wider_band(bad: float, expected: str) -> None:
     size = Size(runs=20, amounts=(5, 20))
@@ -122,13 +118,3 @@ def test_an_order_of_many_models_and_its_opposite_are_seen(power: float, expecte
     verdict, _evidence, numbers = trend(Widths(drawn, tuple(A)))
     assert verdict == expected
     assert np.sign(numbers["least rank correlation of width and A"]) == power
-
-
-@pytest.mark.filterwarnings("error")
-def test_no_width_rises_with_an_A_that_all_models_have() -> None:
-    models, hard = tuple("abcde"), np.linspace(0.9, 1.1, 8)
-    widths = {name: hard[None, None] * (k + 1) for k, name in enumerate(models)}
-    same = ErrorTable((10,), np.ones(8), dict.fromkeys(models, 2.0 * hard), widths)
-    verdict, evidence, _numbers = trend(Widths(same, models))
-    assert verdict == "undecided"
-    assert "the same A" in evidence

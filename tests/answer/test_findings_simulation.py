@@ -68,17 +68,6 @@ def test_the_paper_by_hand(judged: Any) -> None:
     assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S7": "not testable"}
 
 
-@pytest.mark.filterwarnings("error")
-def test_physics_that_made_the_data_are_no_traceback(judged: Any) -> None:
-    """No error at all, alone and with five seeds of data: S1 holds, and nothing can rise with A."""
-    exact = {**dict.fromkeys((f"moderate-{k}" for k in (1, 2, 3)), [0.0] * 3), "high-1": [0.0] * 3, "high-2": [9.0] * 3}
-    by_claim = judged({**exact, "none": H["none"]}, seeds=5, alone=dict.fromkeys(ALONE, 0.0))
-    assert by_claim["S1"]["verdict"] == "confirmed"
-    assert by_claim["S3"]["evidence"] == "all physics models have the same A, so nothing can rise with it"
-    for finding in by_claim.values():
-        assert np.isfinite(list(finding["numbers"].values())).all()
-
-
 def test_one_seed_cannot_tell_a_fluctuation(judged: Any) -> None:
     by_claim = judged()
     assert verdicts(by_claim) == {**dict.fromkeys(CLAIMS, "confirmed"), "S4": "undecided", "S7": "not testable"}
@@ -219,25 +208,3 @@ def test_nothing_is_decided_without_the_whole(judged: Any, made: Any) -> None:
     del some["high-1", 30, 0]
     partial: Results = made(some, planned=18, family=FAMILY, alone=ALONE, claims=ROLES)
     assert {f["evidence"] for f in judge_findings(partial)} == {"1 of 18 cells are not finished"}
-
-
-def test_a_family_without_results_is_reported(judged: Any) -> None:
-    by_claim = judged({**H, "high-1": (None,) * 3, "high-2": (None,) * 3})
-    assert by_claim["S4"]["verdict"] == "undecided"
-    assert by_claim["S4"]["evidence"].startswith("no high model has a result in every cell")
-    assert by_claim["S1"]["verdict"] == "confirmed"
-    by_claim = judged({**H, **{f"moderate-{k}": (None,) * 3 for k in (1, 2, 3)}})
-    assert [by_claim[key]["verdict"] for key in ("S1", "S6")] == ["undecided"] * 2
-
-
-def test_the_nominal_model_counts_nowhere(judged: Any) -> None:
-    """It rises with N_D and would refute S2."""
-    options = {
-        "family": {**FAMILY, "nominal": 1},
-        "alone": {**ALONE, "nominal": 0.5},
-        "claims": {**ROLES, "nominal": "nominal"},
-    }
-    with_it = judged({**H, "nominal": (0.5, 0.6, 0.7)}, **options)
-    assert {key: finding["evidence"] for key, finding in with_it.items()} == {
-        key: finding["evidence"] for key, finding in judged().items()
-    }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 
 from shipid.answer import memory
-from shipid.evidence import FEWEST_RUNS, TRAINING, paired_difference
 from shipid.metrics import position_error
 from shipid.study.results import Results, read_results
 from tests.study.tiny import run_here, tiny_plan
@@ -72,12 +70,6 @@ def test_physics_alone_that_depends_on_the_cell_is_no_rival(tmp_path: Path) -> N
     assert compared == {*COMPARED} - {"observer: physics alone"}
 
 
-def test_other_kinds_are_no_rivals(tmp_path: Path) -> None:
-    other = [{"name": "trained", "kind": "path-trained", "trials": 1}, CHANGES["method"][1]]
-    plan = tiny_plan(tmp_path, {**CHANGES, "method": other})
-    assert {pair.added for pair in memory.memory_pairs(plan.foundations, plan.methods)} == {"observer"}
-
-
 def test_a_study_without_memory_has_no_pairs(tiny_run: Path) -> None:
     results = read_results(tiny_run)
     assert memory.memory_frame(results).empty
@@ -116,37 +108,3 @@ def test_the_observer_frame_holds_every_row_of_the_shown_runs(results: Results) 
     first = frame.groupby("run").head(1)
     assert first["observer.test"].isna().all()
     assert frame.drop(first.index)["observer.test"].notna().all()
-
-
-def test_an_order_is_marked_once(results: Results) -> None:
-    frame = results.dataset.frame.copy()
-    run = str(results.test.run[0])
-    place = frame.index[frame["run"] == run][10]
-    name = results.dataset.commands[0]
-    frame.loc[(frame["run"] == run) & (frame.index >= place), name] += 0.3
-    frame.loc[place, name] -= 0.1  # a ramp of two rows is one order
-    changed = type(results.dataset)(frame, results.dataset.metadata)
-    before = memory.orders_frame(results)
-    after = memory.orders_frame(replace(results, dataset=changed))
-    assert len(after) == len(before) + 1
-    assert after[after["run"] == run]["t"].tolist() == [frame["t"][place]]
-
-
-def test_intervals_are_those_of_contrasts(results: Results) -> None:
-    """Over test runs, paired, by which verdicts are decided too."""
-    runs, test = sorted(set(results.test.run)), results.test
-    assert len(runs) == FEWEST_RUNS
-    before, after = (
-        [position_error(results.physics[name], test.future)[:, test.run == run].mean() for run in runs]
-        for name in ("wrong-2", "seen-2")
-    )
-    windows = np.array([(test.run == run).sum() for run in runs], dtype=float)
-    judged = paired_difference(np.subtract(after, before)[None, :], windows)
-    frame = memory.memory_frame(results).set_index(["comparison", "model"])
-    row = frame.loc[("observer: physics alone", "wrong-2")]
-    assert (row["low"], row["high"]) == pytest.approx((judged.low[0], judged.high[0]))
-    trained = memory.memory_frame(results).query("N_D > 0 and seeds == 1")
-    assert len(trained)
-    for one in trained.itertuples():
-        noise = TRAINING * np.hypot(one.H_without, one.H_with)
-        assert one.high - one.low > 2 * 2.77 * noise, "Student's, four degrees of freedom: what training would give"

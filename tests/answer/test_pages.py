@@ -45,11 +45,6 @@ def test_no_model_is_named_that_no_cell_has(tmp_path: Path) -> None:
     assert "no physics" not in [chip.label for chip in errors_over.horizon_figure(content).chips]
 
 
-def test_a_further_frame_is_one_line(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(pages.REPORT_FRAMES, "failed", lambda results: results.cells[results.cells["status"] != "ok"])
-    assert len(report_content(read_results(tiny_run)).frames["failed"]) == 0
-
-
 def test_pages_are_written_anew_from_the_folder(tiny_run: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(tiny_run, tmp_path / "run")
     report = write_pages(str(folder))

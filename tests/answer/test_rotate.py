@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.answer import rotate as rotate_module
 from shipid.answer.rotate import (
     choose_turns,
-    kept_folder,
     remove_kept,
-    repeated_runs_in_words,
     rotate_test_runs,
     turn_findings,
     turns_table,
@@ -82,38 +78,6 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
         np.testing.assert_allclose(turn["naive"], prepared.naive.mean())
     remove_kept(tmp_path / "kept")
     assert not (tmp_path / "kept").exists()
-
-
-def test_copies_of_runs_are_named_before_their_errors_are_believed(
-    recorded: Callable[..., tuple[Plan, Dataset]],
-) -> None:
-    """Of two copies one trained while the other tested: errors of millimetres, without a word."""
-    log = weaving()
-    copy = log.frame[log.frame["run"] == "a"].assign(run="again", t=lambda rows: rows["t"] + 1e4)
-    twice = Dataset(pd.concat([log.frame, copy], ignore_index=True), {**log.metadata, "clock": "run"})
-    plan, dataset = recorded(twice, split={"test": ["f"]}, prediction={"ahead": 5.0})
-    assert repeated_runs_in_words(plan, dataset).startswith(
-        "runs that move as others do ('again' as 'a'): where one tests"
-    )
-    plan, dataset = recorded(log, split={"test": ["f"]}, prediction={"ahead": 5.0})
-    assert not repeated_runs_in_words(plan, dataset)
-
-
-def test_what_is_kept_belongs_to_one_question(
-    recorded: Callable[..., tuple[Plan, Dataset]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Other settings, data, devices, code, or vessels that are exchanged, have another folder."""
-    plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
-    file = tmp_path / "rows.csv"
-    other, _ = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 6.0}, grid={"N_D": [5]})
-    moved = Dataset(dataset.frame.assign(u=dataset.frame["u"] + 0.1), dataset.metadata)
-    here = next(iter(plan.vessels.values()))
-    two = {"here": here, "there": here.with_values({"inertia.m": 1.1 * here.parameters["inertia.m"]})}
-    placed = [replace(plan, vessels=dict(zip(two, pair, strict=True))) for pair in permutations(two.values())]
-    cases = [(plan, dataset), (other, dataset), (plan, moved), (plan, dataset, "cuda")]
-    folders = [kept_folder(file, *one) for one in (*cases, *((each, dataset) for each in placed))]
-    monkeypatch.setattr(rotate_module, "code_digest", lambda: "another commit")
-    assert len({*folders, kept_folder(file, plan, dataset)}) == 7
 
 
 def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
@@ -187,10 +151,3 @@ def test_a_failed_cell_is_left_out(claimed: Plan) -> None:
     frame.loc[(frame["foundation"] == "good") & (frame["test"] == "ZZ 0"), ["status", "H"]] = ["failed", np.nan]
     assert turn_findings(frame, claimed)[0]["evidence"].endswith("5 test manoeuvres")
     assert turns_table(frame).set_index("foundation").loc["good", "turns"] == 5
-
-
-def test_a_run_without_windows_takes_no_turn(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
-    dataset = weaving()
-    short = dataset.frame[(dataset.frame["run"] != "c") | (dataset.frame["t"] < 3.0)].reset_index(drop=True)
-    plan, cut = recorded(Dataset(short, dataset.metadata), split={"test": 1}, prediction={"ahead": 5.0})
-    assert choose_turns(plan, cut, ["*"]) == ["a", "b", "d", "e", "f"]

@@ -76,14 +76,6 @@ def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
     assert advice.startswith(f"{first}, even with an error A of 6.00 m.\n")
 
 
-def test_a_tie_is_no_harm(made: Any) -> None:
-    """`bad` has 6 m alone and compensated, and so have constant u, v, r."""
-    advice = text(made(grid({"good": (1.5, 1.0), "bad": (7.0, 6.0), "none": (9.0, 8.0)}), naive=6.0))
-    assert "harms" not in advice
-    assert "It is not shown that compensation helps bad." in advice
-    assert 'at 30 runs "no physics" is worse, and bad is not shown to beat them.' in advice
-
-
 def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
     methods = [{"name": "drawn", "kind": "path-drawn", "families": ["good", "bad"]}]
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0)}), changes={"method": methods}))
@@ -175,19 +167,6 @@ def test_the_worst_tried_is_not_the_worst_that_has_every_result(made: Any) -> No
     assert "in every cell" not in text(made(H, alone=alone, claims=None, runs=8))
 
 
-def test_no_limit_of_A_where_better_physics_does_worse(made: Any) -> None:
-    """The better the physics, the worse it predicts with data: no A divides what pays from what harms."""
-    alone = {f"m{k}": 2.0**k for k in range(5)}
-    H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (3.0, 3.0)}
-    advice = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert "physics pays" not in advice
-    sides = "3 of 5 physics models do better than no physics; m0 and m1 do worse"
-    assert f"With 10 or 30 runs {sides}.\n" in advice
-    assert advice.count(sides) == 1
-    H = {name: (10.0 / A, 10.0 / A) for name, A in alone.items()} | {"none": (1.0, 1.0)}
-    assert "physics does not pay" not in text(made(grid(H), alone=alone, claims=None, runs=8))
-
-
 def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
     """`none` with 30 runs has about what `good` has with 10: the test cannot tell which has less."""
     H = grid({"good": (2.0, 1.0), "bad": (3.0, 2.0), "none": (2.1, 2.05)})
@@ -264,21 +243,6 @@ def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     assert "(over 1 model)" in advice
 
 
-def test_an_amount_without_any_result_takes_no_interval_of_the_others(made: Any) -> None:
-    """Too few runs for the method, such as 10 of a single window each: the answer is that of 20 and 30 runs."""
-    H = {"good": (None, 2.0, 1.0), "bad": (None, 3.0, 2.0), "none": (None, 9.0, 4.0)}
-    advice = text(made(grid(H, (10, 20, 30)), runs=8))
-    assert "3 of 9 cells have no result" in advice
-    assert "With 20 or 30 runs every physics model" in advice
-    assert "With 20 runs, good (best in validation) has 2.00 m [" in advice
-
-
-def test_what_is_not_known_of_the_best_model_is_said_of_it(made: Any) -> None:
-    H = {"good": (1.5, None, 1.0), "bad": (3.0, 2.0, 1.5), "none": (9.0, 4.0, 2.0)}
-    advice = text(made(grid(H, (10, 20, 30))))
-    assert "How many runs? Unknown: of good not every cell has a result." in advice
-
-
 def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, None)})))
     assert "does better" not in advice
@@ -290,51 +254,6 @@ def test_without_results_there_is_no_conclusion(made: Any) -> None:
     assert "there is no conclusion" in advice
     assert "does better" not in advice
     assert "there is no conclusion" in text(made(grid({"good": (None,), "bad": (None,), "none": (None,)}, (10,))))
-
-
-@pytest.mark.parametrize(
-    "trials",
-    [
-        [],
-        [{"value": None, "state": "complete"}],
-        [{"value": 2.0, "state": "stopped"}],
-    ],
-)
-def test_results_are_answered_whatever_their_trials_say(made: Any, trials: list[dict[str, Any]]) -> None:
-    """The answer said that no cell had a result, where trials of a user's method had no value."""
-    H = {"good": (1.5, 1.0), "bad": (5.0, 4.5), "none": (9.0, 4.0)}
-    whole = made(grid(H), runs=20)
-    odd = replace(whole, cells=whole.cells.assign(trials=[trials] * len(whole.cells)))
-    assert best_model(odd) is None
-    with_best, without = (text(results).split("\n") for results in (whole, odd))
-    assert not any("no conclusion" in sentence for sentence in without)
-    of_best = ("How many runs?", "With 30 runs, good")
-    kept = [sentence for sentence in with_best if not sentence.startswith(of_best)]
-    added = [sentence for sentence in without if sentence not in kept]
-    assert [sentence for sentence in without if sentence not in added] == kept
-    begins = (
-        "With 30 runs, no trial of the method 'drawn' has a value, so no model is best in validation. Mean errors 8 s"
-    )
-    assert len(added) == 1
-    assert added[0].startswith(f"{begins} ahead: good 1.00 m and bad 4.50 m. Without physics: 4.00 m")
-
-
-def test_where_the_method_that_judges_has_no_result_others_may_have_one(made: Any) -> None:
-    methods = [{"name": "drawn", "kind": "path-drawn"}, {"name": "other", "kind": "path-drawn"}]
-    results = made(grid({"good": (None, None), "none": (9.0, 4.0)}), changes={"method": methods}, planned=12)
-    (row,) = results.cells[results.cells["model"].eq("none") & results.cells["N_D"].eq(30)].to_dict("records")
-    other = pd.DataFrame([{**row, "method": "other", "foundation": "good", "model": "good + other", "family": "good"}])
-    results = replace(results, cells=pd.concat([results.cells, other], ignore_index=True))
-    advice = text(results)
-    assert "No cell with physics and data that counts has a result yet, so there is no conclusion." in advice
-
-
-def test_a_long_list_of_names_is_cut(made: Any) -> None:
-    names = [f"m{k}" for k in range(9)]
-    H = dict.fromkeys(names, (5.0, 5.0)) | {"good": (1.5, 1.0), "none": (4.0, 3.0)}
-    assert "does better than no physics; m0, m1, m2, m3, m4 and 4 more do worse" in text(
-        made(grid(H), alone=dict.fromkeys([*names, "good"], 9.0), claims=None)
-    )
 
 
 def test_bounds_are_those_that_the_study_covers() -> None:
@@ -349,14 +268,8 @@ def test_bounds_are_those_that_the_study_covers() -> None:
 def test_the_comparison_of_methods_comes_first(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     results = made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)}))
     plain = [sentence for sentence, _ in answer_sentences(results, ["Memory errs least."])]
-    monkeypatch.setattr(type(results.plan), "learning", ["drawn", "memory"])
+    monkeypatch.setattr("shipid.answer.sentences.learning_methods", lambda _: ["drawn", "memory"])
     sentences = [sentence for sentence, _ in answer_sentences(results, ["Memory errs least."])]
     assert sentences[0] == "Memory errs least."
     assert [one for one in sentences[1:] if "judges by" not in one] == plain
     assert len(sentences) == len(plain) + 2
-
-
-def test_models_that_do_worse_are_named(made: Any) -> None:
-    advice = text(made(grid({"good": (1.5, 3.5), "bad": (5.0, 4.0), "none": (4.0, 3.0)})))
-    assert "With 10 runs 1 of 2 physics models does better than no physics; bad does worse. " in advice
-    assert "With 30 runs none of 2 physics models does better than no physics; good and bad do worse." in advice

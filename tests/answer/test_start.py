@@ -8,10 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from shipid.answer.start import event_line, events, run
+from shipid.answer.start import events, run
 from shipid.errors import ShipidError
 from shipid.study.plan import default_folder, read_plan
-from shipid.study.run import Event
 from tests.study.tiny import TINY
 
 
@@ -48,9 +47,3 @@ def test_a_mistake_is_an_error_of_shipid() -> None:
         next(events(TINY, {"grid.M_D": [4]}))
     with pytest.raises(ShipidError, match="out must be a path, a text or a Path, not 3"):
         next(events(TINY, out=3))  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(("H", "words"), [(12.3456, "12.346"), (0.05, "0.050"), (0.0002, "0.00020")])
-def test_errors_of_a_ship_model_are_no_zeros_while_a_study_runs(H: float, words: str) -> None:
-    row = {"status": "ok", "cell": "a", "H": H, "H_90": 2 * H, "seconds": 1.0}
-    assert f"H {words} m, H_90 {2 * H:.{len(words.partition('.')[2])}f} m" in event_line(Event("cell", "", 1, 2, row))

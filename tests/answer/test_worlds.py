@@ -97,16 +97,6 @@ def test_each_kind_of_number_has_its_limits(
     assert (row["high"] > 1) == (limits[1] > 1)
 
 
-def test_a_world_that_cannot_tell_is_counted(made: Any) -> None:
-    H = {"good": (1.0,), "bad": (2.1,), "none": (9.0,)}
-    H["bad"] = (1.8,)
-    frame = compare_findings([made(grid(H, (30,)), runs=8), made(grid({**H, "bad": (None,)}, (30,)), runs=8)])
-    row = frame[frame["number"] == "H inaccurate / A accurate"].iloc[0]
-    assert row["verdicts"] == "1 confirmed, 1 undecided"
-    assert row["mean"] == pytest.approx(0.9)
-    assert np.isnan([row["low"], row["high"]]).all(), "one world has no interval"
-
-
 def test_a_member_weighs_once_and_a_failed_cell_nothing() -> None:
     """A of a family is the mean over its members, however many cells each has; what is identified has no one A."""
     columns = ["foundation", "family", "method", "N_D", "status", "A", "H", "coverage", "width"]

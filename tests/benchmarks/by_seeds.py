@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from shipid.answer.findings_full_scale import Rivals
+from shipid.answer.findings import Rivals
 from shipid.answer.findings_simulation import ErrorGrid
 from shipid.answer.verdict import Verdict
 from shipid.metrics import rank_correlation

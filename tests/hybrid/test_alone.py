@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from shipid.data.windows import Instants
-from shipid.errors import DocumentError
 from shipid.hybrid.alone import Alone, Unchanged
-from shipid.hybrid.methods import method_of
 from shipid.hybrid.physics import Physics
 
 
@@ -23,8 +20,3 @@ def test_it_learns_nothing_and_needs_physics() -> None:
     assert Alone().varied() == ()
     assert Alone().past == 0.0
     assert Unchanged.from_arrays(Unchanged({}).header(), {}) == Unchanged({})
-
-
-def test_it_has_no_settings() -> None:
-    with pytest.raises(DocumentError, match=r"method\.trials: unknown key"):
-        method_of("alone", {"trials": 3})

@@ -7,8 +7,6 @@ from shipid.hybrid.compensator import (
     Compensator,
     Network,
     Normaliser,
-    flatten_paths,
-    unflatten_paths,
 )
 from shipid.hybrid.features import Inputs, choose_features, feature_table
 from tests.hybrid.tasks import compensation
@@ -63,10 +61,3 @@ def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
         x, y = h[:, :4].numpy().T, h[:, 4:].numpy().T  # (12): all dx, then all dy
         expected.append(np.stack([network.basis @ x, network.basis @ y], axis=-1))
     np.testing.assert_allclose(compensation(compensator, columns), np.mean(expected, axis=0), atol=1e-10)
-
-
-def test_paths_survive_the_order_of_12():
-    paths = np.random.default_rng(0).normal(size=(30, 9, 2))
-    assert flatten_paths(paths).shape == (9, 60)
-    np.testing.assert_array_equal(flatten_paths(paths)[4, 30:], paths[:, 4, 1])
-    np.testing.assert_array_equal(unflatten_paths(flatten_paths(paths)), paths)

@@ -11,7 +11,6 @@ from shipid.hybrid.features import (
     Inputs,
     Memory,
     choose_features,
-    count_steps,
     feature_table,
     input_group,
     observer_inputs,
@@ -49,18 +48,6 @@ def test_columns_that_differ_by_rounding_are_one_and_vary_by_more(columns):
     chosen = choose_features(feature_table(columns, COMMANDS))
     assert chosen["port.n"] == ("port.n", "starboard.n")
     assert "u" not in chosen
-
-
-def test_constant_columns_are_dropped_and_motions_never_merged(columns):
-    columns["port.n"][:] = 2.4
-    columns["v"] = columns["u"].copy()
-    chosen = choose_features(feature_table(columns, COMMANDS[:2]))
-    assert list(chosen) == ["u", "v", "r", "port.alpha", "u_rw", "v_rw"]
-
-
-def test_wind_that_was_not_measured_is_no_input(columns):
-    del columns["beta_w"]
-    assert list(feature_table(columns, ())) == ["u", "v", "r"]
 
 
 def test_relative_wind_by_hand():
@@ -160,10 +147,3 @@ def test_planned_means_by_hand() -> None:
         | {f"port.planned-{number}.alpha": 0.0 for number in (1, 2, 3)}
     )
     assert list(planned_means({"a.n": np.zeros(1)}, {"a.n": np.ones((2, 1))})) == ["a.planned-1.n", "a.planned-2.n"]
-
-
-@pytest.mark.parametrize(
-    ("seconds", "step", "steps"), [(8.0, 1.0, 8), (8.0, 0.5, 16), (8.0, 2.0, 4), (0.3, 0.1, 3), (0.1, 1.0, 1)]
-)
-def test_seconds_are_so_many_steps(seconds: float, step: float, steps: int) -> None:
-    assert count_steps(seconds, step) == steps

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import ShipidError
 from shipid.hybrid.forest import Forest, Trees
 from tests.hybrid.worlds import HORIZON, fitted, missed, ship, world
 
@@ -68,9 +68,3 @@ def test_without_scikit_learn_one_line_says_what_to_install(monkeypatch):
     with pytest.raises(ShipidError, match=r"shipid\[forest\]") as caught:
         Forest().fit(world(ship(), ship(), runs=2, seconds=20).task())
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("wrong", [{"share": (0.0, 1.0)}, {"share": 0.0}, {"leaf": 0.3}, {"leaf": (0.2, 0.4)}])
-def test_settings_that_no_forest_can_have(wrong):
-    with pytest.raises(DocumentError, match=next(iter(wrong))):
-        Forest(**wrong)

@@ -52,22 +52,8 @@ def test_what_the_physics_missed_before_is_what_it_missed_in_the_steps_before():
         np.testing.assert_allclose(found, steps.missing[first], rtol=0, atol=1e-9)
 
 
-def test_every_delay_is_a_trial():
-    here = world(ship(), ship(), force=late, past=8, known=True)
-    method = HankelDMD(delays=(1.0, 2.0, 3.0, 4.0))
-    (result,) = method.fit(here.task()).values()
-    assert [row["params"]["delays"] for row in result.trials] == [1.0, 2.0, 3.0, 4.0]
-    assert method.num_trials() == 4
-
-
 def test_trials_that_would_have_no_effect_are_refused():
     with pytest.raises(DocumentError, match=r"trials: each of `delays` is a trial: leave it out") as caught:
         HankelDMD(trials=2)
     assert "\n" not in str(caught.value)
     assert HankelDMD(budget=10.0).num_trials() is None
-
-
-@pytest.mark.parametrize("wrong", [{"delays": ()}, {"samples": 0}, {"samples": -1}])
-def test_settings_that_no_fit_can_have(wrong):
-    with pytest.raises(DocumentError, match=next(iter(wrong))):
-        HankelDMD(**wrong)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from shipid.data.windows import Windows, cut_windows
+from shipid.engine.rollout import rollout
 from shipid.errors import DataError
 from shipid.hybrid.learned_force import (
     BLOCK,
@@ -18,10 +18,13 @@ from shipid.hybrid.learned_force import (
     _ForceLoss,
     block_document,
     force_limits,
+    horizontal_mass,
 )
 from shipid.hybrid.method import Case, Task, fit_all
 from shipid.hybrid.physics import Physics
+from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
+from tests.hybrid.worlds import fitted, world
 from tests.study.test_commands import weaving
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -57,13 +60,6 @@ def test_it_learns_most_of_a_wrong_resistance(windows: Windows) -> None:
     best = min(fit.trials, key=lambda row: row["value"])
     assert fit.corrector.hyperparameters == best["params"]
     assert [row["params"]["ridge"] for row in fit.trials] == pytest.approx([1e-2, 1e-4])  # from stiff to soft
-
-
-@pytest.mark.parametrize(
-    ("given", "count"), [({}, 3), ({"ridge": 0.1}, 1), ({"trials": 2}, 2), ({"budget": 9.0}, None)]
-)
-def test_each_ridge_is_a_trial(given: dict[str, Any], count: int | None) -> None:
-    assert LearnedForce(**given).num_trials() == count
 
 
 def test_the_force_is_bounded_by_what_the_ship_is() -> None:
@@ -107,3 +103,25 @@ def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -
     assert not np.isfinite(hopeless.error(hopeless.start, none, windows.future))
     alone = _ForceLoss(WRONG, block(weight=0.0), instants.select(every[every != 4]), windows.future[:, every != 4], 5)
     np.testing.assert_array_equal(trainer.solve(0.1, None)[0], alone.solve(0.1, None)[0])
+
+
+@pytest.mark.slow
+def test_home_a_missing_cross_flow():
+    truth = load_vessel("gunnerus-33.9")
+    here = world(truth, truth.with_values({"hull.crossflow.off": True}), known=True)
+    assert here.removed(fitted(LearnedForce(trials=1, ridge=1e-5), here)) > 0.8
+
+
+@pytest.mark.parametrize("name", ["gunnerus-33.9", "gunnerus-28.9-6dof", "kvlcc2-l7"])
+def test_the_mass_is_what_unit_forces_feel_in_one_step(name):
+    """Against the equations of motion: a force of 1 kN and 1 kN m for one Euler step of 1 s, from rest."""
+    vessel = load_vessel(name)
+    model = vessel_dynamics(vessel)
+    rows = [vessel.axes.index(axis) for axis in (0, 1, 5)]
+    forces = np.zeros((1, 4, len(vessel.axes)))
+    forces[0, range(3), rows] = 1e3
+    zeros = {kind: {key: np.zeros(4) for key in getattr(model, kind)} for kind in ("state", "commands", "environment")}
+    begun = zeros["state"], zeros["commands"], zeros["environment"]
+    after = rollout(vessel, *begun, step=1.0, num_steps=1, tau_extra=forces, engine="casadi")
+    moved = np.stack([after[motion][-1, 0] for motion in ("u", "v", "r")])
+    np.testing.assert_allclose(horizontal_mass(vessel) @ (moved[:, :3] - moved[:, 3:]), 1e3 * np.eye(3), atol=1e-4)

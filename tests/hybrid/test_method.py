@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,7 @@ from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, input_table_key, shared_tables
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Searched
-from shipid.hybrid.trials import trial_row
+from shipid.hybrid.search import trial_row
 from shipid.vessel.load import load_vessel
 from tests.study.test_whole import windy
 
@@ -78,12 +76,6 @@ def test_inputs_without_physics_are_one_array_for_all() -> None:
             np.testing.assert_array_equal(table[key], values)
 
 
-@pytest.mark.parametrize("skeleton", [Method, Searched])
-def test_a_skeleton_is_no_method(skeleton: type[Method]) -> None:
-    with pytest.raises(TypeError, match=r"abstract class \w+ with"):
-        skeleton()
-
-
 ROW = trial_row(0, {}, 1.0, 0.0)
 
 
@@ -93,7 +85,7 @@ ROW = trial_row(0, {}, 1.0, 0.0)
         (None, "must return a table, foundation -> Fitted, not NoneType"),
         ({}, "must give a Fitted for 'right', not NoneType"),
         (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a Fitted for 'right', not tuple"),
-        ({"right": Fitted(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*row_of"),
+        ({"right": Fitted(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*trial_row"),
         ({"right": Fitted(None, None, 0.0)}, "'NoneType' object is not iterable: make trials by"),  # type: ignore[arg-type]
         ({"right": Fitted(None, [{**ROW, "params": None}], 0.0)}, "trial 0.params: None: must be a table"),
         ({"right": Fitted(None, [{**ROW, "value": "low"}], 0.0)}, "trial 0.value: 'low': must be a number"),
@@ -108,12 +100,6 @@ ROW = trial_row(0, {}, 1.0, 0.0)
             {"right": Fitted(Unchanged({}), [trial_row(0, {}, np.nan, 0.0)], 0.0)},
             "a corrector needs a trial that is comp",
         ),
-        ({"right": Fitted(Unchanged({}, "1 s"), [ROW], 0.0)}, "past of the corrector must be a number, not '1 s'"),  # type: ignore[arg-type]
-        (
-            {"right": Fitted(Unchanged({}, -1.0), [ROW], 0.0)},
-            "past of the corrector must be seconds, from 0 on, not -1",
-        ),
-        ({"right": Fitted(None, [ROW], 0.0, sentence=3)}, "sentence must be a text, not int"),  # type: ignore[arg-type]
         ({"right": Fitted(None, [{**ROW, "number": "1"}], 0.0)}, "trial 0.number: '1': must be a number"),
         (
             {"right": Fitted(None, [{**ROW, "state": "done"}], 0.0)},
@@ -125,8 +111,6 @@ ROW = trial_row(0, {}, 1.0, 0.0)
             {"right": Fitted(None, [{**ROW, "params": {"k": {1}}}], 0.0)},
             "trial 0.params.k: .*: must be a number",
         ),
-        ({"right": Fitted(None, [ROW], "1 s")}, "seconds must be a number, not '1 s'"),  # type: ignore[arg-type]
-        ({"right": Fitted(Unchanged({"k": "3"}), [ROW], 0.0)}, "hyperparameters of the corrector: k must be a n"),  # type: ignore[dict-item]
         ({"right": Fitted(None, [ROW], 0.0, np.zeros((2, 4)))}, r"left_out must be \(3, \d+, 2\), not \(2, 4\)"),
     ],
 )
@@ -140,19 +124,6 @@ def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
     with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}") as caught:
         fit_all(Mine(), task())
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("words", [[], ["no licence"], [3]])
-def test_a_method_that_ends_the_process_is_named(words: list[Any]) -> None:
-    """Its worker was said to be killed, perhaps for want of memory; without workers the command ended as if well."""
-
-    class Mine(Method):
-        def fit(self, given: Task) -> dict[str, Fitted]:  # noqa: ARG002
-            sys.exit(*words)
-
-    said = r" \(no licence\)" if words == ["no licence"] else ""
-    with pytest.raises(ShipidError, match=rf"^Mine\.fit calls sys\.exit{said} in {re.escape(__file__)}, line \d+: a"):
-        fit_all(Mine(), task())
 
 
 @pytest.mark.parametrize("of", ["fit", "hyperparameters", "past"])

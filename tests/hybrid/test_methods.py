@@ -227,12 +227,3 @@ def test_what_is_listed_and_no_method_is_one_line(
     monkeypatch.setitem(METHODS, "mine", listed)
     with pytest.raises(DocumentError, match=rf"^method\.kind: METHODS\['mine'\] {message}"):
         method_of("mine", {})
-
-
-@pytest.mark.parametrize("past", [float("inf"), float("nan"), -4.0, "20 s"])
-def test_a_past_that_no_window_can_hold_is_refused(past: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Such as that of a method that needs the whole run: it ended in a traceback."""
-    monkeypatch.setitem(METHODS, "whole", type("Whole", (Alone,), {"past": property(lambda _: past)}))
-    with pytest.raises(DocumentError, match=r"Whole\.past must be seconds, from 0 on, not ") as caught:
-        method_of("whole", {}, "method.mine")
-    assert caught.value.path == "method.mine.kind"

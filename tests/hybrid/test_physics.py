@@ -195,15 +195,3 @@ def test_without_a_vessel_there_is_nothing_to_roll_out(windows: Windows) -> None
     ):
         with pytest.raises(ShipidError, match="no physics, so nothing to roll out"):
             ask()
-
-
-def test_what_are_no_instants_or_no_paths_is_refused(windows: Windows) -> None:
-    for physics in (RIGHT, Physics(None, 5, 1.0)):
-        with pytest.raises(
-            DataError, match=r"instants must be an Instants, such as `windows\.instants\(\)`, not Windows"
-        ):
-            physics.paths(windows)  # type: ignore[arg-type]
-    with pytest.raises(DataError, match=r"future must be \(\d+, \d+, 2\), not \(2, \d+, 2\)"):
-        RIGHT.distances(windows.instants(), windows.future[:2])
-    with pytest.raises(DataError, match="future must be an array of numbers"):
-        RIGHT.gradient(windows.instants(), "x", ["inertia.m"])  # type: ignore[arg-type]

@@ -9,7 +9,6 @@ from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.ridge import (
     LEAST_PIVOT,
-    SPARE_TRIALS,
     _BestTrials,
     _coordinates_with_axes,
     _fold_blocks,
@@ -82,9 +81,6 @@ def predicted(fits, columns):
     return {key: compensation(one.corrector, columns) for key, one in fits.items()}
 
 
-# What is left out.
-
-
 def part_of(features, targets):
     """A coordinate as the search holds it."""
     (part,) = _coordinates_with_axes(torch.tensor(features), [torch.tensor(targets)])
@@ -140,14 +136,14 @@ def drawn_parts(seed, models=1):
     return parts, runs, windows
 
 
-@pytest.mark.parametrize(("part_judged", "least", "most"), [(False, 30, 250), (True, 0, 0)])
+@pytest.mark.parametrize(("part_judged", "least", "most"), [(False, 10, 120), (True, 0, 0)])
 def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, most):
     """Not by all folds, nor by all but one; of windows that are judged in part no such bound is known.
 
     In draw 3026 the ridge that is best over both folds is best over neither of them.
     """
     ridges, passed_over = list(np.geomspace(1e-4, 1e4, 9)), 0
-    for seed in (*range(30), 3026):
+    for seed in (*range(12), 3026):
         parts, runs, windows = drawn_parts(seed)
         folds = [(np.setdiff1d(windows, run), run[: len(run) // 2] if part_judged else run) for run in runs]
         blocks = _fold_blocks(folds, windows, "cpu")
@@ -182,7 +178,7 @@ def descent(curves):
 def test_each_model_takes_the_ridge_to_which_it_descends_from_the_middle():
     """By all folds and by all but any one, whatever its company; with one minimum only, this is the best of all."""
     ridges, asked, alike, curves_of_all = list(np.geomspace(1e-4, 1e4, 9)), 0, 0, 0
-    for seed in range(40):
+    for seed in range(15):
         parts, runs, windows = drawn_parts(seed, models=3)
         blocks = _fold_blocks([(np.setdiff1d(windows, run), run) for run in runs], windows, "cpu")
         sums, others, _ = _left_out_errors(parts, ridges, blocks, 2)
@@ -196,7 +192,7 @@ def test_each_model_takes_the_ridge_to_which_it_descends_from_the_middle():
             alike += int((descent(known) == known.argmin(axis=1)).sum())
             curves_of_all += len(known)
         asked += int(np.isfinite(sums).sum())
-    assert asked < 0.6 * 40 * 3 * 9
+    assert asked < 0.6 * 15 * 3 * 9
     assert alike / curves_of_all > 0.9
 
 
@@ -227,24 +223,6 @@ def test_all_windows_choose_the_ridge_of_a_part_or_one_that_is_smaller_by_its_sh
     assert _ridges_for_all(ridges, 0.1, np.array([3])).tolist() == [2, 3]
     assert _ridges_for_all(ridges, 0.03, np.array([1, 4])).tolist() == [0, 1, 2, 3, 4]
     assert _ridges_for_all([0.5], 0.1, np.array([0])).tolist() == [0]
-
-
-def test_a_part_of_the_windows_chooses_nearly_as_well_as_all(columns, targets):
-    """The networks are solved with all windows, so that what a part chooses costs little, on the paths and in bands."""
-    whole, part = (
-        tune(columns, TWINS, targets, FOLDS, recipe(trials=20, averaged=3, search_windows=most), seed=0)["rough"]
-        for most in (1000, 60)
-    )
-    judged = [np.square(one.left_out[:, ALL]).mean() for one in (whole, part)]
-    assert judged[1] == pytest.approx(judged[0], rel=0.1)
-    assert [trial["number"] for trial in part.trials] == list(range(20))
-    assert [trial["state"] for trial in part.trials].count("stopped") == 20 - 3 - SPARE_TRIALS
-    ended = [trial for trial in part.trials if trial["state"] == "complete"]
-    known = {trial["number"]: trial["value"] for trial in whole.trials}
-    assert all(trial["value"] >= known[trial["number"]] * (1 - 1e-6) for trial in ended)  # of fewer ridges
-    assert sum(trial["value"] == pytest.approx(known[trial["number"]], rel=1e-5) for trial in ended) > len(ended) / 2
-    best = sorted(ended, key=lambda trial: trial["value"])[:3]
-    assert best[0]["params"] == part.corrector.hyperparameters
 
 
 @pytest.mark.parametrize("search_windows", [1000, 40])
@@ -341,9 +319,6 @@ def test_the_compensator_is_the_mean_of_the_best_trials(columns, targets):
     assert len(tuned(columns, targets, recipe(averaged=9))["rough"].corrector.networks) == 6
 
 
-# Port and starboard.
-
-
 @pytest.mark.parametrize("commands", [TWINS, RUDDER])
 def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
     seen, new = drawn(commands), drawn(commands, seed=9)
@@ -355,15 +330,6 @@ def test_a_mirrored_ship_gets_the_mirrored_compensation(commands):
     np.testing.assert_allclose(there, here * [1.0, -1.0], atol=1e-12)
     plain = tuned(seen, {"any": paths}, recipe(mirror=0.0), commands=commands)["any"].corrector
     assert np.abs(compensation(plain, mirrored(new)) - compensation(plain, new) * [1.0, -1.0]).max() > 0.01
-
-
-# Company, order, luck.
-
-
-# What is learned.
-
-
-# Time.
 
 
 @pytest.mark.parametrize(("horizon", "terms"), [(30, 8), (15, 1), (50, 12), (2, 8), (1, 8)])
@@ -378,6 +344,3 @@ def test_shapes_are_orthonormal_and_hold_all_polynomials_from_0(horizon, terms):
         above = t ** (terms + 1)
         assert np.abs(basis @ (basis.T @ above) - above).max() > 1e-10
         assert np.abs(basis @ (basis.T @ np.ones(horizon)) - 1.0).max() > 1e-3  # an error starts from 0
-
-
-# Odd data.

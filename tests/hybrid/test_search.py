@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import count
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,9 +13,8 @@ from shipid.hybrid import search as searches
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS, method_of
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, Search, SearchedAlone, affordable_trials
+from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, SearchedAlone, affordable_trials
 from shipid.hybrid.settings import Searched
 from shipid.hybrid.stored import Stored
 from tests.documented import module
@@ -147,30 +145,6 @@ def test_a_price_is_that_of_the_trials_after_the_first() -> None:
     assert affordable_trials(1.0, 0.0, [0.2] * TIMED_TRIALS) == 5 - CLOSING_TRIALS
     assert affordable_trials(1e-9, 0.0, [5.0]) == 1
     assert affordable_trials(100.0, 0.0, [0.0] * TIMED_TRIALS) > 1000  # a clock that does not tick
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_budget_is_kept_by_trials_of_any_price(seed: int) -> None:
-    """Drawn prices: the trials after the first cost about the same; what all cost is the budget, give or take one."""
-    rng = np.random.default_rng(seed)
-    price, before, budget = rng.uniform(0.01, 1.0), rng.uniform(0.0, 2.0), rng.uniform(8.0, 20.0)
-    seconds: list[float] = []
-    while (trials := affordable_trials(budget, before, seconds)) is None or len(seconds) < trials:
-        seconds.append(price * rng.uniform(0.98, 1.02))
-    assert budget - 3 * price < before + sum(seconds) + CLOSING_TRIALS * price < 1.03 * budget + price
-
-
-def test_foundations_that_go_together_share_a_budget(here: World) -> None:
-    method = PathDrawn(budget=50.0)
-    search = Search(here.task(cases_of(here, "path-drawn")), ["a", "none"], method)
-    for number, _ in search.left(count()):
-        row = {"number": number, "params": {}, "value": 1.0, "seconds": 1.0, "epochs": 0, "state": "complete"}
-        search.record({"a": dict(row), "none": dict(row)})
-        if number > 200:
-            break
-    assert search.count is not None
-    assert abs(search.count - 50) <= 2  # 2 x 50 s at 2 s a trial of both
-    assert search.done == search.count
 
 
 class CountingProblem(LearningProblem):

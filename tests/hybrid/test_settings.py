@@ -4,15 +4,7 @@ import pytest
 from shipid.errors import DocumentError
 from shipid.hybrid.methods import method_of
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.settings import spread_points
-
-
-def test_a_field_can_be_changed_in_either_method():
-    assert PathTrained(trials=4, learning_rate=[1e-3, 1e-2]).ranges()["learning_rate"] == (1e-3, 1e-2)
-    assert PathTrained(trials=3, units=20).units == 20
-    assert PathDrawn(ridge=[1e-3, 1]).ranges()["ridge"] == (1e-3, 1.0)
-    assert "offset" not in PathDrawn(offset=1).ranges()
 
 
 @pytest.mark.parametrize(
@@ -74,11 +66,6 @@ def test_trials_fill_their_ranges_by_the_logarithm():
     assert {point["offset"] for point in points} == {1.5}
     assert np.mean([point["mirror"] for point in points]) == pytest.approx(0.75, abs=0.05)
     assert points[:5] == list(PathDrawn(trials=5, offset=1.5).points())
-
-
-@pytest.mark.parametrize("share", [0.0, 1.0])
-def test_all_trials_or_none_can_be_mirrored(share):
-    assert {point["mirror"] for point in PathDrawn(mirror=share).points()} == {share}
 
 
 def test_ridges_go_from_low_to_high_by_one_factor():

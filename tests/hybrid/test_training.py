@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from shipid.hybrid import training
-from shipid.hybrid.training import BestEpochs, Length, StackSettings, train_stack
+from shipid.hybrid.training import Length, StackSettings, train_stack
 
 torch.set_num_threads(1)
 TRAIN, VAL = np.arange(96), np.arange(96, 128)
@@ -104,24 +104,6 @@ def test_early_stopping_keeps_the_best_epoch(problem):
     np.testing.assert_array_equal(stopped.layers[0][0][0], kept.layers[0][0][0])
 
 
-@pytest.mark.parametrize("rate", [0.1, 0.5, 0.9])
-def test_drop_out_keeps_the_expectation(rate):
-    mask = training.draw_dropout((0.0, rate), (400, 500), [torch.Generator().manual_seed(k) for k in (0, 1)])
-    assert (mask[0] == 1).all()
-    share = (mask[1] == 0).double().mean().item()
-    assert share == pytest.approx(rate, abs=0.005)
-    assert mask[1].double().mean().item() == pytest.approx(1.0, abs=5 * (rate / (1 - rate) / 2e5) ** 0.5)
-
-
-def test_drop_out_of_one_leaves_a_mean_and_no_nan(problem):
-    x, y = problem
-    y = y[:1] + 3.0
-    trained = train_stack(x, y, TRAIN, VAL, settings(hidden_dropout=1.0, input_dropout=1.0, epochs=1500), [0])
-    assert trained.status == ("ok",)
-    np.testing.assert_allclose(trained.layers[0][-1][1], y[0, TRAIN].mean(axis=0), atol=0.3)
-    assert np.isfinite(trained.loss).all()
-
-
 def test_a_diverged_member_harms_nobody(problem):
     x, y = problem
     broken = y.copy()
@@ -131,14 +113,3 @@ def test_a_diverged_member_harms_nobody(problem):
     assert bad.status == ("ok", "diverged", "ok")
     assert np.isnan(bad.loss[1])
     np.testing.assert_array_equal(bad.loss[[0, 2]], good.loss[[0, 2]])
-
-
-def test_who_has_stopped_does_not_start_again():
-    weights = torch.zeros(2, 3)
-    watch = BestEpochs(weights, patience=2)
-    for epoch, losses in enumerate([[3.0, 9.0], [4.0, 8.0], [5.0, 7.0], [1.0, 6.0]], start=1):
-        weights.fill_(epoch)
-        watch.compare(torch.zeros(2), torch.tensor(losses))
-    assert watch.best.tolist() == [3.0, 6.0]
-    assert watch.kept[:, 0].tolist() == [1.0, 4.0]
-    assert watch.epochs.tolist() == [3, 4]

@@ -1,27 +1,19 @@
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import islice
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from pydantic import PositiveInt
 
-from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Fitted
-from shipid.hybrid.one_step import OneStep
-from shipid.hybrid.settings import Scale, Searched
-from shipid.hybrid.trials import (
+from shipid.hybrid.search import (
     diverged_result,
-    fit_each,
-    is_finite_physics,
     ridge_trial,
     trial_points,
     trial_row,
-    windows_of_folds,
 )
+from shipid.hybrid.settings import Scale, Searched
 from tests.hybrid.tasks import task_of
 
 RUNS = {"u": np.arange(12.0)}
@@ -65,40 +57,6 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
 
 
-def test_every_foundation_is_fitted_or_has_diverged():
-    """Paths that are no numbers on windows of the folds: all trials diverged, and the method is not asked."""
-    asked = []
-    here = task()
-    broken = here.cases["one"].paths.copy()
-    broken[0, 4] = np.nan
-    far = here.cases["other"].paths.copy()
-    far[0, 11] = np.nan  # a window of no fold
-    here = replace(
-        here,
-        cases={
-            "one": replace(here.cases["one"], paths=broken),
-            "other": replace(here.cases["other"], paths=far),
-        },
-    )
-
-    def fit(name):
-        asked.append(name)
-        return Fitted(Unchanged({}), [], 1.0)
-
-    fitted = fit_each(here, OneStep(), lambda: [{"a": 1.0}, {"a": 2.0}], fit)
-    assert asked == ["other"]
-    assert fitted["one"].corrector is None
-    assert [(row["number"], row["params"], row["state"]) for row in fitted["one"].trials] == [
-        (0, {"a": 1.0}, "diverged"),
-        (1, {"a": 2.0}, "diverged"),
-    ]
-    assert (is_finite_physics(here, "one"), is_finite_physics(here, "other")) == (False, True)
-    np.testing.assert_array_equal(windows_of_folds(here), np.arange(9))
-    once = replace(here, folds=[(np.array([1, 4]), np.array([7])), (np.array([4]), np.array([2]))])
-    assert windows_of_folds(once).tolist() == [1, 2, 4, 7]  # what validates alone trains the last model, too
-    assert diverged_result(OneStep(), []).trials == []
-
-
 def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():
     """Three correctors in one that miss the true path by 2, 1 and 3 m; of two folds the mean is taken."""
     here, seen = task(), []
@@ -130,10 +88,3 @@ def test_a_trial_that_is_no_number_has_diverged(value, state):
     row = trial_row(3, {"ridge": 0.5}, value, 0.0, epochs=7)
     assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
     assert row["seconds"] > 0
-
-
-def test_with_a_budget_there_is_always_another_trial():
-    method = Counting(trials=3, budget=10.0)
-    assert len(list(islice(trial_points(method), 9))) == 9
-    assert len(diverged_result(method, trial_points(method)).trials) == 1
-    assert len(diverged_result(Counting(trials=3), trial_points(Counting(trials=3))).trials) == 3

@@ -38,14 +38,12 @@ def banded(simulation: ReportContent) -> ReportContent:
         | {"runs": 5, "note": note}
         for by, group, share, note in [
             ("kind", NASTY, 0.6, "2 runs of this kind calibrated the band: too few"),
-            ("speed", "1 to 2 m/s", 0.9, ""),
             ("ahead", "5 s", 0.99, ""),
         ]
     ]
-    worst = [{"model": "nominal", "run": "M003", "kind": "turning", "coverage": 0.1, "reach": 3.0}]
     refused = [{"model": "none", "N_D": 10, "reason": "a band of 90 % needs 9 runs or more"}]
     frames = {"coverage": pd.DataFrame(rows), "coverage_groups": pd.DataFrame(groups)}
-    frames |= {"coverage_runs": pd.DataFrame(worst), "no_band": pd.DataFrame(refused)}
+    frames |= {"no_band": pd.DataFrame(refused)}
     return replace(simulation, cells=cells, frames=frames)
 
 
@@ -65,9 +63,6 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     table = bands.coverage_table(banded)
     assert table is not None
     assert "needs 9 runs" in table.takeaway
-    worst = bands.coverage_by_run(banded)
-    assert worst is not None
-    assert worst.rows[0][0].text == "M003"
 
 
 @pytest.mark.parametrize(("kinds", "said"), [(("zigzag", "turning"), True), (("zigzag",), False)])

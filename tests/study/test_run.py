@@ -26,7 +26,7 @@ from shipid.files import read_json
 from shipid.hybrid.method import Fitted, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.trials import trial_row
+from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error, summarise_errors
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor

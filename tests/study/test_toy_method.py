@@ -15,7 +15,7 @@ from shipid.data.dataset import read_dataset
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.method import Fitted, Method, Task, Traits
 from shipid.hybrid.methods import METHODS
-from shipid.hybrid.trials import trial_row
+from shipid.hybrid.search import trial_row
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.apply import predict_log
