@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -15,6 +14,7 @@ from shipid.report.figure import (
     ColourScale,
     Control,
     PageFigure,
+    Panel,
     Trace,
     error_bars,
     escape_name,
@@ -90,7 +90,7 @@ def coverage_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str], size: int) -> go.Figure:
+def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str], size: int) -> Panel:
     diagonal = {"color": MUTED, "width": 1, "dash": "dash"}
     traces = [make_line("as promised", [0.45, 1.0], [0.45, 1.0], ["nominal"], "", line=diagonal)]
     for i, name in enumerate(names):

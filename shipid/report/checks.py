@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import logs
 from shipid.report.content import AnswerSentence, PageContent, rows_as_tuples
@@ -15,6 +14,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     category_colour,
     even_places,
     make_axis,
@@ -115,7 +115,7 @@ def checked_motion(series: pd.DataFrame) -> PageFigure | None:
     )
 
 
-def _draw_checked(rows: pd.DataFrame) -> list[go.Figure]:
+def _draw_checked(rows: pd.DataFrame) -> list[Panel]:
     shown = rows.iloc[even_places(len(rows), MOST_LINE_POINTS)]
     t = shown["t"] - rows["t"].iloc[0]  # single precision would not do for a clock since 1970
     shown = shown.assign(psi_rate=DEGREES * shown["psi_rate"], r=DEGREES * shown["r"])

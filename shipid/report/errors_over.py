@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -17,6 +16,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
     even_places,
     make_axis,
@@ -100,9 +100,7 @@ def horizon_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_horizon(
-    content: ReportContent, means: pd.DataFrame, seeds: pd.DataFrame, statistic: str, size: int
-) -> go.Figure:
+def _draw_horizon(content: ReportContent, means: pd.DataFrame, seeds: pd.DataFrame, statistic: str, size: int) -> Panel:
     column, title, unit = HORIZON_ERRORS[statistic]
     lines = _error_lines(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
     bands, looks = [], close_styles(content)
@@ -258,7 +256,7 @@ def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
     return units
 
 
-def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> go.Figure:
+def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> Panel:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
     units = _commands_by_unit(commands)
     traces, total, axes = (

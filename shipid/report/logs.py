@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import PUBLISHED, ReportContent, rows_as_tuples
 from shipid.report.figure import (
     MUTED,
     Chip,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     escape_name,
@@ -65,7 +65,7 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> go.Figure:
+def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> Panel:
     """Tracks on a map; those of the test last, so that they lie on top."""
     detail, traces = max(high - low for low, high in bounds) / TRACK_DETAIL, []
     for name in sorted(names_in(tracks, "set"), key=lambda name: set_colour(name) == TEST_COLOUR):
@@ -99,7 +99,7 @@ def envelope_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_ranges(mine: pd.DataFrame) -> go.Figure:
+def _draw_ranges(mine: pd.DataFrame) -> Panel:
     """One quantity: a bar from smallest to largest and a dot at the mean, one row per set; open for the published."""
     traces, quantity, unit = [], mine.quantity.iloc[0], mine.unit.iloc[0]
     for row, (name, low, mean, high) in enumerate(mine[["set", "min", "mean", "max"]].itertuples(index=False)):

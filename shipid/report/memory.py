@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -16,6 +15,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     error_bars,
@@ -131,7 +131,7 @@ def _takeaway_observer(frame: pd.DataFrame, runs: Sequence[str], current: bool) 
     return f"Along {counted_text(len(runs), 'test run')}, {', '.join(parts)}, and {test}."
 
 
-def _draw_observer(frame: pd.DataFrame, moments: Iterable[float], rows: Sequence[str]) -> go.Figure:
+def _draw_observer(frame: pd.DataFrame, moments: Iterable[float], rows: Sequence[str]) -> Panel:
     """A row for each signal, from the top; dotted lines over the whole height at the moments of new orders."""
     traces, axes, total = [], {}, len(rows) * (OBSERVER_ROW + OBSERVER_GAP)
     for place, title in enumerate(rows, start=1):
@@ -189,7 +189,7 @@ def memory_gain(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_memory(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
+def _draw_memory(frame: pd.DataFrame, models: Sequence[str]) -> Panel:
     amounts = sorted(int(value) for value in pd.unique(frame.N_D))
     traces = []
     for i, name in enumerate(models):

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, WindowSnapshot
@@ -23,6 +22,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
     escape_name,
     even_places,
@@ -206,7 +206,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
         "outline": outline,
         "lines": [_line_style(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
-        "layout": make_chart([], TO_STARBOARD, AHEAD).layout.to_plotly_json(),
+        "layout": make_chart([], TO_STARBOARD, AHEAD)["layout"],
     }
 
 
@@ -223,7 +223,7 @@ def draw_window(
     size: int,
     models: Sequence[str] | None = None,
     spans: Sequence[tuple[float, float]] = (),
-) -> go.Figure:
+) -> Panel:
     """Draw one window of a test run as page.js does.
 
     Parameters

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -21,6 +20,7 @@ from shipid.report.figure import (
     ColourScale,
     Control,
     PageFigure,
+    Panel,
     Trace,
     colour_level,
     escape_name,
@@ -191,7 +191,7 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float |
     return "<br>".join([*lines, escape_name(best["hyperparameters"])] if best.get("hyperparameters") else lines)
 
 
-def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> go.Figure:
+def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
     rows, cells = shown
     top, counts = float(rows.y.max()) * 1.04, np.unique(cells.N_D)
@@ -437,7 +437,7 @@ def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
 
 def _draw_sizes(
     content: ReportContent, means: pd.DataFrame, order: Sequence[str], statistic: str, logarithmic: bool
-) -> go.Figure:
+) -> Panel:
     """Lines over N_D; what has no physics first: it must not cover the others."""
     column, looks, sizes = ERROR_STATISTICS[statistic][0], model_styles(content), sorted(content.cells.N_D.unique())
     ended = content.cells[content.cells.status.eq("ok")]
@@ -507,7 +507,7 @@ def _gain_at_one_size(content: ReportContent, means: pd.DataFrame) -> PageFigure
     )
 
 
-def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: list[str]) -> go.Figure:
+def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: list[str]) -> Panel:
     """A row for each model: the physics alone, with compensation, and a bar between them."""
     column, alone, _ = ERROR_STATISTICS[statistic]
     old = content.models.set_index("model")[alone].reindex(names).to_numpy(dtype=float)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import TRIAL_COLUMNS, Floats, ReportContent
 from shipid.report.figure import (
@@ -16,6 +15,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     category_colour,
     escape_name,
     even_places,
@@ -117,7 +117,7 @@ def _with_ratio(trials: pd.DataFrame) -> pd.DataFrame:
     return trials.assign(value=good, ratio=np.sqrt(good / best))
 
 
-def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure:
+def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Panel:
     """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
     chosen, traces = frame.chosen.astype(bool), []
     others, best = frame[~chosen], frame[chosen]
