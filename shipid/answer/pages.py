@@ -31,13 +31,10 @@ log = logging.getLogger(__name__)
 Say = Callable[[str], object]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
-    "observer": memory.observer_frame,
-    "orders": memory.orders_frame,
     "kinds": frames.kinds_frame,
     "memory": memory.memory_frame,
     "coverage": bands.coverage_frame,
     "coverage_groups": bands.groups_frame,
-    "coverage_runs": bands.worst_frame,
     "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
     "intervals": intervals_frame,

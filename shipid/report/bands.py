@@ -1,4 +1,4 @@
-"""How far off a prediction may be: bands, what share of test paths they hold, their width, and who pays."""
+"""How far off a prediction may be: bands, what share of test paths they hold, and their width."""
 
 from __future__ import annotations
 
@@ -29,8 +29,7 @@ from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table,
 from shipid.report.wording import counted_text, listed_names, metres_text
 from shipid.units import level_text, percent_text, plural_word
 
-MOST_WORST_RUNS = 12  # test runs in the table of those that pay
-GROUP_WORDS = {"kind": "manoeuvre", "ahead": "time ahead", "speed": "speed"}
+GROUP_WORDS = {"kind": "manoeuvre", "ahead": "time ahead"}
 BAND_COLUMNS = {
     "model": TableColumn("model"),
     "N_D [1]": TableColumn("N_D", 0),
@@ -48,13 +47,6 @@ BAND_GROUP_COLUMNS = {
     "mean radius [m]": TableColumn("width", "length"),
     "test runs [1]": TableColumn("runs", 0),
     "note": TableColumn("note"),
-}
-BAND_RUN_COLUMNS = {
-    "test run": TableColumn("run"),
-    "manoeuvre": TableColumn("kind"),
-    "model": TableColumn("model"),
-    "paths in the band": TableColumn("held", numeric=True),
-    "greatest error over the band [1]": TableColumn("reach", 2),
 }
 
 
@@ -193,7 +185,7 @@ def _coverage_cells(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def coverage_by_group(content: ReportContent) -> PageTable | None:
-    """Coverage at one level by kind of manoeuvre, time ahead and speed."""
+    """Coverage at one level by kind of manoeuvre and time ahead."""
     frame = content.frame("coverage_groups")
     if frame.empty:
         return None
@@ -205,27 +197,13 @@ def coverage_by_group(content: ReportContent) -> PageTable | None:
 
 
 def _least_held(frame: pd.DataFrame) -> str:
-    kinds = frame[frame.by.isin(["kind", "speed"])]
+    kinds = frame[frame.by.eq("kind")]
     if kinds.empty:
         return ""
     worst = kinds.sort_values("coverage").iloc[0]
     text = f"Bands hold least at {worst.group} ({worst.model}): {percent_text(worst.coverage)} of the paths."
-    better = worst.by == "kind" and not worst.note and kinds.group[kinds.by.eq("kind")].nunique() > 1
+    better = not worst.note and kinds.group.nunique() > 1
     return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
-
-
-def coverage_by_run(content: ReportContent) -> PageTable | None:
-    """Test runs whose paths leave their bands most often."""
-    frame = content.frame("coverage_runs")
-    if frame.empty:
-        return None
-    shown = frame[frame.model.isin(close_up_models(content))].head(MOST_WORST_RUNS)
-    mean = frame.groupby("run").coverage.mean()
-    half = int((mean < 0.5).sum())
-    have = "has less than half of its" if half == 1 else "have less than half of their"
-    takeaway = f"Mean over models, {counted_text(half, 'run')} of {len(mean)} {have} paths in the bands."
-    held = with_cells(shown, held=[TableCell(percent_text(share), share) for share in shown.coverage])
-    return frame_table("coverage-runs", "Runs that bands hold least", takeaway, held, BAND_RUN_COLUMNS)
 
 
 HOW_FAR_OFF = Section(
@@ -235,8 +213,7 @@ HOW_FAR_OFF = Section(
         coverage_table(content),
         width_figure(content),
         coverage_by_group(content),
-        coverage_by_run(content),
     ),
     needs=("coverage",),
-    anchors=("coverage", "coverage-table", "width-map", "coverage-groups", "coverage-runs"),
+    anchors=("coverage", "coverage-table", "width-map", "coverage-groups"),
 )
