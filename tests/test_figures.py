@@ -69,7 +69,9 @@ def test_results_and_their_content_draw_the_same(tiny_run: Path, content: Report
 
 def test_a_table_of_cells_is_enough() -> None:
     cells = pd.DataFrame({"model": ["a", "a", "b", "b"], "N_D": [10, 30, 10, 30], "H": [2.0, 1.0, 3.0, np.nan]})
-    cells = cells.assign(family="given", seed=0, status=["ok", "ok", "ok", "failed"], sentence="", A=[4.0, 4.0, 5.0, 5.0])
+    cells = cells.assign(
+        family="given", seed=0, status=["ok", "ok", "ok", "failed"], sentence="", A=[4.0, 4.0, 5.0, 5.0]
+    )
     cells = cells.assign(A_90=9.0, A_rms=9.0, H_90=9.0, rms=9.0)
     made = figures.gain(cells)
     lines = {trace.name: np.array(trace.y, dtype=float) for trace in made.data if len(trace.x) == 2}
@@ -81,7 +83,7 @@ def test_a_table_of_cells_is_enough() -> None:
 
 
 def test_what_is_no_source_is_one_sentence() -> None:
-    with pytest.raises(ShipidError, match="cells: lacks the columns family, N_D, .*give what `read_cells` returns"):
+    with pytest.raises(ShipidError, match=r"cells: lacks the columns family, N_D, .*give what `read_cells` returns"):
         figures.gain(pd.DataFrame({"model": ["a"]}))
     with pytest.raises(ShipidError, match="source must be a Results, as of `read_results`, or a table of cells"):
         figures.gain("results/quick")  # type: ignore[arg-type]

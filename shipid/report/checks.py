@@ -104,7 +104,7 @@ def checked_motion(series: pd.DataFrame) -> PageFigure | None:
     return PageFigure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {short_text(float(worst.max()))} m.",
+        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {short_text(worst.max())} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",

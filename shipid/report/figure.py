@@ -82,7 +82,7 @@ def least_coloured(span: tuple[float, float]) -> float:
 
 
 def colour_level(value: float, span: tuple[float, float]) -> int:
-    """Place of a magnitude on a logarithmic scale of `COLOUR_LEVELS` colours: errors are factors apart, a few far off."""
+    """Place of a magnitude on a logarithmic scale of `COLOUR_LEVELS` colours: errors are factors apart."""
     low, high, place = np.log(np.maximum([*span, value], least_coloured(span)))
     return round(float(np.clip((place - low) / (high - low), 0, 1)) * (COLOUR_LEVELS - 1)) if high > low else 0
 

@@ -141,7 +141,7 @@ def _published_words(ours: pd.DataFrame, published: pd.DataFrame) -> str:
         for word, end, value in (("min", low, mine["min"].min()), ("max", high, mine["max"].max())):
             known += bool(pd.notna(value))
             far += [f"{word} of {theirs.quantity}"] * (abs(float(value) - end) > NEAR_PUBLISHED * (high - low))
-    text = f"{known - len(far)} of {known} published ends are met within {100 * NEAR_PUBLISHED:.0f} % of the published range"
+    text = f"{known - len(far)} of {known} published ends are met within {100 * NEAR_PUBLISHED:.0f} % of their range"
     return f"{text}; not {listed_names(far, 6)}." if far else f"{text}."
 
 

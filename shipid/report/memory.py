@@ -118,8 +118,8 @@ def _takeaway_memory(frame: pd.DataFrame) -> str:
     best = last.nsmallest(1, "difference").iloc[0]
     which = f"{in_words(best.model)}, {difference_text(best.difference, best.low, best.high)} ({best.comparison})"
     where = f"With N_D = {int(best.N_D)}" if best.N_D else "With physics alone"
-    text = f"{where}, {gains} of {counted_text(len(last), 'comparison')} lower H and {losses} raise it with an interval free "
-    return f"{text}of 0; the lowest difference is that of {which}."
+    text = f"{where}, {gains} of {counted_text(len(last), 'comparison')} lower H and {losses} raise it with an interval"
+    return f"{text} free of 0; the lowest difference is that of {which}."
 
 
 def memory_table(content: ReportContent) -> PageTable | None:

@@ -56,7 +56,7 @@ HOW_WINDOWS = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
-    """Sort windows by test run and time; at most `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_SHOWN_WINDOWS` and `MOST_PATHS`."""
+    """Sort windows by test run and time, at most as many of each as the limits above."""
     by_run: dict[str, list[WindowSnapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
@@ -84,8 +84,8 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
         id="browser",
         title="Look at predictions",
         takeaway=_takeaway_windows(content, counts[-1]),
-        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of {counted_text(len(runs), 'test run')}; "
-        "arrow keys move the slider.",
+        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of "
+        f"{counted_text(len(runs), 'test run')}; arrow keys move the slider.",
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
@@ -100,7 +100,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
     A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one;
-    `make_line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
+    `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
     are metres, angles radians.
     """
     runs, counts = windows_of(content), window_sizes(content)

@@ -107,8 +107,8 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
-        alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. The numbers are in "
-        "the table of cells.",
+        alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
+        "The numbers are in the table of cells.",
         height=HEIGHT,
         draw=lambda: [draw_map(shown, lines)],
         chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [])
@@ -395,8 +395,8 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         id="gain",
         title="What another manoeuvre buys",
         takeaway=takeaway,
-        how="Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of the "
-        "physics alone A (14). Where a cell was trained with several seeds, the line joins their means and the pale "
+        how="Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of "
+        "the physics alone A (14). Where a cell was trained with several seeds, the line joins their means and the pale "
         "points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate stay as they are at the "
         "instant of prediction, the least that any model must beat."
         + (" N_D = 0 is the physics alone." if single else "")
@@ -405,7 +405,7 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         + words_on_left_out(content)
         + drawn
         + cells_without_result(content),
-        alternative=f"Lines of the position error over the number of manoeuvres for {counted_text(len(order), 'model')}. "
+        alternative=f"Lines of the position error over N_D for {counted_text(len(order), 'model')}. "
         "The numbers are in the table of cells.",
         height=460 if len(order) <= 10 else 560,
         draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],

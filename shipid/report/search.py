@@ -42,7 +42,7 @@ MEMORY_WORDS = (
     "none", "the error of the physics", "that and history", "estimates of the observer", "everything",
     "history", "the error of the physics and estimates of the observer", "history and estimates of the observer",
 )  # fmt: skip
-STATES_OF_TRIALS = {  # what a trial came to -> its name in the legend, marker and colour; all but the first are drawn larger
+STATES_OF_TRIALS = {  # outcome of a trial -> its name in the legend, marker and colour; the first is drawn smaller
     "complete": ("trial", "circle", MUTED),
     "stopped": ("stopped early", "triangle-up", category_colour(4)),
     "diverged": ("diverged", "x", "var(--bad)"),
@@ -68,8 +68,8 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         + (thinned if len(frame) > MOST_DOTS + MOST_CHOSEN else "")
         + (early if frame.state.eq("stopped").any() else "")
         + "diamonds are those whose networks the cell uses; those beyond "
-        f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
-        "that have a value. Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
+        f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians. "
+        "Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
         f"what rises or falls throughout, not an optimum in the middle.{memories}",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
@@ -228,8 +228,10 @@ def search_table(content: ReportContent) -> PageTable:
         span = "yes or no" if share else f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
         tried.append(f"{name.replace('_', ' ')} {span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
-    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
-    takeaway += f"{diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
+    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: "
+    takeaway += (
+        f"{stopped} stopped early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
+    )
     takeaway += f" Tried: {', '.join(tried)}." if tried else ""
     shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
