@@ -239,8 +239,8 @@ def filter_function(model: Dynamics) -> ca.Function:
     (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
     state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
     remembered; their lengths are `filter_state_sizes`. commands and environment are those in force since the instant
-    before; a measurement (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction, before any
-    update.
+    before; a measurement (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction,
+    before any update.
     """
     count, (num_memory, num_commands) = len(FILTER_STATES), (len(model.memory), len(model.commands))
     state = SX.sym("state", sum(filter_state_sizes(model)))

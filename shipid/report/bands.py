@@ -90,7 +90,7 @@ def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str]
         shift = 0.004 * (i - (len(names) - 1) / 2)  # intervals of several models would hide each other
         held, low, high = (mine[column].to_numpy(dtype=float) for column in ("coverage", "low", "high"))
         words = [
-            f"{escape_name(name)}: {_share_words(row)} of {level_text(row['level'])}, radius {metres_text(row['width'])}"
+            f"{escape_name(name)}: {_share_words(row)} of {level_text(row['level'])}, to {metres_text(row['width'])}"
             for row in mine.to_dict("records")
         ]
         ink = {"color": look.colour, "width": look.width}

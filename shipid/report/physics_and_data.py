@@ -396,7 +396,7 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         title="What another manoeuvre buys",
         takeaway=takeaway,
         how="Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of "
-        "the physics alone A (14). Where a cell was trained with several seeds, the line joins their means and the pale "
+        "the physics alone A (14). Where a cell has several seeds, the line joins their means and the pale "
         "points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate stay as they are at the "
         "instant of prediction, the least that any model must beat."
         + (" N_D = 0 is the physics alone." if single else "")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 
 import numpy as np
 import pytest
@@ -77,16 +76,6 @@ def test_on_a_full_disk_the_export_that_was_there_stays(simple, tmp_path, monkey
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert caught.value.filename in map(str, old)
     assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == old
-
-
-@pytest.mark.parametrize("to", ["c", "fmu", "casadi"])
-def test_no_export_needs_a_temporary_folder_of_the_system(to, simple, tmp_path, monkeypatch):
-    """Before, a full one ended the export, and the error named another disk."""
-    expected = [file.name for file in simple.export(to, tmp_path / f"first/ship{EXPORT_TARGETS[to].ending}")]
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
-    written = simple.export(to, tmp_path / f"second/ship{EXPORT_TARGETS[to].ending}")
-    assert [file.name for file in written] == expected
-    assert all(file.stat().st_size for file in written)
 
 
 @pytest.mark.parametrize(

@@ -76,26 +76,6 @@ def test_a_close_up_of_many_models_says_which(simulation, full_scale):
     assert "middle one" not in horizon(full_scale).how
 
 
-def test_names_at_the_ends_of_lines_fit_a_narrow_window(simulation):
-    """The room for them is in pixels: a share of the time axis cut them in a window of 390 px."""
-    plot = views(horizon(simulation))["0-0"][0]
-    assert plot.layout.xaxis.range[1] == simulation.horizon.ahead.max()
-    longest = max(len(name.text) for name in plot.layout.annotations)
-    assert plot.layout.margin.r >= 16 + 7 * longest
-    assert all((name.axref, name.ax) == ("pixel", 16) for name in plot.layout.annotations)
-
-
-def test_names_at_the_ends_do_not_stretch_the_axis_of_their_view(simulation):
-    """Moved apart by the largest error of another N_D, they pressed the lines of a small one to the ground."""
-    small = simulation.horizon.N_D.eq(10) & simulation.horizon.model.eq("high-2")
-    lost = simulation.horizon.assign(mean=simulation.horizon["mean"].mask(small, 100 * simulation.horizon["mean"]))
-    figure = horizon(replace(simulation, horizon=lost))
-    for view in ("0-0", "0-2"):
-        plot = views(figure)[view][0]
-        highest = max(max(trace.y) for trace in plot.data)
-        assert max(name.ay for name in plot.layout.annotations) <= 1.1 * highest
-
-
 def test_names_at_the_ends_of_many_lines_have_room(simulation):
     """Of 40 families: each name moved the next one up, to twice the greatest error, and they covered each other."""
     one = {"models": simulation.models, "cells": simulation.cells, "horizon": simulation.horizon}

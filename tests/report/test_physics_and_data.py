@@ -96,22 +96,6 @@ def test_every_row_with_an_A_has_its_name_and_no_name_covers_another(simulation)
     assert min(b - a for a, b in itertools.pairwise(heights)) >= 12.99
 
 
-def test_names_of_many_rows_are_beside_their_cells(simulation):
-    """Moved apart below the least A, the name of a model stood at an A that no model has."""
-    models, cells = simulation.models, simulation.cells
-    (model,), (cell, *_) = (frame[frame.model.eq("high-1")].to_dict("records") for frame in (models, cells))
-    each = [{"model": f"m-{i}", "family": f"m-{i}", "A": 7.0 + 0.1 * i} for i in range(60)]
-    many = [pd.DataFrame([{**row, **one} for one in each]) for row in (model, cell)]
-    added = many[1].assign(N_D=30), many[1].assign(N_D=100)
-    pure = [frame[frame.family.eq("none")] for frame in (models, cells)]
-    content = replace(simulation, models=pd.concat([many[0], pure[0]]), cells=pd.concat([*added, pure[1]]))
-    names = [note for note in flat(content).layout.annotations if note.xref == "paper"]
-    places = {row["model"]: row["A"] ** 0.5 for row in each}
-    line = 13 * flat(content).layout.yaxis.range[1] / (580 - 56)
-    assert 6 < len(names) < 60
-    assert all(abs(note.y - places[note.text]) < 1.5 * line for note in names)
-
-
 def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     names = simulation.cells.model.isin(["moderate-1", "moderate-2"])
     others = simulation.cells[names].assign(model=lambda cells: cells.model + " + alone", H=1.7)
@@ -128,15 +112,6 @@ def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     assert "Of several methods" not in map_figure(simulation).takeaway
     both = pd.concat([simulation.cells.assign(method="learned"), others.assign(method="alone")], ignore_index=True)
     assert map_figure(replace(simulation, cells=both)).takeaway.endswith(" Of several methods, learned is drawn.")
-
-
-def test_rows_of_one_method_alone_are_named_without_it(simulation):
-    """Names of twelve characters were the same `moder… drawn` in every row."""
-    plain = [note.text for note in flat(simulation).layout.annotations if note.xref == "paper"]
-    cells, models = (frame.assign(model=frame.model + " + drawn") for frame in (simulation.cells, simulation.models))
-    layout = flat(replace(simulation, cells=cells, models=models)).layout
-    assert [note.text for note in layout.annotations if note.xref == "paper"] == plain
-    assert layout.yaxis.ticktext == flat(simulation).layout.yaxis.ticktext
 
 
 @pytest.mark.parametrize(
@@ -248,25 +223,6 @@ def test_a_logarithmic_axis_is_offered(simulation):
     powers = [re.sub(r"^10(?=\D|[⁰-⁹¹²³])", "1 × 10", word) for word in ticks.ticktext]
     written = [float(word.replace(" × 10", "e").translate(LOWERED)) for word in powers]
     assert written == list(ticks.tickvals)
-
-
-def test_of_many_models_some_have_a_line(simulation):
-    """41 lines are not told apart; those drawn are spread over A, with the best in validation and the rival."""
-    mine = [frame[frame.model.eq("high-1")] for frame in (simulation.models, simulation.cells)]
-    names = [f"f{k:02d}" for k in range(41)]
-    many = [pd.concat([one.assign(model=n, family=n, A=1.0 + k) for k, n in enumerate(names)]) for one in mine]
-    pure = [frame[frame.model.eq("no physics")] for frame in (simulation.models, simulation.cells)]
-    models, cells = (pd.concat(pair, ignore_index=True) for pair in zip(many, pure, strict=True))
-    figure = gain_figure(replace(simulation, models=models, cells=cells, best="f02"))
-    drawn = [name for name in traces(figure, "0-0") if name.startswith("f") and "seed" not in name]
-    assert len(drawn) == 13
-    assert {"f00", "f02", "f40"} <= set(drawn)
-    assert {chip.key for chip in figure.chips} == {*(f"model:{name}" for name in drawn), "model:no physics", "naive"}
-    words = (
-        "Of 41 models with physics, 13 have a line: some spread over A and the best in validation; the others are in"
-    )
-    assert words in figure.how
-    assert "have a line" not in gain_figure(simulation).how
 
 
 def test_takeaway_speaks_of_the_best_in_validation_and_its_rival(simulation):
