@@ -213,18 +213,6 @@ def test_foreign_contents_are_one_line(tmp_path: Path, tiny_run: Path, changes: 
     assert str(caught.value).startswith(f"{file}: ")
 
 
-def test_names_that_are_no_texts_are_refused(tmp_path: Path, tiny_run: Path) -> None:
-    """Such a name would be the path of an error that cannot be written."""
-    source = cell_file(tiny_run, CELL)
-    with np.load(source, allow_pickle=False) as stored:
-        corrector = json.loads(str(stored["header"]))["corrector"]
-    assert corrector["inputs"]["commands"]
-    for wrong in ([3], None, "port.n", [["port.n"]]):
-        damaged = corrector | {"inputs": corrector["inputs"] | {"commands": wrong}}
-        with pytest.raises(ResultError, match="damaged: run the study again"):
-            Predictor.load(rewritten(source, tmp_path / "names.npz", corrector=damaged))
-
-
 def test_files_of_other_kinds_are_one_line(tmp_path: Path, tiny_run: Path) -> None:
     whole = cell_file(tiny_run, CELL).read_bytes()
     flipped = bytearray(whole)

@@ -419,7 +419,6 @@ def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], m
         ({}, None, "the arrays of the method 'mine' must be a table, not NoneType"),
         ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them, not list"),
         ({"a": {1, 2}}, {}, "the header of the method 'mine' must be a table .* not JSON serializable"),
-        ({"names": [3]}, {}, "the header of the method 'mine': commands and names and modules must be lists of texts"),
     ],
 )
 def test_what_could_not_be_read_back_is_not_saved(header: Any, arrays: Any, message: str, tmp_path: Path) -> None:

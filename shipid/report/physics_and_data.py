@@ -96,7 +96,7 @@ def map_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="map",
         title="Physics and data: the map",
-        takeaway=_takeaway_map(shown) + _method_of_map(content, rows),
+        takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
         + (
             f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
@@ -309,15 +309,6 @@ def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
             bell = np.exp(-((np.subtract.outer(np.arange(count), np.arange(count)) / width) ** 2) / 2)
             total, weight = (np.moveaxis(np.tensordot(bell, part, (1, side)), 0, side) for part in (total, weight))
     return np.where(finite, np.exp(total / np.where(weight > 0, weight, 1.0)), np.nan)
-
-
-def _method_of_map(content: ReportContent, rows: pd.DataFrame) -> str:
-    """Sentence on the method of the cells on the map, where other methods are not on it; empty if all are."""
-    if not (_not_on_map(content) or words_on_left_out(content)):
-        return ""
-    drawn = content.cells[content.cells.model.isin(rows.model[rows.family.ne(DATA_DRIVEN)])]
-    names = sorted({str(name) for name in drawn.method}) if "method" in drawn else []
-    return f" Of several methods, {listed_names(names) if names else 'the first'} is drawn."
 
 
 def _not_on_map(content: ReportContent) -> str:

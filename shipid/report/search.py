@@ -26,7 +26,7 @@ from shipid.report.figure import (
 )
 from shipid.report.section import Section
 from shipid.report.selection import shown_sizes
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, number_cell, with_cells, word_cell
+from shipid.report.tables import PageTable, TableColumn, frame_table
 from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, short_text
 
 MOST_DOTS = 1200  # in one panel: more hide each other
@@ -215,18 +215,11 @@ def search_table(content: ReportContent) -> PageTable:
         "time [s]": TableColumn("seconds", 1),
         "time per cell [s]": TableColumn("each", 1),
     }
-    chosen = frame[frame.chosen.astype(bool)]
     tried = []
     for name in names:
-        share = _yes_or_no(frame[name])
-        values = [chosen[name][chosen.N_D.eq(size)].astype(float).dropna() for size in shown.index]
-        shown = with_cells(shown, **{f"chosen {name}": [_choice_cell(some, share) for some in values]})
-        columns[f"{'share of ' if share else ''}chosen {_hyperparameter_title(name)}"] = TableColumn(
-            f"chosen {name}", numeric=True
-        )
         unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        span = "yes or no" if share else f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
-        tried.append(f"{name.replace('_', ' ')} {span}")
+        span = f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
+        tried.append(f"{name.replace('_', ' ')} {'yes or no' if _yes_or_no(frame[name]) else span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
     takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: "
     takeaway += (
@@ -235,17 +228,6 @@ def search_table(content: ReportContent) -> PageTable:
     takeaway += f" Tried: {', '.join(tried)}." if tried else ""
     shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
-
-
-def _choice_cell(values: pd.Series[float], share: bool) -> TableCell:
-    """Smallest, middle and largest chosen value, or the share of yes."""
-    if values.empty:
-        return word_cell(None)
-    if share:
-        return number_cell(values.mean(), 2)
-    return TableCell(
-        " / ".join(short_text(value) for value in values.quantile([0.0, 0.5, 1.0])), float(values.median())
-    )
 
 
 THE_SEARCH = Section(

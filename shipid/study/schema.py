@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, 
 
 from shipid.arguments import whole_steps
 from shipid.data.windows import Commands, PathSource
-from shipid.document import Document, document_leaves
+from shipid.document import Document
 from shipid.engine.integrate import Method as Integrator
 from shipid.errors import DocumentError, suggest_name
 from shipid.physics.signals import SIGNALS, rows_of_role

@@ -107,11 +107,7 @@ def test_two_methods_on_the_same_physics_do_not_hide_each_other(simulation):
     assert (
         "Not on the map, where another method has their place: moderate-1 + alone and moderate-2 + alone." in figure.how
     )
-    assert figure.takeaway.endswith(" Of several methods, the first is drawn.")
     assert "another method" not in map_figure(simulation).how
-    assert "Of several methods" not in map_figure(simulation).takeaway
-    both = pd.concat([simulation.cells.assign(method="learned"), others.assign(method="alone")], ignore_index=True)
-    assert map_figure(replace(simulation, cells=both)).takeaway.endswith(" Of several methods, learned is drawn.")
 
 
 @pytest.mark.parametrize(
