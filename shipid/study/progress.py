@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
@@ -36,44 +35,76 @@ class Searching:
         return f"{self.cell}: trial {self.done}{of}{best}"
 
 
-@dataclass(frozen=True)
 class Watch:
-    """The journals in the folder of a run, or of its parts; the plan says how many trials a method makes."""
+    """Follows the journals in the folder of a run; each look reads what has been written since the last one.
 
-    plan: Plan
-    folder: Path
+    Parameters
+    ----------
+    plan : says how many trials a method makes. folder : of the run; its parts are followed, too.
+    """
+
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        plans = {part_folder(folder, name): part.plan for name, part in plan.parts.items()} or {folder: plan}
+        self._trials = {
+            place: {way.name: way.method.num_trials() for way in one.methods if way.method.compensates}
+            for place, one in plans.items()
+        }
+        self._ends: dict[Path, int] = {}
+        self._cells: dict[Path, list[str]] = {}
+        self._searches: dict[Path, dict[str, Searching]] = {}  # parts of a study have cells of the same names
+        self._last: dict[tuple[Path, str], int] = {}
+        self._looks = 0
 
     def look(self) -> list[Searching]:
         """Return the searches that go on, those that were written to last first; none of units that are finished."""
-        plans = {part_folder(self.folder, name): part.plan for name, part in self.plan.parts.items()}
-        left: list[tuple[float, list[Searching]]] = []
-        for folder, plan in (plans or {self.folder: self.plan}).items():
-            counts = {way.name: way.method.num_trials() for way in plan.methods if way.method.compensates}
+        self._looks += 1
+        left: list[tuple[int, Searching]] = []
+        for folder, trials in self._trials.items():
             finished = seals.seal_names(folder)
             for file in (folder / JOURNALS).glob("*.log"):
-                with suppress(OSError):  # taken away
-                    if file.stem not in finished:
-                        left.append((file.stat().st_mtime, _searches_of_journal(file.read_bytes(), counts)))
-        newest = sorted(left, key=lambda pair: -pair[0])
-        return [one for _, searches in newest for one in searches if one.done != one.count]
+                if file.stem in finished:
+                    continue
+                self._read(file, trials)
+                known = self._searches.get(file, {})
+                left += [(self._last[file, one.cell], one) for one in known.values() if one.done != one.count]
+        return [one for _, one in sorted(left, key=lambda pair: -pair[0])]
 
-
-def _searches_of_journal(content: bytes, counts: Mapping[str, int | None]) -> list[Searching]:
-    """The searches of a journal, those that were written to last first. counts : method -> trials of a search."""
-    cells: list[str] = []
-    known: dict[str, Searching] = {}
-    for line in content.splitlines():
+    def _read(self, file: Path, trials: Mapping[str, int | None]) -> None:
+        """Take over the whole lines that have been added to a journal."""
+        begin = self._ends.get(file, 0)
         try:
-            entry = json.loads(line)
-            if entry["op_code"] == BEGUN:
-                cells.append(entry["study_name"])
-            elif entry["op_code"] in (COUNTED, TRIED):
-                cell, count, value = cells[entry["study_id"]], entry.get("user_attr", {}).get("trials"), entry.get("value")
-                method = next((name for name in counts if f"{WITH}{name}-N" in cell), "")
-                one = known.pop(cell, None) or Searching(cell, 0, counts.get(method), inf)
-                if entry["op_code"] == TRIED:
-                    one = replace(one, done=one.done + 1, best=min(one.best, inf if value is None else value))
-                known[cell] = replace(one, count=count or one.count)
-        except (ValueError, KeyError, IndexError, TypeError, AttributeError):
-            continue  # half a line, or an entry of someone else
-    return [*reversed(known.values())]
+            with file.open("rb") as stream:
+                stream.seek(begin)
+                text = stream.read()
+        except OSError:  # taken away
+            return
+        text = text[: text.rfind(b"\n") + 1]
+        self._ends[file] = begin + len(text)
+        cells = self._cells.setdefault(file, [])
+        for line in text.splitlines():
+            try:
+                entry = json.loads(line)
+                code = entry["op_code"]
+                if code == BEGUN:
+                    cells.append(entry["study_name"])
+                elif code == COUNTED and "trials" in entry["user_attr"]:
+                    self._count(file, cells[entry["study_id"]], entry["user_attr"]["trials"], trials)
+                elif code == TRIED:
+                    self._tried(file, cells[entry["study_id"]], entry.get("value"), trials)
+            except (ValueError, KeyError, IndexError, TypeError):
+                continue  # half a line, or an entry of someone else
+
+    def _known(self, file: Path, cell: str, trials: Mapping[str, int | None]) -> Searching:
+        method = next((name for name in trials if f"{WITH}{name}-N" in cell), "")
+        return self._searches.get(file, {}).get(cell) or Searching(cell, 0, trials.get(method), inf)
+
+    def _count(self, file: Path, cell: str, count: int, trials: Mapping[str, int | None]) -> None:
+        self._keep(file, replace(self._known(file, cell, trials), count=count))
+
+    def _tried(self, file: Path, cell: str, value: float | None, trials: Mapping[str, int | None]) -> None:
+        known = self._known(file, cell, trials)
+        self._keep(file, replace(known, done=known.done + 1, best=min(known.best, inf if value is None else value)))
+
+    def _keep(self, file: Path, now: Searching) -> None:
+        self._searches.setdefault(file, {})[now.cell] = now
+        self._last[file, now.cell] = self._looks

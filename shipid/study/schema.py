@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -19,13 +20,6 @@ from shipid.vessel.perturb import Family
 
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
-OLD_KEYS = {
-    "recipe": 'write [[method]] with kind = "path-drawn" (it was "fast") or "path-trained" (it was "paper"), the same '
-    "name, and the other keys of [recipe] instead",
-    "prediction.horizon": "was a number of steps: write ahead = its product with the step, in seconds",
-    "prediction.method": "is now called `integrator`",
-}
-"""Dotted path of a key of version 0.1 -> what to write instead."""
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
 

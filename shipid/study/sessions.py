@@ -17,6 +17,7 @@ from shipid.capacity import processor_name, usable_cores
 from shipid.engine.native import engine_description
 from shipid.errors import ShipidError, shorten_line
 from shipid.hybrid.device import vector_instructions
+from shipid.physics import TERMS
 from shipid.study import store
 from shipid.study.code import UNKNOWN, code_digest
 from shipid.study.plan import USER_SCRIPT, Plan, own_code
@@ -112,26 +113,36 @@ def session_at_worker(plan: Plan, device: str, code: Code) -> dict[str, Any]:
 
 def check_workers(plan: Plan) -> None:
     """Raise ShipidError where a local worker lacks the code that a user wrote, or has another one."""
-    here, there, why = _digests(plan), dict[str, str](), ""
+    here, there, why, failed = _digests(plan), dict[str, str](), "", ""
     try:
         ((_, there),) = on_workers(partial(_digests, plan), [None], 1)
     except ShipidError:
         raise
     except Exception as error:  # of a module as it is imported, of a class or of a name in TERMS that is not there
-        why = shorten_line(f" ({type(error).__name__}: {error})".replace(": )", ")"))
+        why = "" if isinstance(error, KeyError) and any(key in error.args for key in TERMS) else f" ({error})"
+        in_script = isinstance(error, AttributeError) and any(
+            type(way.method).__module__ == MAIN for way in plan.methods
+        )
+        failed = "" if in_script or not why else shorten_line(f"{type(error).__name__}: {error}".removesuffix(": "))
     lacking = {what: digest for what, digest in here.items() if there.get(what) != digest}
     if not lacking:
         return
-    named = join_names([*lacking])
-    if there.keys() >= lacking.keys() and UNKNOWN not in lacking.values():
-        words = f"the file of the {named}, or one beside it, has changed since it was imported"
+    named, known = join_names([*lacking]), UNKNOWN not in lacking.values()
+    if failed and known:
+        raise ShipidError(f"a worker cannot import the {named}: {failed}")
+    if there.keys() >= lacking.keys() and known:
+        words = f"the file of the {named}, or one that it imports, has changed since it was imported"
         raise ShipidError(f"{words}: start this process again")
-    words = f"workers are processes that import your files anew, and there the {named} is not to be had{why}"
-    remedy = (
-        f"write it into a file that can be imported; a line TERMS[...] = ... into a script, as {USER_SCRIPT} in "
-        'docs/extending.md, above its line `if __name__ == "__main__":`'
-    )
-    raise ShipidError(f"{words}: {remedy}", file=getattr(sys.modules[MAIN], "__file__", None))
+    file = getattr(sys.modules[MAIN], "__file__", None)
+    if file:
+        remedy = 'they import your script: define and name it above the line `if __name__ == "__main__":`'
+    elif "term" in named:
+        script = f"a script, as {USER_SCRIPT} in docs/extending.md"
+        remedy = f"write it, with its line TERMS[...] = ..., into {script}, and run the study by that"
+    else:
+        remedy = "write it into a file, such as my_method.py, and import it from there"
+    words = f"workers are processes, which do not see what a cell or a console defines: they lack the {named}{why}"
+    raise ShipidError(f"{words}: {remedy}", file=file)
 
 
 def _digests(plan: Plan, _: None = None) -> dict[str, str]:

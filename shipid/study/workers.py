@@ -25,6 +25,7 @@ METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # of multiprocess
 LONGEST = 107 - len("/pymp-12345678/listener-12345678")  # bytes of a folder in which a forkserver has its socket
 PRELOADED = ["shipid.study.run", "shipid.hybrid.training", "shipid.hybrid.ridge"]
 """Modules that workers need, PyTorch with them: a name that cannot be imported is passed over without a word."""
+QUICK_END = "shipid.study.quick_end"  # imported last of all: what is registered last is called first at the end
 NO_GUARD = 64  # exit status of a worker whose script starts workers: EX_USAGE of sysexits.h
 END = 5.0  # s in which a process that has closed its connection has ended
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")  # read at import
@@ -47,7 +48,7 @@ def import_for_workers() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with _one_thread():
-            forkserver.set_forkserver_preload(PRELOADED)
+            forkserver.set_forkserver_preload([*PRELOADED, QUICK_END])
             forkserver.ensure_running()
     finally:
         signal.signal(signal.SIGINT, before)

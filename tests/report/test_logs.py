@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from shipid.report.logs import _takeaway_envelope, envelope_figure, tracks_figure
+from shipid.report.logs import _beyond_words, envelope_figure, tracks_figure
 from tests.report.views import views
 
 
@@ -45,12 +45,11 @@ def test_what_the_test_asks_beyond_training_is_named():
         ("test", "v", "m/s", -1.2, 0, 1),
     ]
     frame = pd.DataFrame(rows, columns=columns)
-    assert _takeaway_envelope(frame) == "The test reaches outside what the other sets cover in 1 of 2 inputs: v."
+    assert _beyond_words(frame) == "The test reaches outside what the other sets cover in 1 of 2 inputs: v."
     assert (
-        _takeaway_envelope(frame[frame.quantity == "u"])
-        == "The test stays inside what the other sets cover in all 1 input."
+        _beyond_words(frame[frame.quantity == "u"]) == "The test stays inside what the other sets cover in all 1 input."
     )
-    assert _takeaway_envelope(frame[frame["set"] == "D_10"]) == "2 inputs in 1 set."
+    assert _beyond_words(frame[frame["set"] == "D_10"]) == "2 inputs in 1 set."
 
 
 def test_ranges_run_from_smallest_to_largest(full_scale):

@@ -8,18 +8,35 @@ import pytest
 
 from shipid.errors import DocumentError
 from shipid.study.plan import read_plan
-from shipid.study.schema import OLD_KEYS, Prediction
+from shipid.study.schema import Prediction
 
 FOLDER = Path(__file__).parents[1] / "bad" / "studies"
 
 
 def test_a_document_of_version_0_1_is_answered_as_a_whole(tmp_path: Path) -> None:
-    """Every old key in one message, a line each with its file and path; done, the document is one of today."""
-    text, file = (FOLDER / "recipe-of-old.toml").read_text(), tmp_path / "old.toml"
-    file.write_text(text.replace("ahead = 5.0", 'horizon = 10\nstep = 0.5\nmethod = "rk4"'))
+    """Every old key in one message, a line each with its file and path, and what to write instead."""
+    text = (FOLDER / "recipe-of-old.toml").read_text()
+    text = text.replace("[[truth.manoeuvre]]\n", "").replace("ahead = 5.0", 'horizon = 10\nstep = 0.5\nmethod = "rk4"')
+    text += '\n[family.identify]\nparameters = ["hull.derivatives.N_ur"]\n'
+    file = tmp_path / "old.toml"
+    file.write_text(text)
     with pytest.raises(DocumentError) as caught:
         read_plan(file)
-    assert str(caught.value).split("\n") == [f"{file}: {key}: {new}" for key, new in OLD_KEYS.items()]
+    lines = str(caught.value).split("\n")
+    assert [line.removeprefix(f"{file}: ").partition(": ")[0] for line in lines] == [
+        "recipe",
+        "prediction.horizon",
+        "prediction.method",
+        "family.wrong.identify",
+    ]
+    assert all(line.startswith(f"{file}: ") for line in lines)
+    assert "write ahead = 5, in seconds" in lines[1]
+
+
+def test_the_remedy_for_a_recipe_works(tmp_path: Path) -> None:
+    """What the message of an old recipe says, done: the document is one of today."""
+    text = (FOLDER / "recipe-of-old.toml").read_text()
+    file = tmp_path / "mended.toml"
     file.write_text(text.replace('[recipe]\nkind = "fast"', '[[method]]\nname = "path-drawn"\nkind = "path-drawn"'))
     assert read_plan(file).methods[0].kind == "path-drawn"
 
