@@ -346,10 +346,7 @@ class Predictor(DeployedMethod):
             raise foreign from None
         if not isinstance(header, dict):
             raise foreign
-        if header.get("format") != FORMAT:
-            raise ResultError(
-                f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
-            )
+        _check_format(header, file)
         kind: Any = header.get("method")
         if isinstance(kind, str) and kind not in METHODS:
             raise ResultError(f"made by the method {kind!r}, which is not known here: {method_names(kind)}", file=file)
@@ -551,7 +548,14 @@ def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
     """Read the bands of a saved predictor alone, and why it has none if it has none; a damaged file as it comes."""
     arrays = read_arrays(file, "header", BANDS)
     header = json.loads(str(arrays.pop("header")))
+    _check_format(header, file)
     return _read_bands(header["bands"], arrays), reason_of_no_band(header["provenance"])
+
+
+def _check_format(header: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
+    if header.get("format") != FORMAT:
+        words = f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again"
+        raise ResultError(words, file=file)
 
 
 def _read_bands(header: Any, arrays: dict[str, Array]) -> Bands | None:
