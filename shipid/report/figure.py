@@ -128,7 +128,6 @@ class PageFigure:
     height : of one panel [px].
     draw : an option of each control -> panels, as many for all options.
     captions : of the panels; empty for none.
-    columns : whether panels stand in rows of three, instead of as many as have room.
     browser : whether the page draws the window that a reader picks, instead of `draw`.
     """
 
@@ -143,7 +142,6 @@ class PageFigure:
     chips: Sequence[Chip] = ()
     captions: Sequence[str] = ()
     scale: ColourScale | None = None
-    columns: bool = False
     browser: bool = False
 
 
