@@ -138,16 +138,18 @@ def test_a_method_without_a_counterpart_is_named_with_those_that_have_one(simple
 @pytest.mark.parametrize(
     ("kind", "place", "value", "message"),
     [
-        ("path-drawn", "networks", [], "networks: must be a list with one entry or more"),
-        ("recurrent", "networks", {}, "networks: must be a list with one entry or more"),
-        ("one-step", "units", {}, "units: must be a list with one entry or more"),
-        ("recurrent", "networks.0.now", [3], "networks.0: past and now must be lists of texts"),
-        ("recurrent", "0.b_h", np.zeros(14), "0.b_h: the arrays of the saved network do not fit together"),
-        ("recurrent", "networks.0.steps", 10**9, "'recurrent' do not fit together .1000000000 steps of the past"),
-        ("learned-force", "N_max", np.array(1.0), "N_max: must be one number in a list"),
+        ("path-drawn", "networks", [], "'path-drawn' do not fit together"),
+        ("one-step", "heads", {}, "'one-step' do not fit together"),
+        ("recurrent", "networks.0.layers.b_h", np.zeros(14), "b_h: the arrays of the saved method do not fit together"),
+        (
+            "recurrent",
+            "networks.0.reader.steps",
+            10**9,
+            "'recurrent' do not fit together .1000000000 steps of the past",
+        ),
         ("hankel-dmd", "past", 1e18, "damaged: a past of 1?[0-9]* steps: 0 to 100000"),
         ("hankel-dmd", "past", -30.0, "damaged: a past of -[0-9]* steps: 0 to 100000"),
-        ("hankel-dmd", "delays", 1, "'hankel-dmd' do not fit together .'past-2.u'"),
+        ("hankel-dmd", "law.delays", 1, "'hankel-dmd' do not fit together .'past-2.u'"),
         ("path-drawn", "inputs.memory.history", [1e-300], "'path-drawn' do not fit together"),
     ],
 )
