@@ -140,11 +140,12 @@ def _template_values(
         "SPEED": str(names.now.index("u")),
         "STEP_OF_REAL": precision.number(step),
         "UNUSED": str(0 if takes_positions(model) else len(POSITION_ENTRIES)),
+        "UNUSED_NOW": str(0 if filters is not None else len(POSITION_ENTRIES)),
     }
 
 
 def takes_positions(model: ExportModel) -> bool:
-    """Whether north and east have an effect: an observer measures them, or the past holds them."""
+    """Whether north and east of a row have an effect: an observer measures them, or the past holds them."""
     physics = model.physics
     return physics.observer is not None or (model.layout.num_past > 0 and physics.path == "position")
 
@@ -317,7 +318,7 @@ static int evaluate(const real *now, const real *reached, const real *past, cons
     (void)orders;
     for (i = 0; i < 2 * @_HORIZON; ++i) path[i] = NAN;
     for (i = 0; band && i < 4 * @_HORIZON; ++i) band[i] = NAN;
-    if (!are_finite(now + $UNUSED, @_NUM_NOW - $UNUSED) || !are_finite(past, @_PAST * @_NUM_PAST)
+    if (!are_finite(now + $UNUSED_NOW, @_NUM_NOW - $UNUSED_NOW) || !are_finite(past, @_PAST * @_NUM_PAST)
         || !are_finite(estimates, @_NUM_ESTIMATES) || !are_finite(parameters, @_NUM_PARAMETERS)) return @_NOT_FINITE;
     for (i = 0; i < $NUM_ABOVE; ++i) if (!(parameters[above_zero[i]] > 0)) return @_PARAMETER;
 #if $HAS_PLAN
