@@ -140,14 +140,14 @@ def _template_values(
         "SPEED": str(names.now.index("u")),
         "STEP_OF_REAL": precision.number(step),
         "UNUSED": str(0 if takes_positions(model) else len(POSITION_ENTRIES)),
-        "UNUSED_NOW": str(0 if filters is not None else len(POSITION_ENTRIES)),
+        "UNUSED_NOW": str(0 if model.vessel is not None else len(POSITION_ENTRIES)),
     }
 
 
 def takes_positions(model: ExportModel) -> bool:
-    """Whether north and east of a row have an effect: an observer measures them, or the past holds them."""
+    """Whether north and east of a row have an effect: physics begins there, or the past holds them."""
     physics = model.physics
-    return physics.observer is not None or (model.layout.num_past > 0 and physics.path == "position")
+    return physics.vessel is not None or (model.layout.num_past > 0 and physics.path == "position")
 
 
 def _num_filter_states(filters: FilterBank | None) -> int:

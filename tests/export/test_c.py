@@ -117,21 +117,22 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
         assert result("parameters", exported.layout.parameters.index(name), 0.0) == PARAMETER
 
 
-@pytest.mark.parametrize("observed", [False, True])
-def test_a_position_that_is_missing_matters_where_it_is_taken(observed, tmp_path):
-    """Python does not look at north and east without an observer; nor does C, which refused such rows."""
-    settings = ONE_FILTER if observed else None
-    predictor = Predictor(Physics(variety()["actuators"], 6, 1.0, observer=settings), "alone", Unchanged({}))
+@pytest.mark.parametrize("vessel", [None, "mariner"])
+def test_a_position_that_is_missing_matters_where_python_takes_it(vessel, tmp_path):
+    """Without physics Python does not look at north and east; C refused such rows."""
+    physics = Physics(vessel and load_vessel(vessel), 6, 5.0)
+    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 1.0)})
     recorder = Recorder(predictor, tmp_path)
     row = np.linspace(0.1, 0.3, len(recorder.model.layout.now))
-    path, expected = np.zeros((6, 2)), np.zeros((6, 2))
-    for places, result in ((expected, 0), (path, INVALID if observed else 0)):
-        recorder.begin()
-        recorder.loaded.odd_record.restype = ctypes.c_int
-        assert recorder.loaded.odd_record(pointer(recorder.kept), 0.0, pointer(row)) == result
-        recorder.loaded.odd_predict(pointer(recorder.kept), None, pointer(places))
-        row[: len(POSITION_ENTRIES)] = np.nan, -np.inf
-    np.testing.assert_array_equal(path, np.full((6, 2), np.nan) if observed else expected)
+    row[: len(POSITION_ENTRIES)] = np.nan, -np.inf
+    columns = {name: row[None, i] for i, name in enumerate(recorder.model.layout.now)}
+    with np.errstate(invalid="ignore"):
+        expected = predictor.predict(Instants(columns))
+    result = recorder.loaded.odd_record(pointer(recorder.kept), 0.0, pointer(row))
+    assert result == (0 if np.isfinite(expected).all() else INVALID) == (0 if vessel is None else INVALID)
+    computed, results = paths(recorder.loaded, "odd", recorder.model, Instants(columns))
+    assert results.tolist() == [result]
+    np.testing.assert_array_equal(computed, expected)
 
 
 @pytest.mark.slow
