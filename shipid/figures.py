@@ -1,9 +1,8 @@
 """Every figure of the reports as a plotly figure: `shipid.figures.error_map(results).show()`.
 
 Figures of a study take `Results` (as `shipid.run` and `shipid.read_results` return them), the content of a report, or
-simple frames: the table of cells alone, or a dict of frames by the names of `ReportContent`. A table of cells needs
-the columns model, N_D and H [m]; other columns may be absent. Figures of an identification take its outcome,
-those of a manoeuvre what `shipid.measure_standard` returns, those of a check a dataset.
+the table of cells alone, as `shipid.read_cells` returns it. Figures of an identification take its outcome, those of a
+manoeuvre what `shipid.measure_standard` returns, those of a check a dataset.
 
 All of them raise ShipidError where there is nothing to draw or an option does not exist, and take `dark=True` for
 light ink on a dark ground.
@@ -11,16 +10,15 @@ light ink on a dark ground.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
 from shipid.arguments import check_class, check_number
-from shipid.errors import ShipidError, suggest_name
+from shipid.errors import ShipidError
 from shipid.report import bands, checks, errors_over, identification, logs, manoeuvre, paths, physics_and_data
 from shipid.report import factors as models
 from shipid.report import search as trials
@@ -36,9 +34,10 @@ if TYPE_CHECKING:
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
-    Source = Results | ReportContent | pd.DataFrame | Mapping[str, pd.DataFrame]
+    Source = Results | ReportContent | pd.DataFrame
 
 Statistic = Literal["mean", "90th percentile", "root mean square"]
+COLUMNS_OF_CELLS = ("model", "family", "N_D", "seed", "status", "A", "A_90", "A_rms", "H", "H_90", "rms")
 
 __all__ = [
     "correlations",
@@ -77,10 +76,10 @@ def gain(
     *,
     dark: bool = False,
 ) -> go.Figure:
-    """H over N_D, a line per model; A beside H, a row per model, where there is a single N_D (`scale` is not used)."""
+    """H over N_D, a line per model; from the physics alone (N_D = 0) where there is a single N_D."""
     content = content_of(source)
-    chosen = [statistic, scale] if content.cells["N_D"].nunique() > 1 else [statistic]
-    return _draw(physics_and_data.gain_figure(content), chosen, dark=dark, lack=physics_and_data.gain_lack(content))
+    figure, lack = physics_and_data.gain_figure(content), physics_and_data.gain_lack(content)
+    return _draw(figure, [statistic, scale], dark=dark, lack=lack)
 
 
 def coverage(source: Source, N_D: int | None = None, *, dark: bool = False) -> go.Figure:
@@ -216,61 +215,25 @@ def _draw(
 
 
 def content_of(source: Source) -> ReportContent:
-    """Return what a report shows: from results, from frames by name, or from the table of cells alone.
+    """Return what a report shows: from results, or from the table of cells alone.
 
     Assembling it from results takes a moment: to draw many figures, call this once and draw from the content.
-    Raises ShipidError for frames that the report does not know, or a table of cells without model, N_D or H.
+    Raises ShipidError for anything else, and for a table that lacks a column of cells.
     """
     if isinstance(source, ReportContent):
         return source
     if isinstance(source, pd.DataFrame):
-        if source.empty:
-            raise ShipidError("the table has no rows", path="cells")
-        return content_of({"cells": source})
-    if isinstance(source, Mapping):
-        return _from_frames(dict(source))
+        if lacking := [name for name in COLUMNS_OF_CELLS if name not in source]:
+            raise ShipidError(f"lacks the columns {', '.join(lacking)}: give what `read_cells` returns", path="cells")
+        models = source.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
+        models = models.assign(status="ok", description="")
+        naive = dict.fromkeys(("mean", "p90", "rms"), np.nan)
+        return ReportContent(title="", name="", cells=source, models=models, naive=naive)
     from shipid.answer.pages import report_content
     from shipid.study.results import Results
 
     check_class("source", source, Results, "as of `read_results`, or a table of cells, as of `read_cells`")
     return report_content(source)
-
-
-def _from_frames(frames: dict[str, Any]) -> ReportContent:
-    known = {field.name for field in fields(ReportContent)}
-    for name in frames:
-        if name not in known:
-            raise ShipidError(f"a report shows no {name!r}; {suggest_name(name, known)}", path="figures")
-    cells = _completed(frames.pop("cells", pd.DataFrame({"model": np.array([], dtype=str), "N_D": [], "H": []})))
-    models = frames.pop("models", None)
-    if models is None:
-        models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
-        models = models.assign(status="ok", description="")
-    naive = frames.pop("naive", dict.fromkeys(("mean", "p90", "rms"), np.nan))
-    words = {"title": "", "name": "", "answer": [], "findings": []}
-    return ReportContent(**{**words, "cells": cells, "models": models, "naive": naive, **frames})
-
-
-def _completed(cells: pd.DataFrame) -> pd.DataFrame:
-    """Give a table of cells the columns that it lacks."""
-    if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
-        raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
-    if twice := cells.columns[cells.columns.duplicated()].tolist():
-        raise ShipidError(f"the column {twice[0]} appears twice", path="cells")
-    for name in [name for name in ("N_D", "H", "A") if name in cells and len(cells)]:
-        column = cells[name]
-        if not pd.api.types.is_numeric_dtype(column) or pd.api.types.is_complex_dtype(column):
-            raise ShipidError(f"the column {name} must hold numbers, not {column.dtype}", path="cells")
-    amounts = cells["N_D"].to_numpy(dtype=float, na_value=np.nan)
-    if (amounts % 1 != 0).any():  # so is what is no number
-        odd = amounts[amounts % 1 != 0][0]
-        raise ShipidError(f"the column N_D must hold numbers of runs, not {odd:g}", path="cells")
-    unknown = dict.fromkeys(("A", "A_90", "A_rms", "H_90", "rms"), np.nan)
-    plain = {"family": "given", "seed": 0, "sentence": "", "hyperparameters": "", "seconds": 0.0}
-    ok = pd.Series(np.where(cells["H"].notna(), "ok", "failed"), index=cells.index)
-    names = cells["model"].astype(str) + "-" + cells["N_D"].astype(str)
-    absent: dict[str, Any] = {"status": ok, "cell": names, **unknown, **plain}
-    return cells.assign(**{name: value for name, value in absent.items() if name not in cells})
 
 
 def _identification(source: Identified | IdentificationContent) -> IdentificationContent:

@@ -12,7 +12,7 @@ A bank of extended Kalman filters on the vessel's equations of motion. The state
 
 Steady uniform current moves the water and everything in it, so the equations hold for nu - nu_c with any vessel, with
 or without a [current] block. d(nu_c)/dt is that of a steady current in turning axes: where a current changes, the
-ship keeps her motion over ground at first. Where an order changes the physics are least sure: the white noise of nu
+ship keeps its motion over ground at first. Where an order changes the physics are least sure: the white noise of nu
 grows by the change of acceleration that they compute, and fades. Filters differ in the waves, the current and the
 model error that they assume; each weighs by the likelihood of its recent innovations. Sources: Fossen, Handbook of
 Marine Craft Hydrodynamics and Motion Control (2021), ch. 13 (wave model) and sec. 10.3 (current); Bar-Shalom, Li,
@@ -188,7 +188,7 @@ class FilterBank:
 
 
 def filter_bank(vessel: Vessel, settings: Observer | None = None) -> FilterBank:
-    """Filters for a vessel of three degrees of freedom; DocumentError for another, or for what is none."""
+    """Filters for a vessel of three degrees of freedom; DocumentError for another, and for no vessel."""
     check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     if settings is not None:
         check_class("settings", settings, Observer, "such as Observer(), or None", DocumentError)
@@ -238,9 +238,9 @@ def filter_function(model: Dynamics) -> ca.Function:
 
     (state, commands, environment, parameters, measured, noise, numbers, dt) -> (state, estimate, innovation, spread).
     state packs x, P by columns, actuators' memory, unsettled acceleration, the commands before and the log-likelihood
-    remembered; their lengths are `filter_state_sizes`. commands and environment are those in force since the instant before; a
-    measurement (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction, before any
-    update.
+    remembered; their lengths are `filter_state_sizes`. commands and environment are those in force since the instant
+    before; a measurement (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction,
+    before any update.
     """
     count, (num_memory, num_commands) = len(FILTER_STATES), (len(model.memory), len(model.commands))
     state = SX.sym("state", sum(filter_state_sizes(model)))
@@ -314,7 +314,7 @@ def filters_function(model: Dynamics, num_filters: int) -> ca.Function:
 
 @lru_cache(maxsize=16)
 def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
-    """The whole observer's step as a pure function of CasADi, for K filters: `run_observer` and exports in C do the same.
+    """The whole observer's step as a pure function of CasADi, for K filters; `run_observer` and exported C follow it.
 
     (states (n, K), commands, environment, parameters, measured, noise, numbers (., K), dt) -> (states, estimate (11,),
     innovation (6,), spread (6,), weights (K,)); estimates are means by the weights, the innovation that of the mixture.
@@ -526,7 +526,8 @@ def _check_intervals(dataset: Dataset, filters: FilterBank, places: Sequence[NDA
     t = dataset.frame["t"].to_numpy()
     apart = max((float(np.max(np.diff(t[rows]), initial=0.0)) for rows in places), default=0.0)
     if apart > MOST_FILTER_STEPS * filters.longest:
-        limit = f"the observer takes rows of {filters.vessel.name} at most {MOST_FILTER_STEPS * filters.longest:.3g} s apart"
+        longest = f"{MOST_FILTER_STEPS * filters.longest:.3g} s"
+        limit = f"the observer takes rows of {filters.vessel.name} at most {longest} apart"
         raise DataError(f"rows are up to {apart:.3g} s apart: {limit}; is the unit of the clock right?", path="t")
 
 

@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self, get_args, overload
 
@@ -31,7 +31,8 @@ from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrate_bands
 from shipid.hybrid.contract import fault_of_corrector, name_of_class
-from shipid.hybrid.method import Case, Corrector, Index, Method, Task, fit_all, widen_range
+from shipid.hybrid.deployed import DeployedMethod, reason_of_no_band
+from shipid.hybrid.method import Case, Index, Method, Task, fit_all, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.metrics import vector_lengths
@@ -41,14 +42,13 @@ from shipid.simulation.log import state_column
 from shipid.units import percent_text
 from shipid.users import error_location, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
-from shipid.vessel.load import Vessel, check_document
+from shipid.vessel.load import check_document
 
 Array = np.ndarray
 FORMAT = 5
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
 BANDS = "bands."  # before the names of arrays of a band in a saved predictor
 MOST_HORIZON_STEPS = 100_000  # of a horizon and of a past
-KEYS_OF_NAMES = ("commands", "names", "modules")  # keys of lists of names in the headers of correctors and bands
 
 
 class BandedPrediction(NamedTuple):
@@ -64,49 +64,8 @@ class BandedPrediction(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Predictor:
-    """Physics and a fitted method as one deployable thing: it predicts a trajectory from one instant.
-
-    physics : the vessel with its numbers, or none, with horizon, step and rule of the rollout.
-    method : kind of the method, a name in `shipid.hybrid.methods.METHODS`.
-    corrector : the fitted method.
-    limits : column -> (least, greatest) seen in training: the region where the method has evidence.
-    commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
-        in force in each step, `Instants.planned`, name -> (T, S).
-    causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
-    bands : what says how far off a prediction may be; None where no runs could calibrate it.
-    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training; 0 without an
-        observer. One that has run for less time has not settled as it had there, so such an instant is outside.
-    """
-
-    physics: Physics
-    method: str
-    corrector: Corrector = field(repr=False)
-    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict, repr=False)
-    provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    commands: Commands = "held"
-    causal: tuple[str, ...] = ()
-    bands: Bands | None = field(default=None, repr=False)
-    run_up: float = 0.0
-
-    def __post_init__(self) -> None:
-        """A number of NumPy's becomes a plain one, as in `Physics`."""
-        object.__setattr__(self, "run_up", float(self.run_up))
-
-    @property
-    def vessel(self) -> Vessel | None:
-        """The vessel of the physics; None for no physics."""
-        return self.physics.vessel
-
-    @property
-    def no_band(self) -> str:
-        """Why it has no band, if it has none."""
-        return _no_band(self.provenance)
-
-    @property
-    def past(self) -> int:
-        """Steps of the past that `Instants.past` must hold."""
-        return math.ceil(self.corrector.past / self.physics.step - 1e-9)
+class Predictor(DeployedMethod):
+    """Physics and a fitted method as one deployable thing: it predicts a trajectory from one instant."""
 
     @overload
     def predict(self, instants: Instants, paths: Array | None = None) -> Array: ...
@@ -330,8 +289,6 @@ class Predictor:
             json.dumps(header)
         except (TypeError, ValueError) as error:
             raise DataError(f"{wrong} ({error})") from None
-        if not _names_are_texts(header):
-            raise DataError(f"the header {what}: {' and '.join(KEYS_OF_NAMES)} must be lists of texts")
         if not isinstance(given, Mapping):
             raise DataError(f"the arrays {what} must be a table, not {type(given).__name__}")
         try:
@@ -389,18 +346,13 @@ class Predictor:
             raise foreign from None
         if not isinstance(header, dict):
             raise foreign
-        if header.get("format") != FORMAT:
-            raise ResultError(
-                f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again", file=file
-            )
+        _check_format(header, file)
         kind: Any = header.get("method")
         if isinstance(kind, str) and kind not in METHODS:
             raise ResultError(f"made by the method {kind!r}, which is not known here: {method_names(kind)}", file=file)
         fault = _fault_of(arrays)
         if fault:
             raise ResultError(f"damaged: {fault}: run the study again", file=file)
-        if not _names_are_texts([header.get("corrector"), header.get("bands")]):
-            raise ResultError("damaged: run the study again", file=file)
         try:
             known, vessel = _Header.model_validate(header), header["vessel"]
             bands = _read_bands(header.get("bands"), arrays)
@@ -474,17 +426,6 @@ class _Header(BaseModel):
     limits: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
     run_up: Annotated[float, Field(ge=0, le=1e9)] = 0.0
-
-
-def _names_are_texts(header: Any) -> bool:
-    """Whether all lists of names in a part of the header of a predictor hold texts, at any depth."""
-    if isinstance(header, list):
-        return all(map(_names_are_texts, header))
-    if not isinstance(header, dict):
-        return True
-    lists = [header[key] for key in KEYS_OF_NAMES if key in header]
-    texts = all(isinstance(one, list) and all(isinstance(name, str) for name in one) for one in lists)
-    return texts and all(_names_are_texts(value) for key, value in header.items() if key not in KEYS_OF_NAMES)
 
 
 def _fault_of(arrays: Mapping[str, Array]) -> str:
@@ -607,7 +548,14 @@ def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
     """Read the bands of a saved predictor alone, and why it has none if it has none; a damaged file as it comes."""
     arrays = read_arrays(file, "header", BANDS)
     header = json.loads(str(arrays.pop("header")))
-    return _read_bands(header["bands"], arrays), _no_band(header["provenance"])
+    _check_format(header, file)
+    return _read_bands(header["bands"], arrays), reason_of_no_band(header["provenance"])
+
+
+def _check_format(header: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
+    if header.get("format") != FORMAT:
+        words = f"written in format {header.get('format')}, this shipid reads {FORMAT}: run the study again"
+        raise ResultError(words, file=file)
 
 
 def _read_bands(header: Any, arrays: dict[str, Array]) -> Bands | None:
@@ -622,10 +570,6 @@ def check_bands(bands: Bands | None, reason: str, level: float, kind: str | None
         raise DataError(f"{NO_BAND}{reason}")
     bands.check(level, kind)
     return bands
-
-
-def _no_band(provenance: Mapping[str, Any]) -> str:
-    return str(provenance.get("no_band", "it was made without"))
 
 
 NO_BAND = "this predictor has no band: "

@@ -192,19 +192,6 @@ def test_two_steps_add_the_uncertainty_of_one_twice_as_long() -> None:
     np.testing.assert_allclose(np.diag(once)[3:6], dt * np.array(powers))
 
 
-def test_what_is_known_badly_counts_little() -> None:
-    """A column of standard deviations weighs each row: speeds that may be wrong by 1,000 km/s move nothing."""
-    vessel, frame = load_vessel("gunnerus-28.9"), calm().data.frame
-    run = frame[frame["run"] == "M000"].iloc[:25].reset_index(drop=True)
-    bad = (run.index >= 5) & (run.index < 15)
-    known = run.assign(std_u=np.where(bad, 1e6, 0.0))
-    moved = known.assign(u=known["u"] + 3.0 * bad)
-    one, other = (
-        run_observer(vessel, Dataset(log, calm().data.metadata)).columns["observer.v"] for log in (known, moved)
-    )
-    np.testing.assert_allclose(other, one, atol=1e-4)
-
-
 def test_rows_far_apart_make_no_force_of_an_order() -> None:
     """Mariner, rows every 8 s, new orders every 160 s; the truth is without noise, and no force is in it."""
     vessel, step, rows = load_vessel("mariner"), 8.0, 160
@@ -357,22 +344,6 @@ def test_tuning_takes_what_errs_least_by_the_paths_of_the_physics(commands: Lite
     assert tried["waves (0.01,), fade 0.0"] == pytest.approx(error(alone), rel=1e-9)
     assert {label.split(",")[0].split()[0] for label in tried} == {"as", "waves"}
     assert max(tried.values()) > 1.05 * min(tried.values())
-
-
-def test_settings_with_which_a_window_diverges_are_chosen_last() -> None:
-    """The other windows may be as well predicted as they like."""
-    vessel, log = load_vessel("gunnerus-28.9"), weaving("a")
-    windows = some_windows(log)
-
-    def paths(settings: Observer, _: object) -> np.ndarray:
-        still = settings.waves == (0.0,)
-        diverged = np.arange(len(windows)) < still
-        return np.where(diverged[:, None], np.nan, windows.future + (0.0 if still else 9.0))
-
-    settings = Observer(waves=(0.0, 0.01), change=(1e-4,), current=0.0)
-    chosen, tried = tune_observer(vessel, log, windows, paths, settings)
-    assert chosen.waves == (0.0, 0.01)
-    assert tried["waves (0.0,), fade 12.0"] > 1e6
 
 
 def test_a_compass_counts_from_zero_again() -> None:

@@ -17,7 +17,7 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.physics import Physics, check_columns, missing_columns
+from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.predictor import FORMAT, Predictor
 from shipid.study.apply import predict_log
@@ -65,14 +65,6 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
     assert again.bands.header() == bands.header()
     for name, values in bands.arrays().items():
         np.testing.assert_array_equal(again.bands.arrays()[name], values)
-
-
-def test_numbers_of_numpy_are_saved_and_exported(tmp_path: Path) -> None:
-    physics = Physics(load_vessel("mariner"), np.int64(3), np.float64(0.5))  # type: ignore[arg-type]
-    one = Predictor(physics, "alone", Unchanged({}), run_up=np.float64(2.0))
-    assert Predictor.load(one.save(tmp_path / "one.npz")).physics == physics
-    for file in one.export("c", tmp_path / "aboard"):
-        assert "np.float64(" not in file.read_text(encoding="utf-8")
 
 
 def test_what_a_user_notes_of_the_origin_is_saved(tmp_path: Path) -> None:
@@ -221,18 +213,6 @@ def test_foreign_contents_are_one_line(tmp_path: Path, tiny_run: Path, changes: 
     assert str(caught.value).startswith(f"{file}: ")
 
 
-def test_names_that_are_no_texts_are_refused(tmp_path: Path, tiny_run: Path) -> None:
-    """Such a name would be the path of an error that cannot be written."""
-    source = cell_file(tiny_run, CELL)
-    with np.load(source, allow_pickle=False) as stored:
-        corrector = json.loads(str(stored["header"]))["corrector"]
-    assert corrector["inputs"]["commands"]
-    for wrong in ([3], None, "port.n", [["port.n"]]):
-        damaged = corrector | {"inputs": corrector["inputs"] | {"commands": wrong}}
-        with pytest.raises(ResultError, match="damaged: run the study again"):
-            Predictor.load(rewritten(source, tmp_path / "names.npz", corrector=damaged))
-
-
 def test_files_of_other_kinds_are_one_line(tmp_path: Path, tiny_run: Path) -> None:
     whole = cell_file(tiny_run, CELL).read_bytes()
     flipped = bytearray(whole)
@@ -318,20 +298,6 @@ def test_pure_data_driven_has_no_physics_path(tmp_path: Path, tiny_run: Path) ->
     assert frame[["cooperative_north", "cooperative_east"]].notna().all(axis=None)
 
 
-def test_outside_is_reported_for_its_instant(tmp_path: Path, tiny_run: Path) -> None:
-    dataset = read_dataset(tiny_run / DATASET)
-    at = (dataset.frame["run"] == "M001") & (dataset.frame["t"] == 7.0)
-    faster = dataset.frame.assign(u=np.where(at, 50.0, dataset.frame["u"]))
-    file = write_dataset(Dataset(faster, dataset.metadata), tmp_path / "fast.parquet")
-    before, _ = predict_log(tiny_run, CELL, tiny_run / DATASET, None, tmp_path / "before.csv")
-    after, outside = predict_log(tiny_run, CELL, file, None, tmp_path / "after.csv")
-    changed = after[after["outside"] != before["outside"]]
-    assert changed[["run", "t"]].drop_duplicates().to_numpy().tolist() == [["M001", 7.0]]
-    assert after.loc[(after["run"] == "M001") & (after["t"] == 7.0), "outside"].all()
-    assert len(changed) == 5
-    assert outside == pytest.approx(after["outside"].mean())
-
-
 def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path) -> None:
     log, out = tiny_run / DATASET, tmp_path / "paths.csv"
     with pytest.raises(ResultError, match=r"did you mean 'wrong-1\+drawn-N0006-s0'"):
@@ -350,12 +316,3 @@ def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path
         with pytest.raises(DataError, match=message):
             predict_log(tiny_run, CELL, file, None, out)
     assert not out.exists()
-
-
-def test_what_is_assumed_is_named() -> None:
-    ship = load_vessel("gunnerus-28.9")
-    commands = {f"{side}.{signal}": np.zeros(1) for side in ("port", "starboard") for signal in ("n", "alpha")}
-    measured = commands | dict.fromkeys(("north", "east", "psi", "u", "v"), np.zeros(1))
-    assert missing_columns(ship, measured) == ["r", "V_w", "beta_w"]
-    assert missing_columns(ship, measured | dict.fromkeys(("r", "V_w", "beta_w"), np.zeros(1))) == []
-    check_columns(ship, commands, "log.csv")

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 import numpy as np
 import pandas as pd
 import pytest
-import torch
 
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
@@ -30,7 +29,7 @@ from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error
 from shipid.predictor import Predictor, _split_folds, fit
 from shipid.vessel.load import Vessel, load_vessel
-from tests.export.strange import bands_of, drawn
+from tests.export.strange import drawn
 
 HORIZON, SMALL = 5, PathDrawn(trials=1, units=8, terms=2)
 NONE = Physics(None, HORIZON, 1.0)
@@ -179,26 +178,6 @@ def test_diverging_physics_is_refused() -> None:
         fit(SMALL, Physics(wild, HORIZON, 1.0), WINDOWS)
 
 
-LOOKS: dict[str, Callable[[np.ndarray], Any]] = {
-    "list": list,
-    "series with another index": lambda values: pd.Series(values, index=range(len(values))[::-1]),
-    "tensor": torch.tensor,
-    "objects": lambda values: values.astype(object),
-}
-
-
-def test_columns_of_any_type_give_the_same_prediction() -> None:
-    instants, known = WINDOWS.instants(), fit(SMALL, Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0), WINDOWS)
-    banded, table = known.predict(instants, level=0.5), pd.DataFrame(instants.columns).assign(run=WINDOWS.run)
-    for look in LOOKS.values():
-        looking = Instants({name: look(values) for name, values in instants.columns.items()})
-        again = known.predict(looking, level=0.5)
-        np.testing.assert_array_equal(again.paths, banded.paths)
-        np.testing.assert_array_equal(again.region.along, banded.region.along)
-        np.testing.assert_array_equal(again.outside, banded.outside)
-    np.testing.assert_array_equal(known.predict(Instants(table)), banded.paths)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -265,15 +244,6 @@ def test_an_estimate_that_is_missing_is_named() -> None:
             strange.predictor.predict(replace(strange.instants, estimates=estimates))
 
 
-def test_only_instants_are_predicted_from(predictor: Predictor) -> None:
-    given: Any = WINDOWS
-    for call in (predictor.predict, predictor.alone):
-        with pytest.raises(
-            DataError, match=r"instants must be an Instants, such as `windows\.instants\(\)`, not Windows"
-        ):
-            call(given)
-
-
 def test_paths_of_another_shape_are_refused(predictor: Predictor) -> None:
     """Before, the path of one instant was taken for all, and without a method whatever was given came back."""
     instants = WINDOWS.instants()
@@ -284,26 +254,6 @@ def test_paths_of_another_shape_are_refused(predictor: Predictor) -> None:
         for wrong in (paths[:, :1], paths[:2], paths[..., 0], paths.transpose(1, 0, 2)):
             with pytest.raises(DataError, match="paths must be"):
                 known.predict(instants, wrong)
-
-
-def test_a_band_takes_paths_and_instants_alone(predictor: Predictor) -> None:
-    """Before, anything else ended in a TypeError or an AttributeError, and a part of the horizon in a wrong band."""
-    instants, rng = WINDOWS.instants(), np.random.default_rng(3)
-    bands = replace(bands_of(rng, predictor.physics, instants, tuple(predictor.limits), 1.0), runs=60)
-    known = replace(predictor, bands=bands)
-    paths = known.predict(instants)
-    whole, listed = (known.band(given, instants, 0.5) for given in (paths, paths.tolist()))
-    np.testing.assert_array_equal(listed.along, whole.along)
-    wrong: Any
-    for wrong in (None, paths[:, :1], "paths"):
-        with pytest.raises(DataError, match="paths must be"):
-            known.band(wrong, instants, 0.5)
-    wrong = instants.columns
-    with pytest.raises(DataError, match="instants must be an Instants, such as"):
-        known.band(paths, wrong, 0.5)
-    lacking = replace(instants, columns={name: values for name, values in instants.columns.items() if name != "port.n"})
-    with pytest.raises(DataError, match=r"port\.n: the band was calibrated with this column, and the instants lack it"):
-        known.band(paths, lacking, 0.5)
 
 
 def test_a_prediction_is_no_view_of_what_was_passed_in() -> None:
@@ -469,7 +419,6 @@ def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], m
         ({}, None, "the arrays of the method 'mine' must be a table, not NoneType"),
         ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them, not list"),
         ({"a": {1, 2}}, {}, "the header of the method 'mine' must be a table .* not JSON serializable"),
-        ({"names": [3]}, {}, "the header of the method 'mine': commands and names and modules must be lists of texts"),
     ],
 )
 def test_what_could_not_be_read_back_is_not_saved(header: Any, arrays: Any, message: str, tmp_path: Path) -> None:

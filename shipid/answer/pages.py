@@ -28,7 +28,6 @@ from shipid.study.results import Results, read_results
 Say = Callable[[str], object]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
-    "observer": memory.observer_frame,
     "kinds": frames.kinds_frame,
     "memory": memory.memory_frame,
     "coverage": bands.coverage_frame,

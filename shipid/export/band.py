@@ -84,7 +84,7 @@ def is_band_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
 
 
 def factor_function(bands: Bands) -> ca.Function:
-    """(miss, level, kind) -> how much wider than calibrated an adaptive band is, as `shipid.hybrid.bands.adaptive_factor`."""
+    """(miss, level, kind) -> growth of an adaptive band, as `shipid.hybrid.bands.adaptive_factor`."""
     inputs = symbols_of({"miss": 1, "level": 1, "kind": 1})
     miss, level, kind = inputs.values()
     whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])

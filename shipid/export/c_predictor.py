@@ -25,6 +25,7 @@ from shipid.export.c import (
     provenance_lines,
     tables_of,
 )
+from shipid.export.known import POSITION_ENTRIES
 from shipid.export.model import ExportModel
 from shipid.export.recorder import KEPT_ENTRIES, filters_of, recorder_functions
 from shipid.observer import MOST_FILTER_STEPS, STEP_SLACK, FilterBank, filter_state_sizes
@@ -138,7 +139,15 @@ def _template_values(
         "ROWS": str(names.num_past + 1),
         "SPEED": str(names.now.index("u")),
         "STEP_OF_REAL": precision.number(step),
+        "UNUSED": str(0 if takes_positions(model) else len(POSITION_ENTRIES)),
+        "UNUSED_NOW": str(0 if model.vessel is not None else len(POSITION_ENTRIES)),
     }
+
+
+def takes_positions(model: ExportModel) -> bool:
+    """Whether north and east of a row have an effect: physics begins there, or the past holds them."""
+    physics = model.physics
+    return physics.vessel is not None or (model.layout.num_past > 0 and physics.path == "position")
 
 
 def _num_filter_states(filters: FilterBank | None) -> int:
@@ -162,6 +171,7 @@ def _header_comment(model: ExportModel, precision: NumberPrecision) -> list[str]
         "",
         "SI units, radians, revolutions per second; directions of wind and current are towards. Path: x ahead and y to",
         "starboard [m] in body axes frozen at the instant of prediction. What is not measured is 0.",
+        *([] if takes_positions(model) else ["Nothing takes north and east: they may be any values, also NAN."]),
         *(SINGLE_PRECISION_NOTE if precision.single else []),
         *_band_note(model),
         *([f"Alarm for the first {predictor.run_up:g} s: the observer settles."] if predictor.run_up else []),
@@ -308,7 +318,7 @@ static int evaluate(const real *now, const real *reached, const real *past, cons
     (void)orders;
     for (i = 0; i < 2 * @_HORIZON; ++i) path[i] = NAN;
     for (i = 0; band && i < 4 * @_HORIZON; ++i) band[i] = NAN;
-    if (!are_finite(now, @_NUM_NOW) || !are_finite(past, @_PAST * @_NUM_PAST)
+    if (!are_finite(now + $UNUSED_NOW, @_NUM_NOW - $UNUSED_NOW) || !are_finite(past, @_PAST * @_NUM_PAST)
         || !are_finite(estimates, @_NUM_ESTIMATES) || !are_finite(parameters, @_NUM_PARAMETERS)) return @_NOT_FINITE;
     for (i = 0; i < $NUM_ABOVE; ++i) if (!(parameters[above_zero[i]] > 0)) return @_PARAMETER;
 #if $HAS_PLAN
@@ -360,7 +370,7 @@ int @_record(@ *self, double t, const @_real *row)
     real kept[$WIDTH], moved[$WIDTH], after[@_NUM_REACHED + 1], *last = self->rows[newest], anew, dt;
     int i, k, alone = 0, at;
     $ARRAYS
-    if (!isfinite(t) || !are_finite(row, @_NUM_ROW)) return @_NOT_FINITE;
+    if (!isfinite(t) || !are_finite(row + $UNUSED, @_NUM_ROW - $UNUSED)) return @_NOT_FINITE;
     if (self->count && !(t > self->t[newest])) return @_TIME;
     if (self->count) {
         const double apart = t - self->t[newest];

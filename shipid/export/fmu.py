@@ -172,9 +172,7 @@ def write_fmu(unit: FmuParts, file: Path) -> list[str]:
     name = unit.identifier
     sources = {key: text for key, text in unit.files.texts.items() if key != "main.c"}
     sources[f"{name}.c"] += "\n" + unit.wrapper
-    texts = {f"sources/{key}": text for key, text in sources.items()} | {
-        "documentation/index.html": _documentation(unit)
-    }
+    texts = {f"sources/{key}": text for key, text in sources.items()}
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(texts.values()))}}}"
     texts["modelDescription.xml"] = model_description(unit, guid)
     texts[f"sources/{name}.c"] = sources[f"{name}.c"].replace("@GUID@", guid)
@@ -271,22 +269,4 @@ def model_description(unit: FmuParts, guid: str) -> str:
   <ModelStructure>
 {structure}  </ModelStructure>
 </fmiModelDescription>
-"""
-
-
-def _documentation(unit: FmuParts) -> str:
-    from html import escape
-
-    rows = "".join(
-        f"<tr><td>{escape(v.name)}</td><td>{v.causality}</td><td>{escape(v.unit)}</td><td>{escape(v.description)}</td></tr>\n"
-        for v in unit.variables
-    )
-    text = (
-        "The vessel takes as many internal steps as solver.step asks for. A value that is not finite is refused."
-        if unit.step is None
-        else "A step from t to t + h keeps the inputs as the row that was measured at t; the outputs are the path from then."
-    )
-    return f"""<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(unit.title)}</title>
-<h1>{escape(unit.title)}</h1><p>{text} SI units, radians, revolutions per second; directions are towards.</p>
-<table>{rows}</table></html>
 """

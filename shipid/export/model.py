@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,9 +17,9 @@ from shipid.export.band import BAND_CHOICE, band_rows, is_band_promised, radii_a
 from shipid.export.correctors import CORRECTORS, inputs_of
 from shipid.export.equations import function_by_names, symbols_of
 from shipid.export.known import InputLayout, PredictorInputs, input_layout
-from shipid.hybrid.bands import Bands
+from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.learned_force import ForceCorrector
-from shipid.hybrid.method import Corrector, widen_range
+from shipid.hybrid.method import widen_range
 from shipid.hybrid.physics import Physics
 from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
@@ -32,33 +32,6 @@ MOST_NUMBERS = 300_000
 """Numbers in the arrays of an exported predictor, at most: 8 MB of source, 2.4 MB compiled in double precision."""
 
 
-class Exportable(Protocol):
-    """The parts of a predictor that an export uses, see `shipid.predictor.Predictor`."""
-
-    @property
-    def physics(self) -> Physics: ...  # noqa: D102
-    @property
-    def method(self) -> str: ...  # noqa: D102
-    @property
-    def corrector(self) -> Corrector: ...  # noqa: D102
-    @property
-    def limits(self) -> Mapping[str, tuple[float, float]]: ...  # noqa: D102
-    @property
-    def provenance(self) -> Mapping[str, Any]: ...  # noqa: D102
-    @property
-    def commands(self) -> str: ...  # noqa: D102
-    @property
-    def causal(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def past(self) -> int: ...  # noqa: D102
-    @property
-    def bands(self) -> Bands | None: ...  # noqa: D102
-    @property
-    def no_band(self) -> str: ...  # noqa: D102
-    @property
-    def run_up(self) -> float: ...  # noqa: D102
-
-
 @dataclass(frozen=True, eq=False)
 class ExportModel:
     """A predictor that is ready to be written.
@@ -66,7 +39,7 @@ class ExportModel:
     physics : with the terms of the method. layout : names of the inputs.
     """
 
-    predictor: Exportable
+    predictor: DeployedMethod
     physics: Physics
     layout: InputLayout
 
@@ -167,7 +140,7 @@ class ExportModel:
         return {**stacked, "parameters": np.tile(self.parameters, (count, 1))}
 
 
-def build_model(predictor: Exportable) -> ExportModel:
+def build_model(predictor: DeployedMethod) -> ExportModel:
     """A predictor as a model; ShipidError for a method that has no counterpart."""
     corrector, physics = predictor.corrector, predictor.physics
     taken = inputs_of(corrector)

@@ -37,7 +37,7 @@ def filters_of(model: ExportModel) -> FilterBank | None:
 
 
 def recorder_functions(model: ExportModel) -> dict[str, ca.Function]:
-    """Functions by name: `keep`; where the model has them `past`, `plan`, `first_filter_states`, `between` and `observe`."""
+    """Functions by name: `keep`; where the model has them `past`, `plan`, `begin`, `between` and `observe`."""
     functions = {"keep": keep_function(model)}
     if model.layout.num_past:
         functions["past"] = past_function(model)

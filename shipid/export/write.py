@@ -18,9 +18,10 @@ from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
 from shipid.export.casadi import predictor_function, vessel_function, write_function
 from shipid.export.fmu import FmuParts, predictor_unit, vessel_unit, write_fmu
-from shipid.export.model import Exportable, ExportModel, build_model
+from shipid.export.model import ExportModel, build_model
 from shipid.export.onnx import write_onnx
 from shipid.files import write_set
+from shipid.hybrid.deployed import DeployedMethod
 from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
@@ -44,7 +45,7 @@ class ExportTarget:
 
 
 def export_predictor(
-    predictor: Exportable, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
+    predictor: DeployedMethod, to: str, out: str | os.PathLike[str], *, single: bool = False, name: str | None = None
 ) -> list[Path]:
     """Write a predictor for a target; the files that were written.
 

@@ -8,7 +8,6 @@ from functools import partial
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import AnswerSentence, Floats, PageContent, SummaryLine
 from shipid.report.figure import (
@@ -16,6 +15,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     category_colour,
     even_places,
     make_axis,
@@ -111,7 +111,7 @@ def paths_figure(content: AboardContent) -> PageFigure:
     )
 
 
-def _draw_seen(content: AboardContent, run: str, drawn: Sequence[str]) -> go.Figure:
+def _draw_seen(content: AboardContent, run: str, drawn: Sequence[str]) -> Panel:
     track, points = (frame[frame["run"] == run] for frame in (content.track, content.points))
     traces = [make_line(LOGGED_TRACK, track["east"], track["north"], [LOGGED_TRACK], line=LOOKS[LOGGED_TRACK])]
     times = points["t"].unique()
@@ -149,7 +149,7 @@ def along_run_figure(content: AboardContent) -> PageFigure:
     )
 
 
-def _draw_along(content: AboardContent, run: str) -> go.Figure:
+def _draw_along(content: AboardContent, run: str) -> Panel:
     mine, points = (frame[frame["run"] == run] for frame in (content.instants, content.points))
     t = mine["t"] - float(content.track.loc[content.track["run"] == run, "t"].min())
     traces = [make_line("error", t, mine["error"], [PATH], line={"color": category_colour(0), "width": 2})]

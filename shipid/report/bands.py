@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -15,6 +14,7 @@ from shipid.report.figure import (
     ColourScale,
     Control,
     PageFigure,
+    Panel,
     Trace,
     error_bars,
     escape_name,
@@ -62,7 +62,7 @@ def coverage_figure(content: ReportContent) -> PageFigure | None:
     if not names:
         return None
     counts, banded = shown_sizes(frame.N_D), frame.model.nunique()
-    drawn = f" Of {banded} models, {listed_names(names, 6)} {plural_word(len(names), 'is', 'are')} drawn; the table has all."
+    drawn = f" Of {banded} models, {listed_names(names, 6)} {plural_word(len(names), 'is', 'are')} drawn."
     return PageFigure(
         id="coverage",
         title="What bands promise, and what they hold",
@@ -70,7 +70,7 @@ def coverage_figure(content: ReportContent) -> PageFigure | None:
         how="A band is a region around every step of a predicted path; it holds a path if it holds all its steps. It "
         "is calibrated on errors of models that saw the run neither in training nor in the choice of hyperparameters, "
         "and counts runs, not windows. Measured on the test runs, on which no cell trained. Bars are exact binomial "
-        f"95 % intervals for so many windows as the {counted_text(int(frame.runs.max()), 'test run')} are worth: windows "
+        f"95 % intervals for as many windows as {counted_text(int(frame.runs.max()), 'test run')} are worth: windows "
         "of one run are alike. The share is over all kinds of manoeuvre as they are mixed; a single kind may get less."
         + (drawn if len(names) < banded else ""),
         alternative="Points of the measured over the promised share of paths with intervals, one line per model. The "
@@ -82,7 +82,7 @@ def coverage_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str], size: int) -> go.Figure:
+def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str], size: int) -> Panel:
     diagonal = {"color": MUTED, "width": 1, "dash": "dash"}
     traces = [make_line("as promised", [0.45, 1.0], [0.45, 1.0], ["nominal"], "", line=diagonal)]
     for i, name in enumerate(names):
@@ -90,7 +90,7 @@ def _draw_coverage(content: ReportContent, frame: pd.DataFrame, names: list[str]
         shift = 0.004 * (i - (len(names) - 1) / 2)  # intervals of several models would hide each other
         held, low, high = (mine[column].to_numpy(dtype=float) for column in ("coverage", "low", "high"))
         words = [
-            f"{escape_name(name)}: {_share_words(row)} of {level_text(row['level'])}, mean radius {metres_text(row['width'])}"
+            f"{escape_name(name)}: {_share_words(row)} of {level_text(row['level'])}, to {metres_text(row['width'])}"
             for row in mine.to_dict("records")
         ]
         ink = {"color": look.colour, "width": look.width}
@@ -149,7 +149,7 @@ def width_figure(content: ReportContent) -> PageFigure | None:
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
         f"left out.{hatched}",
-        alternative=f"Cells of the mean radius of the band [m] for {counted_text(len(shown.rows), 'model')} by A and N_D. "
+        alternative=f"Cells of the mean radius [m] for {counted_text(len(shown.rows), 'model')} by A and N_D. "
         "The numbers are in a table.",
         height=HEIGHT,
         draw=lambda: [draw_map(shown)],

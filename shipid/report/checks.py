@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report import logs
 from shipid.report.content import AnswerSentence, PageContent, rows_as_tuples
@@ -15,6 +14,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     category_colour,
     even_places,
     make_axis,
@@ -104,7 +104,7 @@ def checked_motion(series: pd.DataFrame) -> PageFigure | None:
     return PageFigure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities furthest in {worst.idxmax()}: {short_text(float(worst.max()))} m.",
+        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {short_text(worst.max())} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",
@@ -115,7 +115,7 @@ def checked_motion(series: pd.DataFrame) -> PageFigure | None:
     )
 
 
-def _draw_checked(rows: pd.DataFrame) -> list[go.Figure]:
+def _draw_checked(rows: pd.DataFrame) -> list[Panel]:
     shown = rows.iloc[even_places(len(rows), MOST_LINE_POINTS)]
     t = shown["t"] - rows["t"].iloc[0]  # single precision would not do for a clock since 1970
     shown = shown.assign(psi_rate=DEGREES * shown["psi_rate"], r=DEGREES * shown["r"])

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -17,12 +16,11 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
-    even_places,
     make_axis,
     make_line,
     make_plot,
-    spread_apart,
 )
 from shipid.report.section import Section
 from shipid.report.selection import (
@@ -41,14 +39,11 @@ from shipid.report.selection import (
     thin_lines,
 )
 from shipid.report.tables import PageTable, TableColumn, frame_table
-from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text, shorten_name
+from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text
 
 LINE_COLUMNS = ["model", "source", "N_D"]
 ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
 PLOT_DETAIL = 540  # twice the height of the error over time
-MOST_LETTERS_AT_LINE = 14  # characters of a name beside a line
-NAME_SHARE = 0.055  # height of a name beside a line, as a share of the greatest error
-LEADER, LETTER, EDGE = 16, 7, 6  # line from an end to its name; a letter of a name, at most; space around it [px]
 HORIZON_ERRORS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
     "90th percentile": ("p90", "position error, 90th percentile", "m"),
@@ -80,45 +75,26 @@ def horizon_figure(content: ReportContent) -> PageFigure | None:
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
     columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], shown_sizes(frame.N_D)
     means = over_seeds(frame, [*LINE_COLUMNS, "ahead"], columns)
-    seeds = frame[frame.source.eq("cooperative")].groupby([*LINE_COLUMNS, "ahead"])[columns].agg(["min", "max", "size"])
-    seeds = seeds.reset_index()
     return PageFigure(
         id="horizon",
         title="Error over the horizon",
         takeaway=_takeaway_horizon(content, means, counts[-1]),
         how="Position error of the points predicted that many seconds ahead, over all windows of all test manoeuvres, "
-        "mean over seeds."
-        + (" Pale bands reach from the least seed to the greatest." if (seeds["mean", "size"] > 1).any() else "")
-        + (BY_AXIS if "along" in columns else "")
-        + _models_of_close_up(content),
+        "mean over seeds." + (BY_AXIS if "along" in columns else "") + _models_of_close_up(content),
         alternative="Lines of the position error that grow with the time ahead, one per model with and without "
         "compensation.",
         height=420,
-        draw=lambda word, size: [_draw_horizon(content, means, seeds, word, size)],
+        draw=lambda word, size: [_draw_horizon(content, means, word, size)],
         controls=[Control("Error", statistics), Control("Manoeuvres, N_D", counts, len(counts) - 1)],
         chips=close_up_chips(content, set(means.source)),
     )
 
 
-def _draw_horizon(
-    content: ReportContent, means: pd.DataFrame, seeds: pd.DataFrame, statistic: str, size: int
-) -> go.Figure:
+def _draw_horizon(content: ReportContent, means: pd.DataFrame, statistic: str, size: int) -> Panel:
     column, title, unit = HORIZON_ERRORS[statistic]
     lines = _error_lines(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
-    bands, looks = [], close_styles(content)
-    spans = seeds[seeds.N_D.eq(size) & seeds[column, "size"].gt(1)]
-    for model, mine in spans.groupby("model", sort=False):
-        ahead, low, high = (mine[key].to_numpy(dtype=float) for key in ("ahead", (column, "min"), (column, "max")))
-        keys = [f"source:{drawn_source(content, str(model), 'cooperative')}", f"model:{model}"]
-        area: Trace = {"line": {"width": 0}, "fill": "toself", "fillcolor": looks[str(model)].colour, "opacity": 0.18}
-        around = np.concatenate([ahead, ahead[::-1]]), np.concatenate([high, low[::-1]])
-        bands.append(make_line(f"{model}, seeds", *around, keys, hover="", **area))
-    names = _names_at_ends(lines)
-    room = LEADER + EDGE + LETTER * max((len(name["text"]) for name in names), default=0)  # that they fit any window
     x = make_axis("time ahead [s]", range=[0.0, float(means.ahead.max())])
-    margin = {"l": 48, "r": max(12, room), "t": 12, "b": 44}
-    y = make_axis(f"{title} [{unit}]", rangemode="tozero")
-    return make_plot([*bands, *lines], x, y, hovermode="x unified", annotations=names, margin=margin)
+    return make_plot(lines, x, make_axis(f"{title} [{unit}]", rangemode="tozero"), hovermode="x unified")
 
 
 def time_figure(content: ReportContent) -> PageFigure | None:
@@ -215,31 +191,6 @@ def name_of_line(content: ReportContent, model: str, source: str) -> str:
     return f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
 
 
-def _names_at_ends(traces: Sequence[Trace]) -> list[dict[str, Any]]:
-    """Names joined to the ends of the compensated lines, moved apart where they would collide in this view.
-
-    Of more names than have room, some at even distances.
-    """
-    most = max((float(np.nanmax(t["y"])) for t in traces if np.isfinite(t["y"]).any()), default=0.0)
-    ends = sorted(
-        ((float(t["y"][-1]), float(t["x"][-1]), t) for t in traces if t["mode"] == "lines+markers" and len(t["y"])),
-        key=lambda end: end[:2],
-    )
-    ends = [ends[i] for i in even_places(len(ends), int(1 / NAME_SHARE))] if ends else []
-    heights = spread_apart([height for height, _, _ in ends], NAME_SHARE * most, 1.1 * most)
-    notes = []
-    for height, (end, place, trace) in zip(heights, ends, strict=True):
-        name, colour = (
-            trace["name"].removesuffix(", compensated").removesuffix(", physics alone"),
-            trace["line"]["color"],
-        )
-        text = {"text": shorten_name(name, MOST_LETTERS_AT_LINE), "xanchor": "left", "align": "left"}
-        leader = {"axref": "pixel", "ayref": "y", "ax": LEADER, "ay": height, "arrowhead": 0, "arrowwidth": 1}
-        ink = {"font": {"size": 11, "color": colour}, "arrowcolor": colour, "showarrow": True}
-        notes.append({"x": place, "y": end, **text, **leader, **ink})
-    return notes
-
-
 def _visible_points(lines: Sequence[Floats]) -> list[Floats]:
     """Points of lines (n, 2) that differ visibly at the height of the plot; a line with gaps keeps all."""
     kept = list(lines)
@@ -258,7 +209,7 @@ def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
     return units
 
 
-def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> go.Figure:
+def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> Panel:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
     units = _commands_by_unit(commands)
     traces, total, axes = (

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, ReportContent, rows_as_tuples, spoken_model
 from shipid.report.figure import (
@@ -16,6 +15,7 @@ from shipid.report.figure import (
     MUTED,
     Chip,
     PageFigure,
+    Panel,
     category_colour,
     escape_name,
     make_axis,
@@ -77,7 +77,7 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) -> go.Figure:
+def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) -> Panel:
     logs = np.log(frame.factor[frame.factor > 0].to_numpy(dtype=float))
     least = math.log(1.25)  # at least a quarter down and up
     low, high = min(float(logs.min(initial=0.0)), -least), max(float(logs.max(initial=0.0)), least)

@@ -48,6 +48,7 @@ MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k o
 MOST_LINE_POINTS = 600  # of a line over time: more than pixels are wide
 NumbersOfLine: TypeAlias = "Sequence[float] | Floats | pd.Series[Any]"
 Trace = dict[str, Any]  # as Plotly takes it: `type` and the options of that type
+Panel = dict[str, Any]  # a figure as Plotly takes it: `data`, a list of traces, and `layout`
 
 
 def category_colour(index: int) -> str:
@@ -81,7 +82,7 @@ def least_coloured(span: tuple[float, float]) -> float:
 
 
 def colour_level(value: float, span: tuple[float, float]) -> int:
-    """Place of a magnitude on a logarithmic scale of `COLOUR_LEVELS` colours: errors are factors apart, a few far off."""
+    """Place of a magnitude on a logarithmic scale of `COLOUR_LEVELS` colours: errors are factors apart."""
     low, high, place = np.log(np.maximum([*span, value], least_coloured(span)))
     return round(float(np.clip((place - low) / (high - low), 0, 1)) * (COLOUR_LEVELS - 1)) if high > low else 0
 
@@ -127,7 +128,6 @@ class PageFigure:
     height : of one panel [px].
     draw : an option of each control -> panels, as many for all options.
     captions : of the panels; empty for none.
-    columns : whether panels stand in rows of three, instead of as many as have room.
     browser : whether the page draws the window that a reader picks, instead of `draw`.
     """
 
@@ -137,12 +137,11 @@ class PageFigure:
     how: str
     alternative: str
     height: int
-    draw: Callable[..., Sequence[go.Figure]]
+    draw: Callable[..., Sequence[Panel]]
     controls: Sequence[Control] = ()
     chips: Sequence[Chip] = ()
     captions: Sequence[str] = ()
     scale: ColourScale | None = None
-    columns: bool = False
     browser: bool = False
 
 
@@ -175,8 +174,8 @@ def names_axis(names: Sequence[object], title: str = "", **options: Any) -> dict
     return make_axis(title, tickvals=list(range(len(names))), ticktext=list(map(escape_name, names)), **options)
 
 
-def make_plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **options: Any) -> go.Figure:
-    """Make a figure without background, legend or template: the page gives colours and the legend is text."""
+def make_plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **options: Any) -> Panel:
+    """Make a panel without background, legend or template: the page gives colours and the legend is text."""
     base = {
         "template": None,
         "paper_bgcolor": TRANSPARENT,
@@ -187,12 +186,12 @@ def make_plot(traces: Sequence[Trace], x: dict[str, Any], y: dict[str, Any], **o
         "hovermode": "closest",
         "hoverlabel": {"bgcolor": "var(--card)", "bordercolor": GRID, "font": {"color": INK}, "namelength": -1},
     }
-    return go.Figure(traces, {**base, "xaxis": x, "yaxis": y, **options})
+    return {"data": [*traces], "layout": {**base, "xaxis": x, "yaxis": y, **options}}
 
 
 def make_chart(
     traces: Sequence[Trace], x: str, y: str, spans: Sequence[tuple[float, float]] = (), nticks: int = 6
-) -> go.Figure:
+) -> Panel:
     """Make a plot of two lengths on equal axes, over given spans of x and y [m] or over what is drawn."""
     room = 0.04 * max((high - low for low, high in spans), default=0.0)
     ranges = [{"range": [low - room, high + room]} for low, high in spans] or [{}, {}]
@@ -293,16 +292,16 @@ def _find_option(control: Control, value: object) -> Any:
     return control.options[control.start if value is None else texts.index(str(value))]
 
 
-def dress_panels(figure: PageFigure, panels: Sequence[go.Figure], *, dark: bool = False) -> go.Figure:
+def dress_panels(figure: PageFigure, panels: Sequence[Panel], *, dark: bool = False) -> go.Figure:
     """Put panels below each other, with title, legend and scale, in the colours of the light or the dark page."""
     whole = make_subplots(rows=len(panels), subplot_titles=[*map(escape_name, figure.captions)] or None)
     whole = go.Figure(panels[0]) if len(panels) == 1 else whole
     for row, panel in enumerate(panels if len(panels) > 1 else (), start=1):
-        across = panel.layout.xaxis.to_plotly_json()
+        layout, across = panel["layout"], {**panel["layout"]["xaxis"]}
         across |= {"scaleanchor": f"y{row}"} if "scaleanchor" in across else {}
-        whole.add_traces(panel.data, rows=row, cols=1)
-        whole.update_xaxes(across, row=row, col=1).update_yaxes(panel.layout.yaxis, row=row, col=1)
-        whole.update_layout(template=None, plot_bgcolor=TRANSPARENT, font=panel.layout.font, hovermode="closest")
+        whole.add_traces(panel["data"], rows=row, cols=1)
+        whole.update_xaxes(across, row=row, col=1).update_yaxes(layout["yaxis"], row=row, col=1)
+        whole.update_layout(template=None, plot_bgcolor=TRANSPARENT, font=layout["font"], hovermode="closest")
     whole.update_traces(showlegend=False)
     whole.add_traces([_legend_entry(chip) for chip in figure.chips])
     if figure.scale is not None:

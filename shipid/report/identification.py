@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame
 from shipid.report.figure import (
@@ -18,6 +17,7 @@ from shipid.report.figure import (
     MUTED,
     Chip,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     escape_name,
@@ -181,7 +181,7 @@ def estimates_figure(content: IdentificationContent) -> PageFigure:
     )
 
 
-def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> go.Figure:
+def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> Panel:
     base_ink = {"color": INK, "width": 1, "dash": "dot"}
     traces = [make_line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line=base_ink, hover="")]
     numbered = frame.assign(row=np.arange(len(frame), dtype=float))
@@ -266,7 +266,7 @@ def correlations_figure(content: IdentificationContent) -> PageFigure | None:
     )
 
 
-def _draw_correlations(names: Sequence[str], matrix: Floats) -> go.Figure:
+def _draw_correlations(names: Sequence[str], matrix: Floats) -> Panel:
     scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
     title = {"text": "correlation [1]", "side": "right", "font": {"size": 13}}
     heat: Trace = {"type": "heatmap", "z": matrix.astype(np.float32), "x": names, "y": names, "zmin": -1, "zmax": 1}
@@ -357,7 +357,7 @@ def residuals_figure(content: IdentificationContent) -> PageFigure | None:
     )
 
 
-def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> go.Figure:
+def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> Panel:
     traces = [
         make_line(name, mine["lag"], mine["correlation"], [name], "", line={"color": category_colour(i), "width": 2})
         for i, (name, mine) in enumerate(parts.items())
@@ -384,7 +384,7 @@ def profiles_figure(content: IdentificationContent) -> PageFigure | None:
     )
 
 
-def _draw_profile(path: str, mine: pd.DataFrame) -> go.Figure:
+def _draw_profile(path: str, mine: pd.DataFrame) -> Panel:
     x, limit = mine["factor"].to_numpy(dtype=float), float(mine["limit"].iloc[0])
     curve: Trace = {"mode": "lines+markers", "line": {"color": category_colour(0), "width": 2}}
     traces = [

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pandas as pd
-import plotly.graph_objects as go
 
-from shipid.report.content import PUBLISHED, ReportContent, rows_as_tuples
+from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.figure import (
     MUTED,
     Chip,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     escape_name,
@@ -26,7 +26,6 @@ from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table,
 from shipid.report.wording import counted_text, distance_text, listed_names, number_text
 
 TRAINING_COLOUR, TEST_COLOUR, VALIDATION_COLOUR = (category_colour(i) for i in range(3))
-NEAR_PUBLISHED = 0.2  # of the published range: an end this close is met
 TRACK_DETAIL = 2000  # a track needs no more detail than extent / PIXELS
 REPAIR_COLUMNS = {
     "repair": TableColumn("kind"),
@@ -37,11 +36,9 @@ REPAIR_COLUMNS = {
 
 
 def set_colour(name: str) -> str:
-    """Blue for what trains, green for what validates, vermillion for the test, for any names of the sets."""
-    word = name.lower()
-    return (
-        TEST_COLOUR if word.startswith("test") else VALIDATION_COLOUR if word.startswith("valid") else TRAINING_COLOUR
-    )
+    """Colour of what trains, validates or tests, by the first letters of the name; grey for what a paper published."""
+    starts = {"test": TEST_COLOUR, "valid": VALIDATION_COLOUR, PUBLISHED: MUTED}
+    return next((colour for start, colour in starts.items() if name.lower().startswith(start)), TRAINING_COLOUR)
 
 
 def tracks_figure(content: ReportContent) -> PageFigure | None:
@@ -65,7 +62,7 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> go.Figure:
+def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> Panel:
     """Tracks on a map; those of the test last, so that they lie on top."""
     detail, traces = max(high - low for low, high in bounds) / TRACK_DETAIL, []
     for name in sorted(names_in(tracks, "set"), key=lambda name: set_colour(name) == TEST_COLOUR):
@@ -83,36 +80,27 @@ def envelope_figure(content: ReportContent) -> PageFigure | None:
     frame = content.envelope
     if frame.empty:
         return None
-    frame = frame.iloc[frame["set"].eq(PUBLISHED).to_numpy().argsort(kind="stable")]
-    compared = " The open bar is what the paper published, not data of this study."
     by_count = frame["set"].str.fullmatch(r"D_\d+").any()  # sets called by their number of runs
     return PageFigure(
         id="envelope",
         title="What the inputs cover",
-        takeaway=_takeaway_envelope(frame),
+        takeaway=_beyond_words(frame[frame["set"] != PUBLISHED]),
         how="Bar: smallest to largest value at the instants of prediction; dot: mean. The table below has the numbers."
-        + (" D_ and a number: so many runs, to train and to validate." if by_count else "")
-        + (compared if frame["set"].eq(PUBLISHED).any() else ""),
+        + (" D_ and a number: so many runs, to train and to validate." if by_count else ""),
         alternative="Ranges of the inputs per set; the table below holds the same numbers.",
         height=24 * frame["set"].nunique() + 74,
         draw=lambda: [_draw_ranges(mine) for _, mine in frame.groupby("quantity", sort=False)],
     )
 
 
-def _draw_ranges(mine: pd.DataFrame) -> go.Figure:
-    """One quantity: a bar from smallest to largest and a dot at the mean, one row per set; open for the published."""
+def _draw_ranges(mine: pd.DataFrame) -> Panel:
+    """One quantity: a bar from smallest to largest and a dot at the mean, one row per set."""
     traces, quantity, unit = [], mine.quantity.iloc[0], mine.unit.iloc[0]
     for row, (name, low, mean, high) in enumerate(mine[["set", "min", "mean", "max"]].itertuples(index=False)):
-        published = name == PUBLISHED
         words = f"{escape_name(name)}: {_range_words(low, mean, high)} {escape_name(unit)}"
         bar: Trace = {"line": {"color": set_colour(name), "width": 5}, "opacity": 0.55}
         dot: Trace = {"color": set_colour(name), "size": 11}
-        x, y = [low, high, high, low, low], [row - 0.2, row - 0.2, row + 0.2, row + 0.2, row - 0.2]
-        if published:
-            bar, dot = {"line": {"color": MUTED, "width": 1.5}}, {"symbol": "circle-open", "color": MUTED, "size": 9}
-        traces.append(
-            make_line(name, x if published else x[:2], y if published else [row, row], [], hover=words, **bar)
-        )
+        traces.append(make_line(name, [low, high], [row, row], [], hover=words, **bar))
         traces.append(make_line(name, [mean], [row], [], mode="markers", marker=dot, hover=words))
     low, high = float(mine["min"].min()), float(mine["max"].max())
     room = 0.06 * (high - low) or 1.0
@@ -125,27 +113,8 @@ def _range_words(low: float, mean: float, high: float) -> str:
     return " / ".join(number_text(float(value)) for value in (low, mean, high))
 
 
-def _takeaway_envelope(frame: pd.DataFrame) -> str:
-    """Whether the test set leaves the range of the other sets, and how near the published ranges are."""
-    ours, published = frame[frame["set"] != PUBLISHED], frame[frame["set"] == PUBLISHED]
-    return " ".join(part for part in (_beyond_words(ours), _published_words(ours, published)) if part)
-
-
-def _published_words(ours: pd.DataFrame, published: pd.DataFrame) -> str:
-    """Count the ends of all sets together that lie within a fifth of the published range from the published end."""
-    if ours.empty or published.empty:
-        return ""
-    known, far = 0, []
-    for theirs in rows_as_tuples(published):
-        mine, low, high = ours[ours.quantity == theirs.quantity], theirs.min, theirs.max
-        for word, end, value in (("min", low, mine["min"].min()), ("max", high, mine["max"].max())):
-            known += bool(pd.notna(value))
-            far += [f"{word} of {theirs.quantity}"] * (abs(float(value) - end) > NEAR_PUBLISHED * (high - low))
-    text = f"{known - len(far)} of {known} published ends are met within {100 * NEAR_PUBLISHED:.0f} % of the published range"
-    return f"{text}; not {listed_names(far, 6)}." if far else f"{text}."
-
-
 def _beyond_words(frame: pd.DataFrame) -> str:
+    """Whether the test set leaves the range of the other sets."""
     is_test = frame["set"].map(set_colour).eq(TEST_COLOUR)
     tested, seen = (
         part.groupby("quantity", sort=False).agg(low=("min", "min"), high=("max", "max"))

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
     MUTED,
     Chip,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     make_axis,
@@ -193,7 +193,7 @@ def histories_figure(content: ManoeuvreContent) -> PageFigure:
     )
 
 
-def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, executed: float) -> go.Figure:
+def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, executed: float) -> Panel:
     """Some quantities over time; execute headings are drawn with the heading."""
     traces: list[Trace] = []
     for level in (executed, -executed) if "heading" in values and np.isfinite(executed) else ():

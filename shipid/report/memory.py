@@ -1,4 +1,4 @@
-"""What the past shows: the observer along a test run, and what memory and observer bought, paired over test runs."""
+"""What memory and observer bought, paired over test runs."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import ReportContent, rows_as_tuples
 from shipid.report.figure import (
     INK,
-    MUTED,
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     error_bars,
@@ -32,33 +31,7 @@ from shipid.report.selection import in_words, spread_items
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
 from shipid.report.wording import counted_text, difference_text, listed_names, number_text
 
-OBSERVER_ROW, OBSERVER_GAP, OBSERVER_MARGIN = (
-    118,
-    26,
-    56,
-)  # heights of a row of a stacked figure, between rows, and around them [px]
 MOST_MEMORY_LINES = 6  # models that have a line in a figure
-LEAST_CURRENT = 1e-6  # m/s: no current was looked for
-OBSERVER_INKS = {
-    "measured": MUTED,
-    "filtered": category_colour(0),
-    "ahead": category_colour(1),
-    "across": category_colour(2),
-}
-CURRENT_TITLE = "current [m/s]"
-OBSERVER_ROWS: dict[str, tuple[float, dict[str, tuple[str, str]]]] = {
-    "u [m/s]": (1.0, {"u": ("measured", "u measured"), "observer.u": ("filtered", "u filtered")}),
-    "v [m/s]": (1.0, {"v": ("measured", "v measured"), "observer.v": ("filtered", "v filtered")}),
-    "r [deg/s]": (math.degrees(1), {"r": ("measured", "r measured"), "observer.r": ("filtered", "r filtered")}),
-    "force [cm/s²]": (100.0, {"observer.X": ("ahead", "ahead"), "observer.Y": ("across", "to starboard")}),
-    "moment [deg/s²]": (math.degrees(1), {"observer.N": ("filtered", "yaw")}),
-    CURRENT_TITLE: (
-        1.0,
-        {"observer.current_north": ("ahead", "towards north"), "observer.current_east": ("across", "towards east")},
-    ),
-    "test [1]": (1.0, {"observer.test": ("filtered", "test")}),
-}
-"""Title of the axis with its unit -> factor to that unit, and column of the frame -> key of its chip, and its name."""
 COMPARISON_COLUMNS = {
     "without": TableColumn("without"),
     "with": TableColumn("with"),
@@ -70,80 +43,6 @@ COMPARISON_COLUMNS = {
     "95 % interval [m]": TableColumn("interval", numeric=True),
     "better runs": TableColumn("better", numeric=True),
 }
-
-
-def observer_figure(content: ReportContent) -> PageFigure | None:
-    """Measured and filtered motion, slow forces, current and test of the observer; None in a study without one."""
-    frame = content.frame("observer")
-    if frame.empty:
-        return None
-    runs = names_in(frame)
-    known = bool(frame[["observer.current_north", "observer.current_east"]].abs().max().max() > LEAST_CURRENT)
-    rows = [title for title in OBSERVER_ROWS if title != CURRENT_TITLE or known]
-    current = "; current towards {}" if known else ""
-    words = ["motion, measured and filtered", "slow forces", *(["current"] if known else []), "test"]
-    return PageFigure(
-        id="observer",
-        title="What the observer thinks",
-        takeaway=_takeaway_observer(frame, runs, known),
-        how=f"The observer of {frame.model.iloc[0]} goes along a test run and never looks ahead. Forces and moment are "
-        "slow disturbances over the inertia of the ship, so they are accelerations; they hold wind, waves' drift and "
-        "what the model lacks. The test is the mean squared error of the prediction of each measurement over its "
-        "expected square: 1 where the assumptions hold, above it where the observer is too sure. "
-        f"{_fade_words(frame)}",
-        alternative=f"Lines over the time of one test run, one below the other: {listed_names(words, 6)}.",
-        height=OBSERVER_MARGIN + len(rows) * (OBSERVER_ROW + OBSERVER_GAP),
-        draw=lambda run: [_draw_observer(frame[frame.run.eq(run)], rows)],
-        controls=[Control("Test run", runs)],
-        chips=[
-            Chip("key:measured", "measured", OBSERVER_INKS["measured"], "dot"),
-            Chip("key:filtered", "filtered; moment; test", OBSERVER_INKS["filtered"]),
-            Chip("key:ahead", "force ahead" + current.format("north"), OBSERVER_INKS["ahead"]),
-            Chip("key:across", "force to starboard" + current.format("east"), OBSERVER_INKS["across"]),
-        ],
-    )
-
-
-def _fade_words(frame: pd.DataFrame) -> str:
-    fade, ahead = float(frame.fade.iloc[0]), float(frame.ahead.iloc[0])
-    if fade == 0:
-        return "In a prediction the force has no effect: it fades immediately."
-    if ahead < 0.005 * fade:
-        return f"In a prediction the force is held over the horizon of {ahead:g} s: it does not fade."
-    left = f"{100 * math.exp(-ahead / fade):.0f} % is left {ahead:g} s ahead"
-    return f"In a prediction the force fades with a time constant of {fade:.3g} s: {left}."
-
-
-def _takeaway_observer(frame: pd.DataFrame, runs: Sequence[str], current: bool) -> str:
-    moved = float(np.sqrt(np.nanmean((frame["observer.v"] - frame.v) ** 2)))
-    largest = {word: float(frame[f"observer.{name}"].abs().max()) for word, name in (("ahead", "X"), ("sideways", "Y"))}
-    where = max(largest, key=lambda word: largest[word])
-    parts = [
-        f"the filtered sway velocity is {100 * moved:.2g} cm/s from the measured one (root mean square)",
-        f"the slow force reaches {100 * largest[where]:.2g} cm/s² {where}",
-    ]
-    if current:
-        speed = np.hypot(frame["observer.current_north"], frame["observer.current_east"])
-        parts.append(f"the current that it sees is {float(speed.mean()):.2f} m/s on average")
-    test = f"its test is {number_text(float(frame['observer.test'].mean()))} on average"
-    return f"Along {counted_text(len(runs), 'test run')}, {', '.join(parts)}, and {test}."
-
-
-def _draw_observer(frame: pd.DataFrame, rows: Sequence[str]) -> go.Figure:
-    """A row for each signal, from the top."""
-    traces, axes, total = [], {}, len(rows) * (OBSERVER_ROW + OBSERVER_GAP)
-    for place, title in enumerate(rows, start=1):
-        factor, columns = OBSERVER_ROWS[title]
-        for column, (key, name) in columns.items():
-            ink = {"color": OBSERVER_INKS[key], "width": 1.8} | (
-                {"dash": "dot", "width": 2.5} if key == "measured" else {}
-            )
-            unit, tie = title.partition("[")[2].rstrip("]"), {"xaxis": "x", "yaxis": f"y{place}" if place > 1 else "y"}
-            traces.append(make_line(name, frame.t, factor * frame[column], [f"key:{key}"], unit, line=ink, **tie))
-        low = (len(rows) - place) * (OBSERVER_ROW + OBSERVER_GAP) / total
-        axes[f"yaxis{place}"] = make_axis(title, domain=[low, low + OBSERVER_ROW / total], anchor="x", nticks=4)
-    x = make_axis("time in the run [s]", anchor=f"y{len(rows)}")
-    return make_plot(traces, x, axes.pop("yaxis1"), hovermode="x unified", **axes)
 
 
 def memory_gain(content: ReportContent) -> PageFigure | None:
@@ -185,7 +84,7 @@ def memory_gain(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_memory(frame: pd.DataFrame, models: Sequence[str]) -> go.Figure:
+def _draw_memory(frame: pd.DataFrame, models: Sequence[str]) -> Panel:
     amounts = sorted(int(value) for value in pd.unique(frame.N_D))
     traces = []
     for i, name in enumerate(models):
@@ -219,8 +118,8 @@ def _takeaway_memory(frame: pd.DataFrame) -> str:
     best = last.nsmallest(1, "difference").iloc[0]
     which = f"{in_words(best.model)}, {difference_text(best.difference, best.low, best.high)} ({best.comparison})"
     where = f"With N_D = {int(best.N_D)}" if best.N_D else "With physics alone"
-    text = f"{where}, {gains} of {counted_text(len(last), 'comparison')} lower H and {losses} raise it with an interval free "
-    return f"{text}of 0; the lowest difference is that of {which}."
+    text = f"{where}, {gains} of {counted_text(len(last), 'comparison')} lower H and {losses} raise it with an interval"
+    return f"{text} free of 0; the lowest difference is that of {which}."
 
 
 def memory_table(content: ReportContent) -> PageTable | None:
@@ -241,6 +140,6 @@ def memory_table(content: ReportContent) -> PageTable | None:
 
 THE_PAST = Section(
     "What the past shows",
-    draw=lambda content: (observer_figure(content), memory_gain(content), memory_table(content)),
-    anchors=("observer", "memory-gain", "memory-table"),
+    draw=lambda content: (memory_gain(content), memory_table(content)),
+    anchors=("memory-gain", "memory-table"),
 )

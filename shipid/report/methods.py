@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, AnswerSentence, PageContent, ReportContent, rows_as_tuples, spoken_model
 from shipid.report.figure import (
@@ -18,6 +17,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
     category_colour,
     error_bars,
@@ -176,7 +176,7 @@ def _family_marker(family: str, families: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> list[go.Figure]:
+def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> list[Panel]:
     """Panels of the errors and of the differences: a row for each method, in it a little lower for each family."""
     errors, differences = [], []
     for k, family in enumerate(families):

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.figure import (
     MOST_LINE_POINTS,
     Chip,
     Control,
     PageFigure,
+    Panel,
     make_axis,
     make_chart,
     make_line,
@@ -52,7 +52,7 @@ def motion_figure(
     )
 
 
-def _draw_motion(rows: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str]) -> list[go.Figure]:
+def _draw_motion(rows: pd.DataFrame, inks: Mapping[str, Mapping[str, Any]], framed: Sequence[str]) -> list[Panel]:
     parts = {name: _with_gaps(rows[rows["model"] == name]) for name in inks}
     looks = {name: {**ink, "width": 1.4 if name == LOG_SERIES else 2} for name, ink in inks.items()}
     panels = []

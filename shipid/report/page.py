@@ -12,13 +12,15 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
+from plotly.io.json import to_json_plotly
 
 from shipid.errors import ResultError
 from shipid.files import write_text
 from shipid.report.content import AnswerSentence, ReportContent
-from shipid.report.figure import PageFigure, page_colours
+from shipid.report.figure import PageFigure, Panel, page_colours
 from shipid.report.glossary import mark_short_names
 from shipid.report.paths import window_data
 from shipid.report.section import OF_EVERY_PAGE, Section, declared_anchors, draw_sections
@@ -102,10 +104,22 @@ def _draw_views(figure: PageFigure) -> dict[str, Any]:
     for places in product(*(range(len(control.options)) for control in figure.controls)):
         options = [control.options[place] for control, place in zip(figure.controls, places, strict=True)]
         views["-".join(map(str, places))] = figure.draw(*options)
-    text = ",".join(
-        f'"{key}":[{",".join(panel.to_json(validate=False) for panel in panels)}]' for key, panels in views.items()
-    )
+    text = ",".join(f'"{key}":[{",".join(map(_panel_json, panels))}]' for key, panels in views.items())
     return {"packed": pack_text(f"{{{text}}}"), "panels": max(map(len, views.values()))}
+
+
+def _panel_json(panel: Panel) -> str:
+    """A panel as JSON; arrays of x and y, in single precision, as the typed arrays of Plotly."""
+    data = [
+        trace
+        | {
+            axis: {"dtype": "f4", "bdata": base64.b64encode(trace[axis].tobytes()).decode("ascii")}
+            for axis in ("x", "y")
+            if isinstance(trace.get(axis), np.ndarray)
+        }
+        for trace in panel["data"]
+    ]
+    return str(to_json_plotly({**panel, "data": data}))
 
 
 def pack_text(text: str) -> Markup:

@@ -1,4 +1,4 @@
-"""Figures of predictions: a window browser, and some windows side by side.
+"""The figure of predictions: a browser of windows.
 
 The page holds every window once, as finely as a pixel can show, and draws the one that a reader picks (page.js).
 """
@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.errors import ShipidError, suggest_name
-from shipid.report.content import DATA_DRIVEN, Floats, PathKey, ReportContent, WindowSnapshot
+from shipid.report.content import Floats, PathKey, ReportContent, WindowSnapshot
 from shipid.report.errors_over import close_up_chips, line_source, name_of_line
 from shipid.report.figure import (
     MUTED,
@@ -23,6 +22,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     Trace,
     escape_name,
     even_places,
@@ -38,13 +38,11 @@ from shipid.report.selection import (
     data_driven,
     drawn_source,
     in_words,
-    middle_models,
-    models_by_accuracy,
     shown_sizes,
     spread_items,
     thin_lines,
 )
-from shipid.report.wording import counted_text, listed_names, metres_text, number_text
+from shipid.report.wording import counted_text, metres_text
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
 MOST_SHOWN_WINDOWS = 600  # in all
@@ -58,7 +56,7 @@ HOW_WINDOWS = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
-    """Sort windows by test run and time; at most `FEW_RUNS`, `MOST_INSTANTS` each, `MOST_SHOWN_WINDOWS` and `MOST_PATHS`."""
+    """Sort windows by test run and time, at most as many of each as the limits above."""
     by_run: dict[str, list[WindowSnapshot]] = {}
     for snapshot in content.snapshots:
         by_run.setdefault(snapshot.run, []).append(snapshot)
@@ -86,8 +84,8 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
         id="browser",
         title="Look at predictions",
         takeaway=_takeaway_windows(content, counts[-1]),
-        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of {counted_text(len(runs), 'test run')}; "
-        "arrow keys move the slider.",
+        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of "
+        f"{counted_text(len(runs), 'test run')}; arrow keys move the slider.",
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
@@ -98,77 +96,11 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def snapshots_figure(content: ReportContent) -> PageFigure | None:
-    """Draw some windows side by side, as in the paper's Fig. 7; None without windows.
-
-    With several N_D, one window: a row per model (without physics and one of each of the two largest families) and a
-    column per N_D; with a single family, all models in one row. At a single N_D, three instants of one run.
-    """
-    runs, counts = windows_of(content), window_sizes(content)
-    if not runs:
-        return None
-    several = len(counts) > 1
-    models = _compared_models(content) if several else []
-    if several:
-        shot = _middle_window([window for windows in runs.values() for window in windows])
-        title, where = "One window, more and more data", f"{shot.run}, t = {shot.t:g} s"
-        chosen = f"{where}: the window of middle physics error. All panels share their axes; physics alone and bands "
-        chosen += f"may leave them{_wind_words(shot)}."
-        panels = [(shot, size, name, f"{name or where}, N_D = {size}") for name in models or [""] for size in counts]
-    else:
-        mine = max(runs.values(), key=len)
-        places = sorted({round(share * (len(mine) - 1)) for share in (1 / 6, 1 / 2, 5 / 6)})
-        title = "Instants of a test run"
-        chosen = "Instants at one, three and five sixths of the run." if len(places) == 3 else ""
-        shots = [mine[i] for i in places]
-        panels = [(shot, counts[0], "", f"{shot.run}, t = {shot.t:g} s{_wind_words(shot)}") for shot in shots]
-    return PageFigure(
-        id="snapshots",
-        title=title,
-        takeaway=_takeaway_models(panels[0][0], models, counts)
-        if models
-        else _takeaway_row(content, [(window, size) for window, size, *_ in panels]),
-        how=HOW_WINDOWS + chosen,
-        alternative=f"{len(panels)} small plots of true and predicted paths; captions name what they show.",
-        height=300 if models else 380,
-        draw=lambda: [
-            draw_window(
-                content,
-                window,
-                size,
-                [name] if name else None,
-                _spans_of_panels(window, models or close_up_models(content)) if several else (),
-            )
-            for window, size, name, _ in panels
-        ],
-        chips=_window_chips(content, models),
-        captions=[caption for *_, caption in panels],
-        columns=True,
-    )
-
-
-def _wind_words(window: WindowSnapshot) -> str:
-    """The wind of a window as the end of a sentence."""
-    if window.wind is None or window.wind[0] < 0.05:
-        return "" if window.wind is None else "; no wind"
-    return f"; wind {window.wind[0]:.1f} m/s towards {round(math.degrees(window.wind[1])) % 360}° from ahead"
-
-
-def _compared_models(content: ReportContent) -> list[str]:
-    """The model without physics and one of each of the two largest families, by A; empty if families are too few."""
-    recorded = {model for window in content.snapshots for model, source, _ in window.paths if source == "cooperative"}
-    middle = {family: name for family, name in middle_models(content).items() if name in recorded}
-    physics = [name for family, name in middle.items() if family != DATA_DRIVEN][:2]
-    order = [str(name) for name in models_by_accuracy(content).model]
-    pure = [middle[DATA_DRIVEN]] if DATA_DRIVEN in middle else []
-    return [*pure, *sorted(physics, key=order.index)] if len(physics) > 1 else []
-
-
 def window_data(content: ReportContent) -> dict[str, Any]:
     """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
 
     A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one;
-    `make_line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
+    `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
     are metres, angles radians.
     """
     runs, counts = windows_of(content), window_sizes(content)
@@ -206,39 +138,29 @@ def window_data(content: ReportContent) -> dict[str, Any]:
         "outline": outline,
         "lines": [_line_style(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
-        "layout": make_chart([], TO_STARBOARD, AHEAD).layout.to_plotly_json(),
+        "layout": make_chart([], TO_STARBOARD, AHEAD)["layout"],
     }
 
 
-def _is_drawn(content: ReportContent, key: PathKey, counts: Sequence[int], models: Sequence[str] | None = None) -> bool:
-    """Whether windows show a path: constant u, v, r, or a model of the close-up, or of some, at one of some N_D."""
+def _is_drawn(content: ReportContent, key: PathKey, counts: Sequence[int]) -> bool:
+    """Whether windows show a path: constant u, v, r, or a model of the close-up, at one of some N_D."""
     model, source, size = key
-    shown = close_up_models(content) if models is None else models
-    return source == "naive" or (model in shown and (source != "cooperative" or size in counts))
+    return source == "naive" or (model in close_up_models(content) and (source != "cooperative" or size in counts))
 
 
 def draw_window(
     content: ReportContent,
     window: WindowSnapshot,
     size: int,
-    models: Sequence[str] | None = None,
-    spans: Sequence[tuple[float, float]] = (),
-) -> go.Figure:
-    """Draw one window of a test run as page.js does.
-
-    Parameters
-    ----------
-    size : N_D of the compensated paths.
-    models : that are drawn; default: those of the close-up.
-    spans : of y and x [m]; default: what is drawn.
-    """
+) -> Panel:
+    """Draw one window of a test run as page.js does, with the compensated paths of one N_D."""
     truth = np.asarray(window.truth)
     traces = [_path_line("true path", truth, ["truth"], line={"color": TRUTH, "width": 9}, hover="true path")]
     for pose in (np.zeros(3), np.append(truth[-1], window.psi_end)):
         hull = outline_at(window.outline, pose)
         fill: Trace = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
         traces.append(_path_line("ship", hull, ["ship"], hover="", **fill))
-    for key in (key for key in window.paths if _is_drawn(content, key, [size], models)):
+    for key in (key for key in window.paths if _is_drawn(content, key, [size])):
         look = _line_style(content, "" if key[1] == "naive" else key[0], key[1])
         if key in window.bands:
             shade: Trace = {
@@ -253,7 +175,7 @@ def draw_window(
                 look["name"], window.paths[key], look["keys"], line=look["line"], hover=escape_name(look["name"])
             )
         )
-    return make_chart(traces, TO_STARBOARD, AHEAD, spans)
+    return make_chart(traces, TO_STARBOARD, AHEAD)
 
 
 def _path_line(name: str, path: Floats, keys: Sequence[str], **options: Any) -> Trace:
@@ -266,14 +188,6 @@ def outline_at(outline: Floats, pose: Floats) -> Floats:
     turn = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]])
     closed: Floats = np.vstack([outline, outline[:1]]) @ turn + pose[:2]
     return closed
-
-
-def _spans_of_panels(window: WindowSnapshot, models: Sequence[str]) -> list[tuple[float, float]]:
-    """Range of y, then of x [m] of the true path, the ship at both of its ends and what was compensated or learned."""
-    hulls = [window.outline, outline_at(window.outline, np.append(window.truth[-1], window.psi_end))]
-    paths = [path for (model, source, _), path in window.paths.items() if source == "cooperative" and model in models]
-    every = np.vstack([window.truth, *hulls, *paths])
-    return [(float(np.nanmin(column)), float(np.nanmax(column))) for column in (every[:, 1], every[:, 0])]
 
 
 def find_window(
@@ -309,13 +223,11 @@ def _line_style(content: ReportContent, model: str, given: str) -> dict[str, Any
     return {"name": name_of_line(content, model, source), "keys": keys, "line": {**ink, "width": width}}
 
 
-def _window_chips(content: ReportContent, only: Sequence[str] = ()) -> list[Chip]:
-    """Legend of the windows; of some models, if they are given."""
+def _window_chips(content: ReportContent) -> list[Chip]:
+    """Legend of the windows."""
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
     chips = [Chip("truth", "true path", TRUTH, width=9), *close_up_chips(content, sources)]
-    chips += [Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)
-    others = {f"model:{name}" for name in close_up_models(content) if only and name not in only}
-    return [chip for chip in chips if chip.key not in others]
+    return [*chips, *[Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)]
 
 
 def _half_pixel(windows: Sequence[WindowSnapshot]) -> float:
@@ -340,15 +252,6 @@ def _end_error(window: WindowSnapshot, points: Floats) -> float:
     return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
 
 
-def _middle_window(windows: Sequence[WindowSnapshot]) -> WindowSnapshot:
-    """The window whose mean physics error at the end is the middle one."""
-    errors = [
-        np.mean([_end_error(window, path) for (_, kind, _), path in window.paths.items() if kind != "cooperative"] or 0)
-        for window in windows
-    ]
-    return windows[int(np.argsort(errors, kind="stable")[len(errors) // 2])]
-
-
 def _mean_end_error(windows: Sequence[WindowSnapshot], keys: set[PathKey]) -> float:
     errors = [_end_error(w, points) for w in windows for key, points in w.paths.items() if key in keys]
     return float(np.mean(errors)) if errors else float("nan")
@@ -370,40 +273,9 @@ def _takeaway_windows(content: ReportContent, size: int) -> str:
     return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
-def _takeaway_row(content: ReportContent, panels: Sequence[tuple[WindowSnapshot, int]]) -> str:
-    """How far the compensated paths end from the truth in each panel, or those without physics where there are none."""
-    pure = data_driven(content)
-    physics = [name for name in close_up_models(content) if name != pure]
-    sets: dict[str, list[str | None]] = {
-        "the compensated paths": [name for name in physics if name not in content.alone],
-        "the paths of physics alone": [name for name in physics if name in content.alone],
-        "the paths without physics": [pure],
-    }
-    for words, models in sets.items():
-        means = []
-        for window, size in panels:
-            keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in models}
-            means.append(_mean_end_error([window], keys))
-        if np.isfinite(means).any():
-            return f"From panel to panel, {words} end {listed_names([number_text(m) for m in means])} m from the true place."
-    return "No compensated path was recorded for these windows."
-
-
-def _takeaway_models(window: WindowSnapshot, models: Sequence[str], counts: Sequence[int]) -> str:
-    """How far each model ends from the truth, by rising N_D."""
-    parts = []
-    for name in models:
-        ends = [number_text(_mean_end_error([window], {(name, "cooperative", size)})) for size in counts]
-        alone = _mean_end_error([window], {(name, "physics", 0)})
-        physics = f" (physics alone {metres_text(alone)})" if np.isfinite(alone) else ""
-        parts.append(f"{in_words(name)} {listed_names(ends)} m{physics}")
-    numbers = listed_names([str(size) for size in counts])
-    return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."
-
-
 PREDICTIONS = Section(
     "The predictions",
-    draw=lambda content: (browser_figure(content), snapshots_figure(content)),
+    draw=lambda content: (browser_figure(content),),
     needs=("snapshots",),
-    anchors=("browser", "snapshots"),
+    anchors=("browser",),
 )

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -21,6 +20,7 @@ from shipid.report.figure import (
     ColourScale,
     Control,
     PageFigure,
+    Panel,
     Trace,
     colour_level,
     escape_name,
@@ -29,7 +29,6 @@ from shipid.report.figure import (
     make_axis,
     make_line,
     make_plot,
-    row_name,
     spread_apart,
 )
 from shipid.report.section import Section
@@ -58,19 +57,13 @@ NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines 
 FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
 NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a level may have
 TICKS_OF_A = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
-MOST_LETTERS_BESIDE, MOST_LETTERS_ABOVE = 12, 28  # characters of a name beside a row, and above one
-DUMBBELL = 46  # height of a model where there is one N_D [px]
+MOST_LETTERS_BESIDE = 12  # characters of a name beside a row
 MOST_LINES, FAR_APART = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
-ERROR_STATISTICS = {  # of the position error -> its columns in the cells, the models and constant u, v, r
-    "mean": ("H", "A", "mean"),
-    "90th percentile": ("H_90", "A_90", "p90"),
-    "root mean square": ("rms", "A_rms", "rms"),
+ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
+    "mean": ("H", "mean"),
+    "90th percentile": ("H_90", "p90"),
+    "root mean square": ("rms", "rms"),
 }
-HOW_MEASURED = (
-    "Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of the "
-    "physics alone A (14). Where a cell was trained with several seeds, {seeds}. The dashed line is constant u, v, r: "
-    "surge, sway and yaw rate stay as they are at the instant of prediction, the least that any model must beat."
-)
 
 
 class CellMap(NamedTuple):
@@ -103,7 +96,7 @@ def map_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="map",
         title="Physics and data: the map",
-        takeaway=_takeaway_map(shown) + _method_of_map(content, rows),
+        takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
         + (
             f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
@@ -114,8 +107,8 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
-        alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. The numbers are in "
-        "the table of cells.",
+        alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
+        "The numbers are in the table of cells.",
         height=HEIGHT,
         draw=lambda: [draw_map(shown, lines)],
         chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [])
@@ -191,7 +184,7 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float |
     return "<br>".join([*lines, escape_name(best["hyperparameters"])] if best.get("hyperparameters") else lines)
 
 
-def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> go.Figure:
+def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
     rows, cells = shown
     top, counts = float(rows.y.max()) * 1.04, np.unique(cells.N_D)
@@ -318,15 +311,6 @@ def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
     return np.where(finite, np.exp(total / np.where(weight > 0, weight, 1.0)), np.nan)
 
 
-def _method_of_map(content: ReportContent, rows: pd.DataFrame) -> str:
-    """Sentence on the method of the cells on the map, where other methods are not on it; empty if all are."""
-    if not (_not_on_map(content) or words_on_left_out(content)):
-        return ""
-    drawn = content.cells[content.cells.model.isin(rows.model[rows.family.ne(DATA_DRIVEN)])]
-    names = sorted({str(name) for name in drawn.method}) if "method" in drawn else []
-    return f" Of several methods, {listed_names(names) if names else 'the first'} is drawn."
-
-
 def _not_on_map(content: ReportContent) -> str:
     """Sentence on the methods whose place on the map another has; empty if there are none."""
     names = list(overview_models(content).loc[same_physics, "model"])
@@ -372,14 +356,6 @@ def cells_without_result(content: ReportContent) -> str:
     return f" Not plotted: {listed_names(names, 6)}; reasons in the table of cells." if names else ""
 
 
-def gain_figure(content: ReportContent) -> PageFigure | None:
-    """H over N_D, or the dumbbell A -> H when the study has a single N_D; None where `gain_lack` says why not."""
-    if gain_lack(content):
-        return None
-    means = errors_over_seeds(content).merge(overview_models(content)[["model"]])
-    return _gain_over_size(content, means) if content.cells.N_D.nunique() > 1 else _gain_at_one_size(content, means)
-
-
 def gain_lack(content: ReportContent) -> str:
     """Why there is nothing to draw, as the end of a sentence; empty where it can be drawn."""
     if content.cells.empty:
@@ -390,7 +366,18 @@ def gain_lack(content: ReportContent) -> str:
     return ""
 
 
-def _gain_over_size(content: ReportContent, means: pd.DataFrame) -> PageFigure:
+def gain_figure(content: ReportContent) -> PageFigure | None:
+    """H over N_D, from the physics alone where the study has a single N_D; None where `gain_lack` says why not."""
+    if gain_lack(content):
+        return None
+    means, single = (
+        errors_over_seeds(content).merge(overview_models(content)[["model"]]),
+        content.cells.N_D.nunique() < 2,
+    )
+    takeaway = _takeaway_sizes(content, means)
+    if single:
+        alone = content.models.assign(N_D=0).rename(columns={"A": "H", "A_90": "H_90", "A_rms": "rms"})
+        means = pd.concat([alone[["model", "N_D", "H", "H_90", "rms"]], means])
     looks, span, (order, drawn) = model_styles(content), accuracy_range(content), _models_with_line(content)
     heights = means.H[means.model.isin(order) & means.H.gt(0)]
     accuracy = content.cells.groupby("model").A.first()
@@ -398,14 +385,18 @@ def _gain_over_size(content: ReportContent, means: pd.DataFrame) -> PageFigure:
     return PageFigure(
         id="gain",
         title="What another manoeuvre buys",
-        takeaway=_takeaway_sizes(content, means),
-        how=HOW_MEASURED.format(seeds="the line joins their means and the pale points are the seeds")
+        takeaway=takeaway,
+        how="Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of "
+        "the physics alone A (14). Where a cell has several seeds, the line joins their means and the pale "
+        "points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate stay as they are at the "
+        "instant of prediction, the least that any model must beat."
+        + (" N_D = 0 is the physics alone." if single else "")
         + (" Colour is A; the" if span else " The")
         + " marker is the family; N_D counts manoeuvres to train and to validate."
         + words_on_left_out(content)
         + drawn
         + cells_without_result(content),
-        alternative=f"Lines of the position error over the number of manoeuvres for {counted_text(len(order), 'model')}. "
+        alternative=f"Lines of the position error over N_D for {counted_text(len(order), 'model')}. "
         "The numbers are in the table of cells.",
         height=460 if len(order) <= 10 else 560,
         draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],
@@ -437,9 +428,10 @@ def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
 
 def _draw_sizes(
     content: ReportContent, means: pd.DataFrame, order: Sequence[str], statistic: str, logarithmic: bool
-) -> go.Figure:
+) -> Panel:
     """Lines over N_D; what has no physics first: it must not cover the others."""
-    column, looks, sizes = ERROR_STATISTICS[statistic][0], model_styles(content), sorted(content.cells.N_D.unique())
+    column, looks = ERROR_STATISTICS[statistic][0], model_styles(content)
+    sizes = sorted({*content.cells.N_D, *means.N_D})
     ended = content.cells[content.cells.status.eq("ok")]
     traces = []
     for name in (name for name in reversed(order) if means.model.eq(name).any()):
@@ -452,26 +444,19 @@ def _draw_sizes(
         if seeds.seed.nunique() > 1:
             faint: Trace = {"mode": "markers", "marker": {**marker, "size": 5}, "opacity": 0.4}
             traces.append(make_line(f"{name}, seed", seeds.N_D, seeds[column], keys, **faint))
-    traces.append(_line_of_constant_motion(content, statistic, [sizes[0], sizes[-1]]))
+    level, dashed = content.naive[ERROR_STATISTICS[statistic][1]], {"color": NAIVE, "dash": "dash", "width": 1.5}
+    hover = f"{CONSTANT_MOTION}: {metres_text(level)}"
+    traces.append(make_line(CONSTANT_MOTION, [sizes[0], sizes[-1]], [level] * 2, ["naive"], line=dashed, hover=hover))
     title = f"position error, {statistic} [m]"
     x = make_axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
     return make_plot(traces, x, log_axis(title) if logarithmic else make_axis(title, rangemode="tozero"))
-
-
-def _line_of_constant_motion(content: ReportContent, statistic: str, ends: Sequence[float]) -> Trace:
-    """Dashed line of constant u, v, r from one end to the other."""
-    level = content.naive[ERROR_STATISTICS[statistic][2]]
-    ink = {"color": NAIVE, "dash": "dash", "width": 1.5}
-    return make_line(
-        CONSTANT_MOTION, ends, [level] * 2, ["naive"], line=ink, hover=f"{CONSTANT_MOTION}: {metres_text(level)}"
-    )
 
 
 def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
     if means.empty:
         return "No cell gave a result."
     parts = []
-    for size in (means.N_D.min(), means.N_D.max()):
+    for size in dict.fromkeys((means.N_D.min(), means.N_D.max())):
         mine = means[means.N_D.eq(size)].set_index("model").H
         named = [name for name in (content.best, data_driven(content)) if name and name in mine.index]
         known = " and ".join(f"{in_words(name)} has H = {metres_text(mine[name])}" for name in named)
@@ -479,83 +464,7 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
             f"t N_D = {size}, {known or f'H runs from {metres_text(mine.min())} to {metres_text(mine.max())}'}"
         )
     best = f" {content.best} is the best in validation." if content.best else ""
-    return f"A{parts[0]}; a{parts[1]}.{best}"
-
-
-def _gain_at_one_size(content: ReportContent, means: pd.DataFrame) -> PageFigure:
-    names = [str(name) for name in overview_models(content).model]
-    names = list(means.set_index("model").H.reindex(names).sort_values(na_position="last").index)
-    return PageFigure(
-        id="gain",
-        title="What compensation buys",
-        takeaway=_takeaway_one_size(content, means),
-        how="Open marker: the physics alone; filled: with the compensator trained on N_D = "
-        f"{content.cells.N_D.iloc[0]} manoeuvres. "
-        + HOW_MEASURED.format(seeds="the filled marker is their mean and the pale points are the seeds")
-        + words_on_left_out(content)
-        + cells_without_result(content),
-        alternative=f"Position error before and after compensation for {counted_text(len(names), 'model')}. "
-        "The numbers are in the tables of models and cells.",
-        height=DUMBBELL * len(names) + 90,
-        draw=lambda statistic: [_draw_dumbbells(content, means, statistic, names)],
-        controls=[Control("Position error", list(ERROR_STATISTICS))],
-        chips=[
-            Chip("before", "physics alone", INK, "none", symbol="circle-open"),
-            Chip("after", "with compensation (or no physics)", INK, "none", symbol="circle"),
-            Chip("naive", CONSTANT_MOTION, NAIVE, "dash"),
-        ],
-    )
-
-
-def _draw_dumbbells(content: ReportContent, means: pd.DataFrame, statistic: str, names: list[str]) -> go.Figure:
-    """A row for each model: the physics alone, with compensation, and a bar between them."""
-    column, alone, _ = ERROR_STATISTICS[statistic]
-    old = content.models.set_index("model")[alone].reindex(names).to_numpy(dtype=float)
-    new = means.set_index("model")[column].reindex(names).to_numpy(dtype=float)
-    colours = [model_styles(content)[name].colour for name in names]
-    seeds = content.cells[content.cells.status.eq("ok") & content.cells.model.isin(names)]
-    seeds = seeds[seeds.groupby("model").H.transform("size") > 1]
-    at = {name: row for row, name in enumerate(names)}
-    places = [at[name] for name in seeds.model]
-    floor = _line_of_constant_motion(content, statistic, [len(names) - 0.4, -0.6])
-    traces = [floor | {"x": floor["y"], "y": floor["x"]}]
-    traces += [
-        make_line(name, [old[i], new[i]], [i, i], ["before", "after"], line={"color": colours[i], "width": 3}, hover="")
-        for i, name in enumerate(names)
-    ]
-    for key, what, values, lines, symbol, size in (
-        ("before", "physics alone", old, range(len(names)), "circle-open", 13),
-        ("after", "with compensation, seed", seeds[column].to_numpy(dtype=float), places, "circle", 7),
-        ("after", "with compensation", new, range(len(names)), "circle", 13),
-    ):
-        ink = [colours[i] for i in lines]
-        marker = {"symbol": symbol, "size": size, "color": ink, "line": {"width": 2, "color": ink}}
-        words = [
-            f"{escape_name(names[i])}, {what}: {metres_text(value)}" for i, value in zip(lines, values, strict=True)
-        ]
-        shade = 0.4 if size == 7 else 1.0
-        traces.append(make_line(what, values, lines, [key], mode="markers", marker=marker, hover=words, opacity=shade))
-    texts = []
-    for row, name in enumerate(names):
-        numbers = " → ".join(metres_text(value) for value in (old[row], new[row]) if np.isfinite(value))
-        numbers += "" if np.isfinite(new[row]) else " → no result"
-        texts.append(row_name(row, f"<b>{escape_name(shorten_name(name, MOST_LETTERS_ABOVE))}</b>  {numbers}"))
-    x = make_axis(f"position error, {statistic} [m]", rangemode="tozero")
-    y = make_axis("", range=[len(names) - 0.4, -0.75], showticklabels=False, showgrid=False)
-    return make_plot(traces, x, y, annotations=texts, margin={"l": 8, "r": 12, "t": 4, "b": 44})
-
-
-def _takeaway_one_size(content: ReportContent, means: pd.DataFrame) -> str:
-    after = means.set_index("model").H
-    if after.empty:
-        return "No cell gave a result."
-    before = content.models.set_index("model").A.reindex(after.index).dropna()
-    better, best, pure = before.index[after[before.index] < before], content.best, data_driven(content)
-    text = f"{best}, best in validation, has H = {metres_text(after[best])}; c" if best in after.index else "C"
-    text += f"ompensation improves {len(better)} of {counted_text(len(before), 'physics model')}"
-    text = "No physics model has a result with data" if before.empty else text
-    text += f"; {in_words(pure)} has H = {metres_text(after[pure])}" if pure and pure in after.index else ""
-    return f"{text}; {CONSTANT_MOTION} {metres_text(content.naive['mean'])}."
+    return f"A{'; a'.join(parts)}.{best}"
 
 
 WHAT_PHYSICS_AND_DATA_BUY = Section(

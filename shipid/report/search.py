@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from shipid.report.content import TRIAL_COLUMNS, Floats, ReportContent
 from shipid.report.figure import (
@@ -16,6 +15,7 @@ from shipid.report.figure import (
     Chip,
     Control,
     PageFigure,
+    Panel,
     category_colour,
     escape_name,
     even_places,
@@ -26,7 +26,7 @@ from shipid.report.figure import (
 )
 from shipid.report.section import Section
 from shipid.report.selection import shown_sizes
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, number_cell, with_cells, word_cell
+from shipid.report.tables import PageTable, TableColumn, frame_table
 from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, short_text
 
 MOST_DOTS = 1200  # in one panel: more hide each other
@@ -42,7 +42,7 @@ MEMORY_WORDS = (
     "none", "the error of the physics", "that and history", "estimates of the observer", "everything",
     "history", "the error of the physics and estimates of the observer", "history and estimates of the observer",
 )  # fmt: skip
-STATES_OF_TRIALS = {  # what a trial came to -> its name in the legend, marker and colour; all but the first are drawn larger
+STATES_OF_TRIALS = {  # outcome of a trial -> its name in the legend, marker and colour; the first is drawn smaller
     "complete": ("trial", "circle", MUTED),
     "stopped": ("stopped early", "triangle-up", category_colour(4)),
     "diverged": ("diverged", "x", "var(--bad)"),
@@ -68,8 +68,8 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         + (thinned if len(frame) > MOST_DOTS + MOST_CHOSEN else "")
         + (early if frame.state.eq("stopped").any() else "")
         + "diamonds are those whose networks the cell uses; those beyond "
-        f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians of all "
-        "that have a value. Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
+        f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians. "
+        "Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
         f"what rises or falls throughout, not an optimum in the middle.{memories}",
         alternative="Dots of the relative validation error of trials over each hyperparameter; a table sums up.",
         height=270,
@@ -117,7 +117,7 @@ def _with_ratio(trials: pd.DataFrame) -> pd.DataFrame:
     return trials.assign(value=good, ratio=np.sqrt(good / best))
 
 
-def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> go.Figure:
+def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Panel:
     """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
     chosen, traces = frame.chosen.astype(bool), []
     others, best = frame[~chosen], frame[chosen]
@@ -215,35 +215,19 @@ def search_table(content: ReportContent) -> PageTable:
         "time [s]": TableColumn("seconds", 1),
         "time per cell [s]": TableColumn("each", 1),
     }
-    chosen = frame[frame.chosen.astype(bool)]
     tried = []
     for name in names:
-        share = _yes_or_no(frame[name])
-        values = [chosen[name][chosen.N_D.eq(size)].astype(float).dropna() for size in shown.index]
-        shown = with_cells(shown, **{f"chosen {name}": [_choice_cell(some, share) for some in values]})
-        columns[f"{'share of ' if share else ''}chosen {_hyperparameter_title(name)}"] = TableColumn(
-            f"chosen {name}", numeric=True
-        )
         unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        span = "yes or no" if share else f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
-        tried.append(f"{name.replace('_', ' ')} {span}")
+        span = f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
+        tried.append(f"{name.replace('_', ' ')} {'yes or no' if _yes_or_no(frame[name]) else span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
-    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: {stopped} stopped early, "
-    takeaway += f"{diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
+    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: "
+    takeaway += (
+        f"{stopped} stopped early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
+    )
     takeaway += f" Tried: {', '.join(tried)}." if tried else ""
     shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
-
-
-def _choice_cell(values: pd.Series[float], share: bool) -> TableCell:
-    """Smallest, middle and largest chosen value, or the share of yes."""
-    if values.empty:
-        return word_cell(None)
-    if share:
-        return number_cell(values.mean(), 2)
-    return TableCell(
-        " / ".join(short_text(value) for value in values.quantile([0.0, 0.5, 1.0])), float(values.median())
-    )
 
 
 THE_SEARCH = Section(

@@ -100,7 +100,7 @@ def middle_models(content: ReportContent) -> dict[str, str]:
 
 
 def overview_models(content: ReportContent) -> pd.DataFrame:
-    """Rows of `models_by_accuracy` of the models in figures of all: of many methods the one judged, and all without physics."""
+    """Rows of `models_by_accuracy` that overviews draw: of many methods the one judged, and all without physics."""
     frame = models_by_accuracy(content)
     frame = frame[frame.model.isin(content.cells.model)]
     if len(frame) > MOST_MODELS:

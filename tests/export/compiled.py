@@ -15,7 +15,8 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.export.c import NumberPrecision, SourceFiles
 from shipid.export.c_predictor import predictor_files
-from shipid.export.model import Exportable, ExportModel, build_model
+from shipid.export.model import ExportModel, build_model
+from shipid.hybrid.deployed import DeployedMethod
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-parameter")
@@ -78,7 +79,7 @@ def run_example(files: SourceFiles, folder: Path, *options: str) -> str:
 class Recorder:
     """An exported predictor that is given rows."""
 
-    def __init__(self, predictor: Exportable, folder: Path, precision: NumberPrecision | None = None) -> None:
+    def __init__(self, predictor: DeployedMethod, folder: Path, precision: NumberPrecision | None = None) -> None:
         self.model, precision = build_model(predictor), precision or NumberPrecision()
         self.files, self.real = predictor_files(self.model, "odd", precision), np.dtype(precision.real)
         write(self.files, folder)

@@ -148,36 +148,6 @@ def test_a_band_adapts_as_in_python(tmp_path):
         assert np.isnan(loaded.odd_factor(*wrong))
 
 
-def test_casadi_gives_path_and_band(tmp_path):
-    """One function; the derivative of a path does not meet that of its band."""
-    strange = drawn("path-drawn", 5, count=4, vessel="mariner")
-    predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10))
-    file, _ = predictor.export("casadi", tmp_path / "ship.casadi")
-    function, given = ca.Function.load(str(file)), build_model(predictor).inputs(strange.instants)
-    for level, pointwise in ((0.9, False), (0.6, True)):
-        right = predictor.predict(strange.instants, level=level, pointwise=pointwise)
-        for i in range(4):
-            entry = {key: values[i] for key, values in given.items()}
-            output = function(**entry, level=level, pointwise=pointwise)
-            assert output["promised"] == 1
-            assert output["outside"] == right.outside[i]
-            np.testing.assert_allclose(np.array(output["path"]).T, right.paths[:, i], rtol=0, atol=1e-11)
-            band = np.array(output["band"]).T
-            np.testing.assert_allclose(band, rows_of(right.region)[:, i], rtol=NEAR, atol=NEAR)
-    for asked in (
-        {"level": 0.95},
-        {"level": 0.0},
-        {"level": 0.5, "kind": 9},
-        {"level": 0.5, "pointwise": 1, "kind": 1},
-    ):
-        refused = function(**entry, **asked)
-        assert refused["promised"] == 0
-        assert np.isnan(np.array(refused["band"])).all()
-    now = ca.MX.sym("now", len(entry["now"]))
-    slopes = ca.jacobian(function(**{**entry, "now": now}, level=0.95)["path"], now)
-    assert np.isfinite(ca.Function("slopes", [now], [slopes])(entry["now"]).full()).all()
-
-
 def test_no_bands_leave_no_trace():
     predictor = Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", Unchanged({}), {}, {"no_band": "too few"})
     files = predictor_files(build_model(predictor), "m", NumberPrecision())

@@ -22,6 +22,7 @@ from shipid.export.c import NumberPrecision, SourceFiles, c_comment, c_name, c_s
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.equations import Equations
+from shipid.export.known import POSITION_ENTRIES
 from shipid.export.model import build_model
 from shipid.hybrid.alone import Unchanged
 from shipid.hybrid.features import Memory
@@ -66,7 +67,7 @@ def agrees(strange, folder):
     """Paths, alarms and refusals are those of Python at instants with faults."""
     exported = build_model(strange.predictor)
     loaded = library(predictor_files(exported, "odd", NumberPrecision()), folder)
-    taken = [name for name in exported.layout.now if name in strange.instants.columns]
+    taken = [name for name in exported.layout.now[len(POSITION_ENTRIES) :] if name in strange.instants.columns]
     instants, faulty, fast = with_faults(strange.instants, taken, np.random.default_rng(0))
     computed, results = paths(loaded, "odd", exported, instants)
     np.testing.assert_array_equal(results[faulty], INVALID)
@@ -110,10 +111,28 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
         return code
 
     for group in ("now", "past", "planned", "parameters"):
-        for place in range(0, len(given[group]), 7):
+        for place in range(len(POSITION_ENTRIES), len(given[group]), 7):
             assert {result(group, place, fault) for fault in (np.nan, np.inf, -np.inf)} == {INVALID}
     for name in exported.vessel.above_zero:
         assert result("parameters", exported.layout.parameters.index(name), 0.0) == PARAMETER
+
+
+@pytest.mark.parametrize("vessel", [None, "mariner"])
+def test_a_position_that_is_missing_matters_where_python_takes_it(vessel, tmp_path):
+    """Without physics Python does not look at north and east; C refused such rows."""
+    physics = Physics(vessel and load_vessel(vessel), 6, 5.0)
+    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 1.0)})
+    recorder = Recorder(predictor, tmp_path)
+    row = np.linspace(0.1, 0.3, len(recorder.model.layout.now))
+    row[: len(POSITION_ENTRIES)] = np.nan, -np.inf
+    columns = {name: row[None, i] for i, name in enumerate(recorder.model.layout.now)}
+    with np.errstate(invalid="ignore"):
+        expected = predictor.predict(Instants(columns))
+    result = recorder.loaded.odd_record(pointer(recorder.kept), 0.0, pointer(row))
+    assert result == (0 if np.isfinite(expected).all() else INVALID) == (0 if vessel is None else INVALID)
+    computed, results = paths(recorder.loaded, "odd", recorder.model, Instants(columns))
+    assert results.tolist() == [result]
+    np.testing.assert_array_equal(computed, expected)
 
 
 @pytest.mark.slow
@@ -326,22 +345,6 @@ def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(singl
         assert np.isfinite(path).all()
 
 
-def test_the_past_begins_anew_before_the_observer_does(tmp_path):
-    """Over a pause of 6 s the filters go on, as in Python, and no row of the past lies before it."""
-    vessel = variety()["gunnerus-28.9"]
-    frame = log_of(vessel, 20, np.random.default_rng(1), 1.0).frame
-    frame.loc[10:, "t"] += 6.0
-    t, physics = frame["t"].to_numpy(), Physics(vessel, 5, 1.0, "rk4", ONE_FILTER)
-    estimates = run_observer(vessel, Dataset(frame, {"clock": "run"}), ONE_FILTER).columns
-    assert (np.diff(estimates[AGE_COLUMN]) > 0).all()
-    instants = Instants(sample_columns(frame, t), past_of_instants(frame, t, 3, 1.0, "position"), None, None, estimates)
-    predictor = remembering(physics, Memory(history=(1.0, 3.0), observer=True), instants)
-    found, results = Recorder(predictor, tmp_path).follow(frame)
-    young = t - t[np.where(np.arange(len(t)) < 10, 0, 10)] < 3.0
-    np.testing.assert_array_equal(results, np.where(young, NO_PAST, 0))
-    np.testing.assert_allclose(found[:, ~young], predictor.predict(instants)[:, ~young], rtol=0, atol=1e-9)
-
-
 def test_a_long_way_costs_single_precision_no_digits(tmp_path):
     """The past by integrated velocities: what came long before moves no path."""
     physics = Physics(variety()["gunnerus-28.9"], 3, 1.0, path="velocity")
@@ -446,18 +449,6 @@ def _steps(vessel, folder, draw_inputs):
             np.testing.assert_allclose(carry[: len(names)], last, rtol=1e-12, atol=1e-12)
 
 
-def test_headers_say_what_is_not_in_them():
-    """In single precision, coordinates of a map lose digits; an observer takes no deviations of a log."""
-    for single in (False, True):
-        for settings in (None, Observer()):
-            predictor = Predictor(
-                Physics(load_vessel("mariner"), 6, 5.0, observer=settings), "alone", Unchanged({}), {}
-            )
-            header = predictor_files(build_model(predictor), "m", NumberPrecision(single)).texts["m.h"]
-            assert ("from a point nearby" in header) == single
-            assert ("std_u, std_v, std_r of a log" in header) == (settings is not None)
-
-
 def test_states_that_terms_keep_have_units():
     units = VesselParts(load_vessel("gunnerus-28.9-6dof"), "rk4").units()["carry"]
     assert "-" not in units.values()
@@ -477,7 +468,7 @@ def test_examples_run_and_end_with_the_result_of_a_row_that_is_refused(tmp_path)
     files = predictor_files(build_model(predictor), "m", NumberPrecision())
     assert "30 s: " in run_example(files, tmp_path / "a")
     assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", NumberPrecision()), tmp_path / "b")
-    broken = files.texts["main.c"].replace("m_real row[m_NUM_ROW] = {0", "m_real row[m_NUM_ROW] = {0.0 / 0.0", 1)
+    broken = files.texts["main.c"].replace("[m_NUM_ROW] = {0,0,0", "[m_NUM_ROW] = {0,0,0.0 / 0.0", 1)
     write(replace(files, texts={**files.texts, "main.c": broken}), tmp_path)
     compile_([compiler()], tmp_path, "-O0", "-o", "example", "main.c", *sources(files))
     result = subprocess.run([tmp_path / "example"], capture_output=True, text=True)

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from shipid.data.windows import Instants
-from shipid.engine.rollout import rollout
 from shipid.export.model import build_model
 from shipid.export.write import export_predictor, export_vessel
 from shipid.hybrid.alone import Unchanged
@@ -126,42 +125,6 @@ def hybrid(horizon):
 
 
 @pytest.mark.slow
-def test_a_controller_keeps_a_track_with_the_hybrid_model(tmp_path):
-    """Ten rudder orders, each from a plan over 80 s, bring the ship 20 m to starboard."""
-    horizon = 8
-    predictor = hybrid(horizon)
-    file, names, *_ = predictor.export("casadi", tmp_path / "ship.casadi")
-    function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
-    entries = {key: [entry["name"] for entry in rows] for key, rows in listed["inputs"].items()}
-    rudder = entries["planned"].index("rudder.delta")
-    ship = {"north": 0.0, "east": 0.0, "psi": 0.0, "u": 7.7, "v": 0.0, "r": 0.0}
-    reached = {"rudder.delta": 0.0}
-    problem = ca.Opti()
-    orders, at, actual = problem.variable(horizon), problem.parameter(6), problem.parameter(1)
-    motion = dict(zip(ship, ca.vertsplit(at), strict=True)) | {"propeller.n": 1.3}
-    plan = [orders[k] if i == rudder else 1.3 for k in range(horizon) for i in range(len(entries["planned"]))]
-    path = function(
-        now=ca.vertcat(*(motion.get(name, 0.0) for name in entries["now"])), reached=actual,
-        planned=ca.vertcat(*plan), parameters=listed["defaults"]["parameters"],
-    )["path"]  # fmt: skip
-    east = at[1] + ca.sin(at[2]) * path[0, :] + ca.cos(at[2]) * path[1, :]
-    problem.minimize(ca.sumsqr(east - 20) + 2e3 * ca.sumsqr(orders) + 50 * ca.sumsqr(ca.diff(east.T)))
-    problem.subject_to(problem.bounded(-0.6, orders, 0.6))
-    problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes", "max_iter": 60})
-    for _ in range(10):
-        problem.set_value(at, list(ship.values()))
-        problem.set_value(actual, reached["rudder.delta"])
-        order = float(problem.solve().value(orders[0]))
-        columns = {name: np.array([value]) for name, value in ship.items()}
-        commands = {"propeller.n": np.array([1.3]), "rudder.delta": np.array([order])}
-        hidden = {name: np.array([value]) for name, value in reached.items()}
-        result = rollout(predictor.vessel, columns, commands, step=1.0, num_steps=10, method="rk4", memory=hidden)
-        ship = {name: float(result[name][-1, 0, 0]) for name in ship}
-        reached = {name: float(result[f"actual.{name}"][-1, 0, 0]) for name in reached}
-    assert abs(ship["east"] - 20) < 8
-
-
-@pytest.mark.slow
 def test_the_example_of_the_docs_keeps_a_course(tmp_path, monkeypatch, capsys):
     """It runs as it is printed: a receding horizon brings a vessel 20 m to starboard."""
     text = (Path(__file__).parents[2] / "docs/export-casadi.md").read_text(encoding="utf-8")
@@ -170,35 +133,6 @@ def test_the_example_of_the_docs_keeps_a_course(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(example, "docs/export-casadi.md", "exec"), {})
     assert abs(float(capsys.readouterr().out.split()[-1]) - 20) < 8
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")
-def test_do_mpc_takes_the_function(tmp_path):
-    do_mpc = pytest.importorskip("do_mpc")
-    file, names = export_vessel(load_vessel("mariner"), "casadi", tmp_path / "ship.casadi")
-    step, listed = ca.Function.load(str(file)), json.loads(names.read_text())
-    at = [entry["name"] for entry in listed["inputs"]["carry"]]
-    ship = do_mpc.model.Model("discrete", "SX")
-    x, rudder = ship.set_variable("_x", "x", (len(at), 1)), ship.set_variable("_u", "rudder")
-    ship.set_rhs("x", step(x, ca.vertcat(1.3, rudder), [], np.zeros(3), listed["defaults"]["parameters"], 10.0))
-    ship.setup()
-    controller = do_mpc.controller.MPC(ship)
-    controller.set_param(n_horizon=8, t_step=10.0, store_full_solution=False)
-    controller.settings.supress_ipopt_output()
-    cost = (x[at.index("east")] - 20) ** 2 + 1e4 * x[at.index("psi")] ** 2
-    controller.set_objective(lterm=cost, mterm=cost)
-    controller.set_rterm(rudder=2e3)
-    controller.bounds["lower", "_u", "rudder"], controller.bounds["upper", "_u", "rudder"] = -0.6, 0.6
-    controller.setup()
-    now = np.zeros((len(at), 1))
-    now[at.index("u")] = 7.7
-    controller.x0 = now
-    controller.set_initial_guess()
-    for _ in range(12):
-        order = controller.make_step(now)
-        now = np.array(step(now, ca.vertcat(1.3, order), [], np.zeros(3), listed["defaults"]["parameters"], 10.0))
-    assert abs(now[at.index("east"), 0] - 20) < 8
 
 
 def test_a_name_that_is_not_utf_8_can_be_written(tmp_path):

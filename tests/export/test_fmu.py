@@ -6,12 +6,10 @@ import ctypes
 import logging
 import os
 import platform
-import re
 import resource
 import shutil
 import subprocess
 import sys
-import time
 import xml.etree.ElementTree as ET
 import zipfile
 from dataclasses import replace
@@ -23,19 +21,17 @@ from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
-from shipid.export import fmu
 from shipid.export.c import c_name
 from shipid.export.fmu import model_description, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import build_model
 from shipid.export.write import export_vessel
 from shipid.hybrid.alone import Unchanged
-from shipid.hybrid.features import MOTIONS, Memory
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import check_document, load_vessel
 from tests.conftest import variety
 from tests.export.compiled import FLAGS, SANITIZERS, compile_, compiler
-from tests.export.strange import drawn, network_of
+from tests.export.strange import drawn
 
 SECONDS = 60.0
 
@@ -401,77 +397,12 @@ def test_a_compiler_of_cplusplus_takes_the_sources(program, ship, aboard, tmp_pa
         assert version() == b"2.0"
 
 
-STEPS_OF_NO_LENGTH = """
-#include "ship.c"
-int main(void)
-{
-    const double steps[] = {0, -1, 1e-300, 9e-8, 1e300}; /* the last but one: more than a million */
-    const fmi2ValueReference last = NUM_REALS - 1; /* solver.step */
-    fmi2CallbackFunctions call = {0, 0, 0, 0, 0};
-    fmi2Component c = fmi2Instantiate("a", fmi2CoSimulation, guid, "", &call, 0, 0);
-    int i;
-    if (!c || fmi2EnterInitializationMode(c) || fmi2ExitInitializationMode(c)) return 1;
-    for (i = 0; i < 5; ++i)
-        if (fmi2SetReal(c, &last, 1, &steps[i]) || fmi2DoStep(c, 0, 0.1, 0) != (i < 4 ? fmi2Error : fmi2OK)) return 2;
-    fmi2FreeInstance(c);
-    return 0;
-}
-"""
-
-
-def test_an_internal_step_of_no_length_is_refused(ship, tmp_path):
-    """Before, the number of steps, which is infinite, was made a whole number first: C does not say what that gives.
-
-    And a thousand million steps were taken without a word. An error, since FMPy tries a discarded step for ever.
-    """
-    with zipfile.ZipFile(ship) as archive:
-        archive.extractall(tmp_path)
-    (tmp_path / "sources" / "main.c").write_text(STEPS_OF_NO_LENGTH)
-    compile_([compiler()], tmp_path / "sources", *SANITIZERS, "-fsanitize=float-cast-overflow", "-o", "main", "main.c",
-             "ship_casadi.c")  # fmt: skip
-    result = subprocess.run([tmp_path / "sources" / "main"], capture_output=True, text=True)
-    assert (result.returncode, result.stderr[:1000]) == (0, "")
-
-
-def test_a_long_past_is_not_on_the_stack(tmp_path, monkeypatch):
-    """A thread of a tool may have little: before, the path at the start took the whole recorder."""
-    strange = drawn("path-drawn", 7, vessel="gunnerus-28.9")
-    physics, corrector = Physics(load_vessel("gunnerus-28.9"), 3, 1.0), strange.predictor.corrector
-    inputs = type(corrector.inputs)(corrector.inputs.commands, Memory(history=(1.0, 60.0)))
-    names = (*MOTIONS, "psi", "x", "y", "V_w", "beta_w", *inputs.commands)
-    instants = Instants(strange.instants.columns, {name: np.zeros((60, 20)) for name in names})
-    table = inputs.table(physics, instants)
-    network = network_of(np.random.default_rng(2), list(table), table, 3, 2, False)
-    predictor = Predictor(physics, "path-drawn", type(corrector)(inputs, (network,), {}))
-    monkeypatch.setattr(fmu, "BINARIES", {})  # its sources alone
-    write_fmu(predictor_unit(build_model(predictor), "path"), tmp_path / "path.fmu")
-    with zipfile.ZipFile(tmp_path / "path.fmu") as archive:
-        archive.extractall(tmp_path)
-    command = [compiler(), *FLAGS, "-Wframe-larger-than=32768", "-c", "path.c", "-o", "path.o"]
-    result = subprocess.run(command, cwd=tmp_path / "sources", capture_output=True, text=True)
-    assert result.returncode == 0, result.stderr[:1000]
-
-
 @pytest.mark.parametrize("name", ["model", "size_t", "kept", "instance", "predict", "linux", "x"])
 def test_no_name_collides_with_those_of_the_source(predictor, name, tmp_path):
     compiler()
     title = c_name(name)
     for unit in (predictor_unit(build_model(predictor), title), vessel_unit(variety()["actuators"], title, "rk4")):
         assert write_fmu(unit, tmp_path / "a.fmu")  # compiled
-
-
-@pytest.mark.parametrize(
-    ("system", "file"), [("Linux", "linux64/ship.so"), ("Darwin", "darwin64/ship.dylib"), ("Windows", None)]
-)
-def test_a_binary_has_the_name_that_importers_load(system, file, tmp_path, monkeypatch):
-    """Before, that for a Mac ended in .so, and no importer there found it."""
-    compiler()
-    monkeypatch.setattr(platform, "system", lambda: system)
-    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
-    write_fmu(vessel_unit(load_vessel("otter"), "ship", "rk4"), tmp_path / "ship.fmu")
-    with zipfile.ZipFile(tmp_path / "ship.fmu") as archive:
-        binaries = [name for name in archive.namelist() if name.startswith("binaries/")]
-    assert binaries == ([] if file is None else [f"binaries/{file}"])
 
 
 @pytest.mark.parametrize("system", ["Linux", "Windows"])
@@ -497,21 +428,6 @@ def test_a_compiler_that_fails_is_one_line_and_leaves_no_file(tmp_path, monkeypa
         write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), tmp_path / "ship.fmu")
     assert not os.path.exists(noted.read_text())
     assert sorted(place.name for place in tmp_path.iterdir()) == ["gcc", "noted"]
-
-
-def test_an_fmu_is_the_same_whatever_the_clock_says(ship, tmp_path, monkeypatch):
-    """A board without a battery begins in 1970, which no zip can hold: the export was a traceback."""
-    monkeypatch.setattr(time, "time", lambda: 100.0)
-    monkeypatch.setattr(time, "localtime", lambda *_: time.gmtime(100.0))
-    file = tmp_path / "ship.fmu"
-    assert write_fmu(vessel_unit(variety()["actuators"], "ship", "rk4"), file)
-    with zipfile.ZipFile(file) as archive, zipfile.ZipFile(ship) as usual:
-        assert archive.namelist() == usual.namelist()
-        for entry, other in zip(archive.infolist(), usual.infolist(), strict=True):
-            assert entry.date_time == other.date_time == (1980, 1, 1, 0, 0, 0)
-            assert entry.external_attr == other.external_attr
-        texts = [name for name in usual.namelist() if not name.startswith("binaries/")]
-        assert all(archive.read(name) == usual.read(name) for name in texts)
 
 
 def test_an_importer_finds_no_fault(ship, aboard):
@@ -688,24 +604,6 @@ def test_an_actuator_begins_within_its_stops(ship, folder):
     one.fmu.freeInstance()
 
 
-def test_before_the_initialisation_there_is_no_path(aboard, tmp_path):
-    """Before, a tool that read outputs of a new instance, or of one that was reset, had paths of 0 m with status 0."""
-    with zipfile.ZipFile(aboard) as archive:
-        archive.extractall(tmp_path)
-    source = (tmp_path / "sources" / "path.c").read_text()
-    assert not re.search(r"^static const .*\bNAN\b", source, re.MULTILINE)  # no constant for some compilers
-    one = Instance(aboard, tmp_path)
-    one.fmu.instantiate()
-    for _ in range(2):
-        assert np.isnan(one.get("x[1]", "y[6]", "instant")).all()
-        assert one.fmu.getInteger([0]) == [8]
-        one.fmu.enterInitializationMode()
-        one.fmu.exitInitializationMode()
-        assert np.isfinite(one.get("x[1]", "y[6]", "instant")).all()
-        one.fmu.reset()
-    one.fmu.freeInstance()
-
-
 @pytest.mark.slow
 def test_outputs_of_the_initialisation_follow_what_has_been_set(ship, aboard, folder):
     """Before, a tool that read them there, as FMI allows, had paths of 0 m without an alarm."""
@@ -727,47 +625,6 @@ def test_outputs_of_the_initialisation_follow_what_has_been_set(ship, aboard, fo
         two.set(**{order: value})
         assert two.get(f"actual.{order}") == [value]
     two.fmu.freeInstance()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("taken", ["at its begin", "at its end", "as bytes"])
-def test_a_state_of_the_initialisation_knows_which_actuators_have_a_start_value(taken, ship, folder):
-    """Before, those of the moment counted: an actuator forgot its start value, or one that was taken back stayed."""
-    one, other = Instance(ship, folder).begin(), Instance(ship, folder, "b").begin()
-    order = next(name for name in one.at if f"actual.{name}" in one.at)
-    one.set(**{order: 0.3})
-    if taken == "at its begin":
-        state = one.fmu.getFMUstate()
-        one.set(**{f"actual.{order}": 0.05})
-        one.fmu.setFMUstate(state)
-    else:
-        one.set(**{f"actual.{order}": 0.05})
-        state = one.fmu.getFMUstate()
-        one.fmu.reset()
-        if taken == "as bytes":
-            state = other.fmu.deSerializeFMUstate(one.fmu.serializeFMUstate(state))
-            one, other = other, one
-        one.fmu.setFMUstate(state)
-    one.fmu.exitInitializationMode()
-    assert one.get(f"actual.{order}") == [0.3 if taken == "at its begin" else 0.05]
-    for each in (one, other):
-        each.fmu.freeInstance()
-
-
-@pytest.mark.slow
-def test_ten_copies_do_not_know_each_other(ship, folder):
-    copies = [Instance(ship, folder, f"copy {i}").begin() for i in range(10)]
-    for i, one in enumerate(copies):
-        one.set(u=1.0 + i / 10)
-        one.fmu.exitInitializationMode()
-    for k in range(5):
-        for one in copies:
-            one.fmu.doStep(float(k), 1.0)
-    speeds = [one.get("u")[0] for one in copies]
-    assert (np.diff(speeds) > 0).all()
-    for one in copies:
-        one.fmu.terminate()
-        one.fmu.freeInstance()
 
 
 @pytest.mark.slow

@@ -84,24 +84,6 @@ def test_what_limits_the_promise_is_on_the_page() -> None:
     assert paths_figure(content(banded=False)).takeaway == said[0], "the figure shows paths, no alarm"
 
 
-def test_of_many_runs_the_worst_is_among_those_to_choose_from() -> None:
-    """Of 60 runs 24 were shown, and the worst of these was said to have the largest error of all."""
-    here = content()
-    frames = {
-        key: pd.concat([getattr(here, key).assign(run=f"run {i}") for i in range(60)], ignore_index=True)
-        for key in ("instants", "points", "track")
-    }
-    rows = frames["instants"]
-    frames["instants"] = rows.assign(error=rows["error"].where(rows["run"].ne("run 31") | rows["t"].ne(4.0), 55.0))
-    many = replace(here, **frames)
-    figure = along_run_figure(many)
-    assert "the largest, 55.0 m, is in run 31." in figure.takeaway
-    assert figure.controls[0].options[figure.controls[0].start] == "run 31"
-    drawn_errors = views(figure)[str(figure.controls[0].start)][0].data[0]["y"]
-    assert np.nanmax(drawn_errors) == 55.0
-    assert 24 <= len(figure.controls[0].options) <= 25
-
-
 def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
     """Three runs of another day: the second errs most; its band is that of the last step, along and across."""
     here = content()

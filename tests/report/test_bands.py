@@ -90,33 +90,6 @@ def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) ->
     assert symbols == [chip.symbol for chip in figure.chips]
 
 
-def test_the_coverage_says_which_models_are_drawn(banded: ReportContent) -> None:
-    """Bands of methods that the study does not judge by are in the table; of these alone there is no figure."""
-    frame = banded.frames["coverage"]
-    other = frame.assign(model=frame.model + " + other")
-    both = replace(banded, frames={**banded.frames, "coverage": pd.concat([frame, other], ignore_index=True)})
-    figure = bands.coverage_figure(both)
-    assert figure is not None
-    names = [chip.label for chip in figure.chips]
-    assert all(name in figure.how.partition(f" Of {2 * frame.model.nunique()} models, ")[2] for name in names)
-    assert "drawn; the table has all." in figure.how
-    alone = replace(banded, frames={**banded.frames, "coverage": other})
-    assert bands.coverage_figure(alone) is None
-    assert bands.coverage_table(alone) is not None
-
-
-def test_bands_of_a_small_model_are_no_zeros(banded: ReportContent) -> None:
-    frames = {name: frame.copy() for name, frame in banded.frames.items()}
-    for name in ("coverage", "coverage_groups"):
-        for column in {"width", "end"} & set(frames[name].columns):
-            frames[name][column] /= 1000
-    small = replace(banded, frames=frames)
-    for table in (bands.coverage_table(small), bands.coverage_by_group(small)):
-        assert table is not None
-        place = list(table.columns).index("mean radius [m]")
-        assert not {"0.00", "0.000"} & {row[place].text for row in table.rows}
-
-
 def test_the_map_of_the_width(banded: ReportContent) -> None:
     figure = bands.width_figure(banded)
     assert figure is not None
@@ -124,15 +97,6 @@ def test_the_map_of_the_width(banded: ReportContent) -> None:
     least, most = banded.cells.groupby(["model", "N_D"]).width.mean().agg(["min", "max"])
     assert figure.scale is not None
     assert (figure.scale.low, figure.scale.high) == (pytest.approx(least), pytest.approx(most))
-
-
-def test_the_map_of_the_width_speaks_of_hatching_where_there_is_some(banded: ReportContent) -> None:
-    pure = banded.cells.family.eq("none")
-    for factor, told in ((100.0, False), (0.01, True)):
-        cells = banded.cells.assign(width=banded.cells.width.where(~pure, factor * banded.cells.width.mean()))
-        figure = bands.width_figure(replace(banded, cells=cells))
-        assert figure is not None
-        assert ("Hatched: not narrower than the band of no physics" in figure.how) == told
 
 
 def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:

@@ -48,7 +48,7 @@ def test_seeds_become_their_mean(full_scale):
     assert after[name].y[-1] == pytest.approx(2 * before[name].y[-1])
 
 
-def test_errors_by_axis_where_they_are_known_and_seeds_as_bands(full_scale):
+def test_errors_by_axis_where_they_are_known(full_scale):
     one = full_scale.horizon
     assert len(horizon(full_scale).controls[0].options) == 2
     known = one.assign(along=0.8 * one["mean"], across=0.5 * one["mean"])
@@ -59,11 +59,6 @@ def test_errors_by_axis_where_they_are_known_and_seeds_as_bands(full_scale):
     name = "inaccurate, compensated"
     mean, across = (lines(figure, f"{i}-0")[name].y[-1] for i in (0, 3))
     assert across == pytest.approx(mean * 0.5 * 1.5 / 2)
-    drawn = lines(figure, "0-0")
-    bands = {key for key in drawn if key.endswith(", seeds")}
-    assert len(bands) == sum(key.endswith(", compensated") or key == "no physics" for key in drawn)
-    assert max(drawn["inaccurate, seeds"].y) == pytest.approx(1.5 * mean)
-    assert not [key for key in lines(horizon(replace(full_scale, horizon=known)), "0-0") if key.endswith(", seeds")]
 
 
 def test_a_close_up_of_many_models_says_which(simulation, full_scale):
@@ -74,45 +69,6 @@ def test_a_close_up_of_many_models_says_which(simulation, full_scale):
     )
     assert "high-1, compensated" not in lines(figure, "0-0")
     assert "middle one" not in horizon(full_scale).how
-
-
-def test_names_at_the_ends_of_lines_fit_a_narrow_window(simulation):
-    """The room for them is in pixels: a share of the time axis cut them in a window of 390 px."""
-    plot = views(horizon(simulation))["0-0"][0]
-    assert plot.layout.xaxis.range[1] == simulation.horizon.ahead.max()
-    longest = max(len(name.text) for name in plot.layout.annotations)
-    assert plot.layout.margin.r >= 16 + 7 * longest
-    assert all((name.axref, name.ax) == ("pixel", 16) for name in plot.layout.annotations)
-
-
-def test_names_at_the_ends_do_not_stretch_the_axis_of_their_view(simulation):
-    """Moved apart by the largest error of another N_D, they pressed the lines of a small one to the ground."""
-    small = simulation.horizon.N_D.eq(10) & simulation.horizon.model.eq("high-2")
-    lost = simulation.horizon.assign(mean=simulation.horizon["mean"].mask(small, 100 * simulation.horizon["mean"]))
-    figure = horizon(replace(simulation, horizon=lost))
-    for view in ("0-0", "0-2"):
-        plot = views(figure)[view][0]
-        highest = max(max(trace.y) for trace in plot.data)
-        assert max(name.ay for name in plot.layout.annotations) <= 1.1 * highest
-
-
-def test_names_at_the_ends_of_many_lines_have_room(simulation):
-    """Of 40 families: each name moved the next one up, to twice the greatest error, and they covered each other."""
-    one = {"models": simulation.models, "cells": simulation.cells, "horizon": simulation.horizon}
-    mine = {key: frame[frame.model.eq("high-1")] for key, frame in one.items()}
-    many = {key: [frame] for key, frame in one.items()}
-    for i in range(40):
-        for key, frame in mine.items():
-            many[key].append(frame.assign(model=f"m-{i}", **{"family": f"m-{i}"} if "family" in frame else {}))
-    content = replace(simulation, **{key: pd.concat(frames, ignore_index=True) for key, frames in many.items()})
-    for view in views(horizon(content)).values():
-        plot = view[0]
-        most = max(np.nanmax(trace.y) for trace in plot.data if not trace.name.endswith(", seeds"))
-        heights = sorted(name.ay for name in plot.layout.annotations)
-        assert 10 < len(heights) < 40
-        assert np.diff(heights).min() > 0.054 * most
-        assert heights[0] >= 0
-        assert heights[-1] < 1.11 * most
 
 
 def test_what_failed_has_no_compensated_line(full_scale):

@@ -32,20 +32,6 @@ def test_the_row_tells_where_the_error_comes_from(simulation):
     assert views(factors_figure(bare))[""][0].layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
 
 
-def test_a_long_name_leaves_room_for_the_errors_of_its_row(simulation):
-    """A window of 390 px shows about 54 characters of 12 px."""
-    long = {"high-1": "a-family-with-a-name-of-sixty-characters-that-nobody-should-use-1"}
-    renamed = {
-        part: getattr(simulation, part).assign(model=getattr(simulation, part).model.replace(long))
-        for part in ("cells", "models", "factors")
-    }
-    texts = [note.text for note in views(factors_figure(replace(simulation, **renamed)))[""][0].layout.annotations]
-    (mine,) = [text for text in texts if text.startswith("<b>a-fa")]
-    assert "7.50 m: 5.25 along, 4.50 across" in mine
-    small = "  A 0.0016 m: 0.0073 along, 0.0014 across"  # of a model ship: these were cut off
-    assert len(mine.partition("  ")[0].replace("<b>", "").replace("</b>", "") + small) <= 54
-
-
 def test_takeaway_counts_and_finds_the_farthest(simulation):
     squared = np.log(simulation.factors.factor) ** 2
     away = np.exp(np.sqrt(squared.groupby(simulation.factors.model).mean()))

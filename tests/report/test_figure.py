@@ -1,6 +1,7 @@
 import itertools
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,7 +52,7 @@ def test_names_moved_apart_keep_their_order_and_their_distance(places, gap):
 
 def test_a_map_has_equal_axes_and_room_for_its_ticks():
     """ "−8000" has five signs of 8 px; a gap of 8 px and a line of 15 px follow."""
-    made = make_chart([], "y [m]", "x [m]", [(0.0, 100.0), (-5.0, 5.0)]).layout
+    made = go.Figure(make_chart([], "y [m]", "x [m]", [(0.0, 100.0), (-5.0, 5.0)])).layout
     assert (made.xaxis.scaleanchor, made.xaxis.scaleratio) == ("y", 1)
     assert (made.xaxis.range, made.yaxis.range) == ((-4.0, 104.0), (-9.0, 9.0))
     assert made.margin.l >= 5 * 8 + 8 + 15 + 4

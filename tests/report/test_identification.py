@@ -132,16 +132,6 @@ def test_the_figure_of_residuals_holds_every_line() -> None:
     assert figure.takeaway == "The correlation of residuals one sample apart is v 0.95."
 
 
-@pytest.mark.parametrize(("count", "named"), [(3, True), (40, False)])
-def test_names_of_many_estimates_do_not_cover_each_other(count: int, named: bool) -> None:
-    one = content()
-    rows = one.estimates.iloc[[0] * count].assign(name=[f"N_{k}" for k in range(count)])
-    figure = identification.correlations_figure(replace(one, estimates=rows, correlations=np.eye(count)))
-    assert figure is not None
-    assert views(figure)[""][0].layout.xaxis.showticklabels is named
-    assert ("Columns are in the order of the rows." in figure.how) is not named
-
-
 def test_pieces_are_not_joined_and_time_starts_at_zero() -> None:
     panels = views(identification.free_runs_figure(content()))["0"]
     speed = next(trace for trace in panels[0].data if trace.name == "measured")
@@ -151,14 +141,6 @@ def test_pieces_are_not_joined_and_time_starts_at_zero() -> None:
     assert np.nanmax(speed.x) == 59  # a clock since 1970 in single precision would not tell seconds
     rate = next(trace for trace in panels[2].data if trace.name == "after")
     assert np.nanmax(rate.y) == pytest.approx(np.rad2deg(1 / 9), rel=0.01)
-
-
-def test_a_base_that_diverges_leaves_the_map_whole() -> None:
-    page = content()
-    series = page.series.copy()
-    series.loc[series["model"] == "before", ["north", "east", "u", "v", "r"]] = np.nan
-    figure = views(identification.free_runs_figure(replace(page, series=series)))["0"][3]
-    assert np.isfinite(figure.layout.xaxis.range).all()
 
 
 def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:

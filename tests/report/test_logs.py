@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from shipid.report.logs import _takeaway_envelope, envelope_figure, tracks_figure
+from shipid.report.logs import _beyond_words, envelope_figure, tracks_figure
 from tests.report.views import views
 
 
@@ -45,34 +45,11 @@ def test_what_the_test_asks_beyond_training_is_named():
         ("test", "v", "m/s", -1.2, 0, 1),
     ]
     frame = pd.DataFrame(rows, columns=columns)
-    assert _takeaway_envelope(frame) == "The test reaches outside what the other sets cover in 1 of 2 inputs: v."
+    assert _beyond_words(frame) == "The test reaches outside what the other sets cover in 1 of 2 inputs: v."
     assert (
-        _takeaway_envelope(frame[frame.quantity == "u"])
-        == "The test stays inside what the other sets cover in all 1 input."
+        _beyond_words(frame[frame.quantity == "u"]) == "The test stays inside what the other sets cover in all 1 input."
     )
-    assert _takeaway_envelope(frame[frame["set"] == "D_10"]) == "2 inputs in 1 set."
-
-
-def test_the_published_ranges_are_compared_and_not_counted_as_data():
-    columns = ["set", "quantity", "unit", "min", "mean", "max"]
-    rows = [
-        ("D_10", "u", "m/s", 0, 2, 5),
-        ("test", "u", "m/s", 1, 2, 4.5),
-        ("published", "u", "m/s", 0.5, 2, 8),
-    ]
-    text = _takeaway_envelope(pd.DataFrame(rows, columns=columns))
-    assert text == (
-        "The test stays inside what the other sets cover in all 1 input. "
-        "1 of 2 published ends are met within 20 % of the published range; not max of u."
-    )
-
-
-def test_the_published_range_is_the_last_row_and_open(simulation):
-    figure = views(envelope_figure(simulation))[""][0]
-    assert list(figure.layout.yaxis.ticktext) == ["D_10", "D_30", "D_100", "test", "published"]
-    assert len(figure.data[-2].x) == 5
-    assert figure.data[-1].marker.symbol == "circle-open"
-    assert "not data of this study" in envelope_figure(simulation).how
+    assert _beyond_words(frame[frame["set"] == "D_10"]) == "2 inputs in 1 set."
 
 
 def test_ranges_run_from_smallest_to_largest(full_scale):

@@ -101,33 +101,6 @@ def test_a_missing_measure_says_why_in_its_row() -> None:
     assert "period: not reached" in replace(shown, measures=spoiled).answer[0].text
 
 
-@pytest.mark.parametrize(("span", "together"), [(20.0, True), (119.0, True), (121.0, False), (540.0, False)])
-def test_a_heading_of_few_degrees_is_drawn_with_the_helm(span: float, together: bool) -> None:
-    """A zigzag, wherever it heads to: one panel, or two where it turns far; the execute headings are in the first."""
-    shown = content("zigzag")
-    psi = shown.log["psi"].to_numpy()
-    wide = shown.log.assign(psi=2.0 + (psi - psi[0]) * np.deg2rad(span) / np.ptp(psi))
-    panels = views(manoeuvre.histories_figure(replace(shown, log=wide)))[""]
-    lines = [{str(trace["name"]): np.asarray(trace["y"]) for trace in panel.data} for panel in panels]
-    assert np.ptp(lines[0]["heading"]) == pytest.approx(span, rel=1e-3)
-    assert ("helm" in lines[0]) == together
-    execute = [name for name in lines[0] if name.endswith(" deg")]
-    assert sorted(execute) == ["-10 deg", "10 deg"]
-    for name in execute:
-        assert set(lines[0][name]) == {float(name.removesuffix(" deg"))}
-    helm = next(panel["helm"] for panel in lines if "helm" in panel)
-    assert np.ptp(helm) == pytest.approx(20.0)
-
-
-def test_rounding_is_not_drawn() -> None:
-    """A stop on a straight course: a yaw rate of 1e-25 filled its panel."""
-    made = content("stop")
-    figure = manoeuvre.histories_figure(replace(made, log=made.log.assign(r=np.linspace(0, 3e-25, len(made.log)))))
-    (panel,) = (one for one in views(figure)[""] if one.layout["yaxis"]["title"]["text"] == "yaw rate [deg/s]")
-    low, high = panel.layout["yaxis"]["range"]
-    assert high - low >= 1
-
-
 def test_counts_have_no_decimals() -> None:
     rows = {row[0].text: row[1].text for row in manoeuvre.measures_table(content("spiral")).rows}
     assert rows["levels"] == f"{int(rows['levels'])}"

@@ -26,29 +26,13 @@ SUMS = [  # comparison, model, N_D, A, H_without, H_with, low, high
 ]
 
 
-def along(current: float = 0.3, fade: float = 20.0) -> pd.DataFrame:
-    t = np.arange(50.0)
-    frame = pd.DataFrame({"run": "M001", "t": t, "u": 5.0, "v": 0.2 * np.sin(t), "r": 0.01})
-    frame = frame.assign(**{"observer.u": 5.0, "observer.v": 0.0, "observer.r": 0.01, "observer.X": -0.02})
-    frame = frame.assign(**{"observer.Y": 0.01, "observer.N": 1e-3, "observer.current_east": 0.0})
-    frame["observer.current_north"] = current
-    frame["observer.test"] = np.where(t == 0, np.nan, 1.5)
-    return frame.assign(model="seen", fade=fade, ahead=30.0)
-
-
 @pytest.fixture
 def past(simulation: ReportContent) -> ReportContent:
     names = ["comparison", "model", "N_D", "A", "H_without", "H_with", "low", "high"]
     sums = pd.DataFrame(SUMS, columns=names)
     sums = sums.assign(difference=sums.H_with - sums.H_without, runs=20, better=15, seeds=2, differs="", added="memory")
     sums = sums.assign(**{"without": sums.model + " + a", "with": sums.model + " + b"})
-    t = np.arange(20.0, 60.0)
-    time = []
-    for row in sums[sums.N_D.isin([0, 30])].to_dict("records"):
-        names = {key: row[key] for key in ("comparison", "model", "without", "with", "N_D")}
-        time.append(pd.DataFrame({**names, "run": "M001", "t": t, "error_without": 1.0 + t / 100, "error_with": 1.3}))
-    frames = {"observer": along(), "memory": sums, "memory_over_time": pd.concat(time, ignore_index=True)}
-    return replace(simulation, frames=frames)
+    return replace(simulation, frames={"memory": sums})
 
 
 @pytest.fixture
@@ -68,45 +52,6 @@ def test_the_section_is_on_the_page_and_names_are_escaped(little: ReportContent)
 
 def test_a_study_without_a_past_has_no_such_section(little: ReportContent) -> None:
     assert "What the past shows" not in render_page("study", ONLY, replace(little, frames={}))
-
-
-def test_an_observer_alone_is_shown(past: ReportContent) -> None:
-    only = replace(past, frames={"observer": along()})
-    assert [item.id for item in SECTIONS["the-past"].draw(only) if item is not None] == ["observer"]
-
-
-def test_the_observer_says_its_numbers(past: ReportContent) -> None:
-    figure = memory.observer_figure(past)
-    assert figure is not None
-    moved = 100 * np.sqrt(np.mean((0.2 * np.sin(np.arange(50.0))) ** 2))
-    assert f"{moved:.2g} cm/s" in figure.takeaway
-    assert "reaches 2 cm/s² ahead" in figure.takeaway
-    assert "0.30 m/s" in figure.takeaway
-    assert "1.50 on average" in figure.takeaway
-    assert f"{100 * np.exp(-1.5):.0f} % is left 30 s ahead" in figure.how
-    plot = views(figure)["0"][0]
-    force = next(trace for trace in plot.data if trace.name == "ahead")
-    assert force.y == pytest.approx(-2.0)  # cm/s^2
-    moment = next(trace for trace in plot.data if trace.name == "yaw")
-    assert moment.y == pytest.approx(np.degrees(1e-3))
-    rate = next(trace for trace in plot.data if trace.name == "r filtered")
-    assert rate.y == pytest.approx(np.degrees(0.01))
-
-
-@pytest.mark.parametrize(
-    ("fade", "words"), [(0.0, "fades immediately"), (np.inf, "does not fade"), (2e6, "does not fade")]
-)
-def test_the_ends_of_the_fade_are_named(past: ReportContent, fade: float, words: str) -> None:
-    figure = memory.observer_figure(replace(past, frames={"observer": along(fade=fade)}))
-    assert figure is not None
-    assert words in figure.how
-
-
-def test_no_row_for_a_current_that_nobody_looked_for(past: ReportContent) -> None:
-    figure = memory.observer_figure(replace(past, frames={"observer": along(current=0.0)}))
-    assert figure is not None
-    assert "current" not in figure.takeaway
-    assert not any("towards" in trace.name for trace in views(figure)["0"][0].data)
 
 
 def test_the_gain_counts_intervals_free_of_zero(past: ReportContent) -> None:

@@ -9,18 +9,16 @@ from html.parser import HTMLParser
 from importlib.resources import files
 
 import numpy as np
-import pandas as pd
 import pytest
 from plotly.offline import get_plotlyjs_version
 
 from shipid.errors import ResultError
 from shipid.report import AnswerSentence, ReportContent, write_report
-from shipid.report.figure import PageFigure, make_axis, make_line, make_plot
+from shipid.report.figure import PageFigure
 from shipid.report.page import render_page
 from shipid.report.paths import window_data
-from shipid.report.section import Section, declared_anchors
+from shipid.report.section import declared_anchors
 from shipid.report.sections import SECTIONS
-from shipid.report.selection import close_styles, model_styles
 from tests.report.views import views
 
 NASTY = "<script>alert('x')</script>"
@@ -257,66 +255,6 @@ def test_axes_have_units(sections):
                         assert named or re.search(r"\S \[[^\]]+\]$", drawn_axis["title"]["text"]), (item.id, name)
                         seen += 1
     assert seen > 20
-
-
-def test_a_line_of_a_model_has_one_colour_in_overviews_and_one_in_close_ups(sections, simulation, simulation_drawn):
-    """Of many models the colour is the accuracy; a close-up of a few gives each a colour of its group."""
-    colours_of: dict[str, set[str]] = {}
-    for section in sections:
-        for item in section.items:
-            for panel in every_panel(item):
-                for trace in panel.data:
-                    for key in trace.meta or []:
-                        if key.startswith("model:"):
-                            colours_of.setdefault(key, set()).add(trace.line.color or trace.marker.color)
-            for chip in getattr(item, "chips", ()):
-                if chip.key.startswith("model:"):
-                    colours_of.setdefault(chip.key, set()).add(chip.colour)
-    assert len(colours_of) >= 4
-    allowed: dict[str, set[str]] = {key: colours for key, colours in colours_of.items() if len(colours) == 1}
-    if sections is simulation_drawn:
-        looks, close = model_styles(simulation), close_styles(simulation)
-        allowed = {
-            f"model:{name}": {style.colour, close[name].colour if name in close else style.colour}
-            for name, style in looks.items()
-        }
-    assert {key: colours for key, colours in colours_of.items() if not colours <= allowed.get(key, set())} == {}
-
-
-def test_a_section_added_at_run_time_is_on_the_page(plain, monkeypatch):
-    """One record in the registry: no other place is edited, not even for a link from the answer."""
-
-    def toy(content):
-        frame = content.frames["tides"]
-        tide = make_plot([make_line("tide", frame.t, frame.height, [])], make_axis("time [h]"), make_axis("height [m]"))
-        return [
-            PageFigure(
-                id="tide",
-                title="The tide",
-                takeaway=f"The tide rises by {frame.height.max():g} m.",
-                how="As given.",
-                alternative="A line of the height of the tide over time, and nothing else.",
-                height=200,
-                draw=lambda: [tide],
-            ),
-            None,
-        ]
-
-    monkeypatch.setitem(SECTIONS, "tides", Section("Tides", toy, needs=("tides",), anchors=("tide",)))
-    linked = replace(plain, answer=[AnswerSentence("There is a tide.", "tide")])
-    tides = pd.DataFrame({"t": [0.0, 1.0, 2.0], "height": [0.0, 1.25, 0.5]})
-    page = Page(render(replace(linked, frames={"tides": tides})))
-    ids = [attributes.get("id") for _, attributes, _ in page.elements]
-    assert ids.index("cells") < ids.index("tides") < ids.index("tide") < ids.index("provenance")
-    assert any("The tide rises by 1.25\u00a0m." in text for _, text in page.all("p"))
-    hrefs = [a["href"] for a, _ in page.all("a")]
-    assert {"#tides", "#tide"} <= set(hrefs)
-    packed = [unpacked(text) for a, text in page.all("script") if a.get("class") == "views"]
-    assert [list(json.loads(text)) for text in packed if '"tide"' in text] == [[""]]
-
-    without = Page(render(linked))  # nothing of what it needs
-    assert not {"tides", "tide"} & {attributes.get("id") for _, attributes, _ in without.elements}
-    assert "#tide" not in [a["href"] for a, _ in without.all("a")]
 
 
 def test_it_is_written_from_cells_alone(full_scale):

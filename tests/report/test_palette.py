@@ -1,10 +1,9 @@
 import re
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 
-from shipid.report.figure import colour_level, page_colours
+from shipid.report.figure import page_colours
 from shipid.report.selection import accuracy_range, close_styles, model_styles
 
 
@@ -50,28 +49,6 @@ def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
     assert len(set(colours)) == len(colours)
     symbols = {name.split("-")[0]: style.symbol for name, style in model_styles(simulation).items()}
     assert len(set(symbols.values())) == len(symbols)
-
-
-def test_errors_of_a_model_ship_have_colours():
-    """A scale from 0.1 mm to 10 km, and one whose first value is that of an exact model."""
-    decades = [colour_level(10.0**k, (1e-4, 1e4)) for k in range(-4, 5)]
-    assert decades[0] == 0
-    assert decades[-1] == 23
-    assert min(np.diff(decades)) >= 2
-    assert colour_level(4e-4, (2e-4, 8e-4)) == 12
-    for exact in (0.0, 1e-15):
-        assert [colour_level(value, (exact, 10.0)) for value in (exact, 0.1, 10.0)] == [0, 12, 23]
-    assert colour_level(0.0, (0.0, 0.0)) == 0
-
-
-def test_methods_on_one_model_and_models_without_physics_have_markers_of_their_own(simulation):
-    cells, pure = simulation.cells, simulation.cells.model.eq("no physics")
-    more = [cells[cells.model.eq("high-1")].assign(model="high-1 + alone")]
-    more += [cells[pure].assign(model=f"none + {name}") for name in ("plain", "forest", "step")]
-    looks = model_styles(replace(simulation, cells=pd.concat([cells, *more], ignore_index=True)))
-    drawn = [(look.colour, look.symbol) for name, look in looks.items() if name.startswith(("high-1", "no"))]
-    assert len(drawn) == 1 + 6  # nominal
-    assert len(set(drawn)) == len(drawn)
 
 
 def test_models_of_many_families_are_told_apart_in_close_ups(simulation):

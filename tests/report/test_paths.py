@@ -8,11 +8,8 @@ import pytest
 from shipid.report import paths
 from shipid.report.paths import browser_figure, windows_of
 from shipid.report.selection import FEW_RUNS
-from shipid.report.wording import number_text
-from tests.report.views import views
 
 window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
-snapshots = lru_cache(maxsize=2)(paths.snapshots_figure)
 
 
 def test_windows_hold_truth_and_paths_closer_than_a_pixel(full_scale, away):
@@ -73,16 +70,6 @@ def test_a_diverged_path_becomes_gaps(full_scale):
     paths = {key: np.where(np.arange(16)[:, None] > 7, np.inf, path) for key, path in first.paths.items()}
     text = json.dumps(window_data(replace(full_scale, snapshots=[replace(first, paths=paths)])), allow_nan=False)
     assert "null" in text
-    assert snapshots(replace(full_scale, snapshots=[replace(first, paths=paths)])) is not None
-
-
-def test_where_nothing_has_physics_the_panels_are_of_what_has_none(full_scale):
-    """Paths were drawn below the sentence that none was recorded."""
-    first = full_scale.snapshots[0]
-    error = number_text(float(np.hypot(*(first.paths["no physics", "cooperative", 15] - first.truth)[-1])))
-    pure = {key: path for key, path in first.paths.items() if key[0] == "no physics" or key[1] != "cooperative"}
-    figure = snapshots(replace(full_scale, snapshots=[replace(first, paths=pure)]))
-    assert figure.takeaway == f"From panel to panel, the paths without physics end {error} m from the true place."
 
 
 def test_takeaway_is_the_mean_end_error(full_scale):
@@ -97,47 +84,4 @@ def test_takeaway_is_the_mean_end_error(full_scale):
 
 
 def test_no_windows_no_browser(full_scale):
-    empty = replace(full_scale, snapshots=[])
-    assert browser_figure(empty) is None
-    assert snapshots(empty) is None
-
-
-def test_a_row_per_model_and_a_column_per_size_share_their_axes(simulation):
-    """All panels are of one window and hold its ship at both ends, also a long one that has turned round."""
-    outline = np.array([[50.0, 0.0], [40.0, 8.0], [-50.0, 8.0], [-50.0, -8.0], [40.0, -8.0]])
-    shots = [replace(shot, outline=outline, psi_end=2.5) for shot in simulation.snapshots]
-    figure = snapshots(replace(simulation, snapshots=shots))
-    names = ["no physics", "moderate-2", "high-2"]
-    assert figure.captions == [f"{name}, N_D = {size}" for name in names for size in (10, 30, 100)]
-    assert {chip.key for chip in figure.chips if chip.key.startswith("model:")} == {f"model:{name}" for name in names}
-    panels = views(figure)[""]
-    drawn = [{trace.name for trace in panel.data} for panel in panels]
-    assert drawn[0] == {"true path", "ship", "no physics"}
-    assert drawn[3] == {"true path", "ship", "moderate-2, compensated", "moderate-2, physics alone"}
-    assert len({(panel.layout.xaxis.range, panel.layout.yaxis.range) for panel in panels}) == 1
-    hulls = [trace for trace in panels[0].data if trace.name == "ship"]
-    for axis, column in ((panels[0].layout.xaxis, "x"), (panels[0].layout.yaxis, "y")):
-        every = np.concatenate([hull[column] for hull in hulls])
-        assert axis.range[0] < every.min()
-        assert every.max() < axis.range[1]
-    assert figure.takeaway.startswith(
-        'Distance from the true place at the end, with N_D = 10, 30 and 100: "no physics" '
-    )
-
-
-def test_one_family_shows_all_its_models_in_one_row(simulation):
-    kept = simulation.models.family.isin(["moderate", "none"])
-    names = set(simulation.models.model[kept])
-    shots = [
-        replace(shot, paths={key: path for key, path in shot.paths.items() if key[0] in names})
-        for shot in simulation.snapshots[:20]
-    ]
-    cells = simulation.cells[simulation.cells.model.isin(names)]
-    figure = snapshots(replace(simulation, models=simulation.models[kept], cells=cells, snapshots=shots))
-    assert [caption.partition(", N_D")[2] for caption in figure.captions] == [" = 10", " = 30", " = 100"]
-    assert figure.takeaway.startswith("From panel to panel")
-
-
-def test_one_size_gives_three_instants_of_one_run(full_scale):
-    times = [float(caption.split("t = ")[1].split()[0]) for caption in snapshots(full_scale).captions]
-    np.testing.assert_allclose(times, 4150 + 179 * np.array([1, 3, 5]) / 6, atol=2)
+    assert browser_figure(replace(full_scale, snapshots=[])) is None

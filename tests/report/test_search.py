@@ -6,17 +6,14 @@ import pandas as pd
 import pytest
 from scipy.stats import spearmanr
 
-from shipid.hybrid.path_drawn import MEMORIES as KINDS_BY_NUMBER
 from shipid.report.search import (
     DIVERGED_RATIO,
     HIGHEST_RATIO,
-    MEMORY_WORDS,
     search_table,
     searched_names,
     trial_rank_correlation,
 )
 from shipid.report.search import search_figure as drawn_anew
-from shipid.report.wording import short_text
 from tests.report.views import views
 
 search = lru_cache(maxsize=2)(drawn_anew)  # the same content is drawn once
@@ -41,7 +38,7 @@ def test_a_panel_per_hyperparameter_that_varies(simulation):
 
 def test_ticks_over_many_decades_have_room(simulation):
     """A panel is 190 px wide: names of five powers of ten lay over each other."""
-    for decades in range(2, 13):
+    for decades in (2, 7, 12):
         values = np.geomspace(10.0 ** (4 - decades), 1e4, len(simulation.trials))
         x = panels(replace(simulation, trials=simulation.trials.assign(weight_decay=values)))["weight decay"]
         low, high = x.layout.xaxis.range
@@ -62,14 +59,6 @@ def test_dots_are_relative_to_the_best_of_their_cell(simulation):
     np.testing.assert_allclose(drawn["chosen"].x, trials.learning_rate[trials.chosen], rtol=1e-5)
 
 
-def test_views_hold_their_size(simulation):
-    drawn = dots(panels(simulation, "2")["units"])
-    mine = simulation.trials[simulation.trials.N_D.eq(30) & simulation.trials.chosen]
-    np.testing.assert_allclose(drawn["chosen"].x, mine.units)
-    ranges = {tuple(panels(simulation, view)["units"].layout.xaxis.range) for view in ("0", "1", "2", "3")}
-    assert len(ranges) == 1
-
-
 def test_of_many_trials_some_are_drawn(simulation):
     many = pd.concat([simulation.trials] * 5, ignore_index=True)
     content = replace(simulation, trials=many)
@@ -79,19 +68,9 @@ def test_of_many_trials_some_are_drawn(simulation):
     assert "are drawn" not in search(simulation).how
 
 
-def test_the_rank_correlation_is_within_cells():
-    cell = np.repeat(["a", "b"], 5)
-    rate = np.tile([1.0, 2, 3, 4, 5], 2)
-    # Within a cell the error falls; between cells it would seem to rise.
-    trials = pd.DataFrame({"cell": cell, "rate": rate + 10 * (cell == "b"), "value": 9 - rate + 20 * (cell == "b")})
-    assert trial_rank_correlation(trials, "rate") == pytest.approx(-1)
-    assert trial_rank_correlation(trials.assign(value=[5, 1, 4, 2, 3] * 2), "rate") == pytest.approx(-0.3)
-    assert np.isnan(trial_rank_correlation(trials.assign(value=np.nan), "rate"))
-
-
 def test_the_rank_correlation_is_scipys_mean_over_cells():
     rng = np.random.default_rng(5)
-    for _ in range(30):
+    for _ in range(10):
         cell = rng.choice(["a", "b", "c", None], 40)
         rate = np.where(rng.random(40) < 0.1, np.nan, rng.integers(0, 4, 40))
         value = np.where(rng.random(40) < 0.1, np.nan, rng.normal(size=40).round(1))
@@ -120,10 +99,6 @@ def test_the_table_sums_up_by_size(simulation):
     assert rows[30]["trials [1]"].key == len(mine)
     assert rows[30]["diverged [1]"].key == mine.state.eq("diverged").sum()
     assert rows[30]["time per cell [s]"].key == pytest.approx(mine.seconds.sum() / 14)
-    chosen = mine.units[mine.chosen]
-    assert rows[30]["chosen units [1]"].text == " / ".join(
-        map(short_text, (chosen.min(), chosen.median(), chosen.max()))
-    )
 
 
 def test_a_search_in_closed_form_says_what_there_was(simulation):
@@ -141,8 +116,6 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     assert "Tried: motion scale 2 to 13, mirror yes or no." in printed.takeaway
     row = dict(zip(printed.columns, printed.rows[0], strict=True))
     assert "epochs [1]" not in row
-    assert row["chosen motion scale [1]"].text == "2 / 3.5 / 5"
-    assert row["share of chosen mirror [1]"].text == "0.75"
     assert "epochs [1]" in search_table(simulation).columns
     assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
 
@@ -159,24 +132,13 @@ def test_delays_are_seconds_and_kinds_of_memory_are_named(simulation):
         "%{x:.3g} s" in dot.hovertemplate for name, dot in dots(panels(content)["delays"]).items() if name != "median"
     )
     assert search(content).how.endswith(" Memory: 0 none, 1 the error of the physics, 2 that and history.")
-    assert "chosen delays [s]" in search_table(content).columns
     assert "delays 2 to 4 s," in search_table(content).takeaway
     assert "Memory:" not in search(simulation).how
-
-
-def test_every_kind_of_memory_has_its_words():
-    """The words of what a trial takes name its kinds, and a page those that were tried."""
-    assert len(MEMORY_WORDS) == len(KINDS_BY_NUMBER) == len(set(KINDS_BY_NUMBER))
-    names = {"history": "history", "error": "the error of the physics", "observer": "estimates of the observer"}
-    for kinds, words in zip(KINDS_BY_NUMBER, MEMORY_WORDS, strict=True):
-        everything = words.replace("that", names["error"]) if len(kinds) < len(names) else " ".join(names.values())
-        assert {kind for kind, name in names.items() if name in everything} == set(kinds), words
 
 
 def test_trials_that_all_diverged_stand(simulation):
     lost = simulation.trials.assign(state="diverged", value=np.nan, chosen=False)
     content = replace(simulation, trials=lost)
-    assert "–" in search_table(content).rows[0][-1].text
     assert search(content).takeaway.startswith("None of 504 trials ended")
 
 

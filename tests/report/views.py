@@ -14,7 +14,7 @@ def views(figure: PageFigure) -> dict[str, list[go.Figure]]:
     result = {}
     for places in product(*(range(len(control.options)) for control in figure.controls)):
         options = [control.options[place] for control, place in zip(figure.controls, places, strict=True)]
-        result["-".join(map(str, places))] = list(figure.draw(*options))
+        result["-".join(map(str, places))] = [go.Figure(panel) for panel in figure.draw(*options)]
     return result
 
 

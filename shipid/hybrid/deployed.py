@@ -1,0 +1,65 @@
+"""What a predictor holds: physics, a fitted method, and the limits and bands of its predictions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from shipid.data.windows import Commands
+from shipid.hybrid.bands import Bands
+from shipid.hybrid.method import Corrector
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import Vessel
+
+
+@dataclass(frozen=True, eq=False)
+class DeployedMethod:
+    """Physics and a fitted method, and what is known of both: what a predictor holds, and what an export writes.
+
+    physics : the vessel with its numbers, or none, with horizon, step and rule of the rollout.
+    method : kind of the method, a name in `shipid.hybrid.methods.METHODS`.
+    corrector : the fitted method.
+    limits : column -> (least, greatest) seen in training: the region where the method has evidence.
+    commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
+        in force in each step, `Instants.planned`, name -> (T, S).
+    causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
+    bands : what says how far off a prediction may be; None where no runs could calibrate it.
+    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training; 0 without an
+        observer. One that has run for less time has not settled as it had there, so such an instant is outside.
+    """
+
+    physics: Physics
+    method: str
+    corrector: Corrector = field(repr=False)
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict, repr=False)
+    provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    commands: Commands = "held"
+    causal: tuple[str, ...] = ()
+    bands: Bands | None = field(default=None, repr=False)
+    run_up: float = 0.0
+
+    def __post_init__(self) -> None:
+        """A number of NumPy's becomes a plain one, as in `Physics`."""
+        object.__setattr__(self, "run_up", float(self.run_up))
+
+    @property
+    def vessel(self) -> Vessel | None:
+        """The vessel of the physics; None for no physics."""
+        return self.physics.vessel
+
+    @property
+    def no_band(self) -> str:
+        """Why it has no band, if it has none."""
+        return reason_of_no_band(self.provenance)
+
+    @property
+    def past(self) -> int:
+        """Steps of the past that `Instants.past` must hold."""
+        return math.ceil(self.corrector.past / self.physics.step - 1e-9)
+
+
+def reason_of_no_band(provenance: Mapping[str, Any]) -> str:
+    """Why a predictor of this provenance has no band."""
+    return str(provenance.get("no_band", "it was made without"))
