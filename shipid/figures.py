@@ -32,7 +32,7 @@ from shipid.report.manoeuvre import ManoeuvreContent
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
-    from shipid.identification.outcome import Identified
+    from shipid.identification.outcome import Identification
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
@@ -162,27 +162,29 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
     return _draw(checks.checked_motion(content.series), [run], dark=dark)
 
 
-def estimates(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def estimates(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Estimates of an identification with 95 % intervals, as factors on the base values."""
     return _draw(identification.estimates_figure(_identification(source)), dark=dark)
 
 
-def correlations(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def correlations(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Correlations of the estimates of an identification; needs two of them."""
     return _draw(identification.correlations_figure(_identification(source)), dark=dark)
 
 
-def free_runs(source: Identified | IdentificationContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
+def free_runs(
+    source: Identification | IdentificationContent, run: str | None = None, *, dark: bool = False
+) -> go.Figure:
     """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
     return _draw(identification.free_runs_figure(_identification(source)), [run], dark=dark)
 
 
-def residuals(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def residuals(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Autocorrelation of the residuals of an identification."""
     return _draw(identification.residuals_figure(_identification(source)), dark=dark)
 
 
-def profiles(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def profiles(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Profile likelihoods of an identification, of the paths that were asked for."""
     return _draw(identification.profiles_figure(_identification(source)), dark=dark)
 
@@ -241,7 +243,7 @@ def _from_frames(frames: dict[str, Any]) -> ReportContent:
     for name in frames:
         if name not in known:
             raise ShipidError(f"a report shows no {name!r}; {suggest_name(name, known)}", path="figures")
-    cells = _completed(frames.pop("cells", pd.DataFrame({"model": np.array([], dtype=str), "N_D": [], "H": []})))
+    cells = _complete_cells(frames.pop("cells", pd.DataFrame({"model": np.array([], dtype=str), "N_D": [], "H": []})))
     models = frames.pop("models", None)
     if models is None:
         models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
@@ -251,7 +253,7 @@ def _from_frames(frames: dict[str, Any]) -> ReportContent:
     return ReportContent(**{**words, "cells": cells, "models": models, "naive": naive, **frames})
 
 
-def _completed(cells: pd.DataFrame) -> pd.DataFrame:
+def _complete_cells(cells: pd.DataFrame) -> pd.DataFrame:
     """Give a table of cells the columns that it lacks."""
     if lacking := [name for name in ("model", "N_D", "H") if name not in cells]:
         raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
@@ -273,13 +275,13 @@ def _completed(cells: pd.DataFrame) -> pd.DataFrame:
     return cells.assign(**{name: value for name, value in absent.items() if name not in cells})
 
 
-def _identification(source: Identified | IdentificationContent) -> IdentificationContent:
+def _identification(source: Identification | IdentificationContent) -> IdentificationContent:
     if isinstance(source, IdentificationContent):
         return source
     from shipid.identification.contents import identification_content
-    from shipid.identification.outcome import Identified
+    from shipid.identification.outcome import Identification
 
-    check_class("source", source, Identified, "as of `run_identification`")
+    check_class("source", source, Identification, "as of `run_identification`")
     return identification_content(source, "")
 
 

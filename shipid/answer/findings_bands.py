@@ -27,9 +27,9 @@ from shipid.answer.findings_simulation import trend_over_accuracy, trend_verdict
 from shipid.answer.verdict import (
     EQUAL_A,
     ClaimRule,
-    JudgedClaim,
+    ClaimVerdict,
     Judgement,
-    Undecided,
+    UndecidedClaim,
     count_manoeuvres,
     difference_with_interval,
     judge_claims,
@@ -41,9 +41,9 @@ from shipid.answer.verdict import (
 )
 from shipid.evidence import all_significant, any_significant, share_interval
 from shipid.metrics import coverage_share, rank_correlation
-from shipid.report.wording import listed_names
+from shipid.report.wording import join_few_names
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import judged_method
+from shipid.study.plan import verdict_method
 from shipid.study.results import Results
 from shipid.units import level_text, percent_text
 
@@ -86,7 +86,7 @@ class BandEvidence:
     shares: Sequence[float] = ()
 
 
-def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[JudgedClaim]:
+def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[ClaimVerdict]:
     """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
 
     rivals : as in `Widths`.
@@ -96,7 +96,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     level, run, of = (
         results.plan.study.bands.level,
         results.test.run,
-        of_methods(results, [judged_method(results.plan)]),
+        of_methods(results, [verdict_method(results.plan)]),
     )
     widths, held = {}, {}
     for row, by_level, apart in cell_regions(results, [level]):
@@ -180,10 +180,10 @@ def _judge_promise(bands: BandEvidence) -> Judgement:
         like = np.isin(promise.kinds, list(promise.calibrated))
         these, count = sorted(set(promise.kinds[~like])), len(set(promise.run[~like]))
         if count:
-            left_out = f"no run of the kind {listed_names(these)} calibrated them, so they promise nothing for "
+            left_out = f"no run of the kind {join_few_names(these)} calibrated them, so they promise nothing for "
             left_out += count_manoeuvres(count)
         if not like.any():
-            raise Undecided(left_out)
+            raise UndecidedClaim(left_out)
         promise = replace(promise, held=promise.held[like], run=promise.run[like])
     decided, evidence, numbers = judge_held_share(promise)
     return decided, f"{evidence}; {left_out}" if left_out else evidence, numbers

@@ -23,7 +23,7 @@ from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.verdict import (
     EQUAL_A,
     ClaimRule,
-    JudgedClaim,
+    ClaimVerdict,
     Judgement,
     count_manoeuvres,
     difference_with_interval,
@@ -148,13 +148,13 @@ FULL_SCALE_RULES = {
 }
 
 
-def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[JudgedClaim]:
+def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[ClaimVerdict]:
     """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval, which needs a remedy."""
     few = too_few_manoeuvres(rivals.table.runs)
     return judge_claims(FULL_SCALE_RULES, rivals, f"{few}: {remedy}" if few else count_manoeuvres(rivals.table.runs))
 
 
-def full_scale_findings(results: Results) -> list[JudgedClaim]:
+def full_scale_findings(results: Results) -> list[ClaimVerdict]:
     """R1-R4 on the test manoeuvres of a study."""
     claims = results.plan.study.claims
     assert claims is not None

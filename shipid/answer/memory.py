@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.answer.comparison import CellErrors, compare_cells
-from shipid.answer.frames import insert_gaps, shown_runs
+from shipid.answer.frames import figure_runs, insert_gaps
 from shipid.observer import filter_bank, run_observer
 from shipid.predictor import Predictor
 from shipid.study import store
@@ -177,7 +177,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
     if predictor is None or predictor[1].vessel is None:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
-    part = results.dataset.select(shown_runs(results))
+    part = results.dataset.select(figure_runs(results))
     known = run_observer(vessel, known_by_then(results.plan.study, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
     table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *OBSERVER_COLUMNS]]
@@ -191,7 +191,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
 def orders_frame(results: Results) -> pd.DataFrame:
     """Moments of new orders in the shown test runs: run, t [s]; a command jumps, or begins to move as fast."""
     frames = []
-    for run in shown_runs(results):
+    for run in figure_runs(results):
         rows = results.dataset.frame[results.dataset.frame["run"] == run]
         values = rows[results.dataset.commands].to_numpy(dtype=float)
         moved = (np.abs(np.diff(values, axis=0)) > NEW_ORDER * np.ptp(values, axis=0) + 1e-9).any(axis=1)

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from shipid.hybrid.method import Fitted, Index, Row, Task
-from shipid.hybrid.settings import Point, Searched
+from shipid.hybrid.method import FitResult, Index, Row, Task
+from shipid.hybrid.settings import Point, SearchMethod
 from shipid.hybrid.trials import best_trials, fit_each, mean_squared_error, trial_points, trial_row, windows_of_folds
 
 Any_ = TypeVar("Any_")
@@ -59,7 +59,13 @@ class Search:
     """
 
     def __init__(
-        self, task: Task, names: Iterable[str], method: Searched, *, again: bool = False, closing: int = CLOSING_TRIALS
+        self,
+        task: Task,
+        names: Iterable[str],
+        method: SearchMethod,
+        *,
+        again: bool = False,
+        closing: int = CLOSING_TRIALS,
     ) -> None:
         self.begun, self.closing = time.process_time(), closing
         self.method, self.journal = method, task.journal
@@ -158,7 +164,7 @@ class LearningProblem:
         return self.solve(best[0]["number"], best[0]["params"], windows_of_folds(self.task))
 
 
-class SearchedAlone(Searched):
+class SearchedAlone(SearchMethod):
     """A method that searches for one foundation after the other: its formula is its `problem`.
 
     IDLE : settings that a trial chooses by itself, so that they differ in no point.
@@ -173,11 +179,11 @@ class SearchedAlone(Searched):
         """Return the trials: a value of everything searched, evenly spread."""
         return trial_points(self, self.IDLE)
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         """Search for every foundation; the best trials make its corrector."""
         return fit_each(task, self, self.points, lambda name: self._fit(task, name))
 
-    def _fit(self, task: Task, name: str) -> Fitted:
+    def _fit(self, task: Task, name: str) -> FitResult:
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
         for number, point in search.left(self.points()):
             start = time.process_time()
@@ -185,4 +191,4 @@ class SearchedAlone(Searched):
             search.record({name: trial_row(number, judged.params, judged.value, start, judged.epochs)})
         rows = search.rows[name]
         best = best_trials(rows)[: self.num_chosen()]
-        return Fitted(problem.corrector(best) if best else None, rows, search.seconds)
+        return FitResult(problem.corrector(best) if best else None, rows, search.seconds)

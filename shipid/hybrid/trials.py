@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.hybrid.method import Corrector, Fitted, Index, Row, Task
-from shipid.hybrid.settings import Searched, seed_of, spread_points
+from shipid.hybrid.method import Corrector, FitResult, Index, Row, Task
+from shipid.hybrid.settings import SearchMethod, seed_of, spread_points
 
 Array = NDArray[np.float64]
 
 
-def trial_points(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
     """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
 
     A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
@@ -30,7 +30,7 @@ def trial_points(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) 
         yield {**fixed, **point}
 
 
-def setting_at_share(method: Searched, name: str, share: float) -> float:
+def setting_at_share(method: SearchMethod, name: str, share: float) -> float:
     """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
     low, high = method.ranges()[name]
     if name in method.LINEAR:
@@ -44,16 +44,19 @@ def ridge_values(ridge: float | tuple[float, float], count: int) -> list[float]:
     return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
 
 
-def diverged_result(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
+def diverged_result(method: SearchMethod, points: Iterable[Mapping[str, float]]) -> FitResult:
     """The result where the physics is not finite: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
     some = islice(points, 1 if method.budget else None)
-    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
+    return FitResult(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
 
 
 def fit_each(
-    task: Task, method: Searched, points: Callable[[], Iterable[Mapping[str, float]]], fit: Callable[[str], Fitted]
-) -> dict[str, Fitted]:
+    task: Task,
+    method: SearchMethod,
+    points: Callable[[], Iterable[Mapping[str, float]]],
+    fit: Callable[[str], FitResult],
+) -> dict[str, FitResult]:
     """Result of `fit` for every foundation of a task by name; where its physics is not finite all trials diverged."""
     fitted = {}
     for name in task.cases:

@@ -22,7 +22,7 @@ from shipid.report.figure import (
     make_axis,
     make_line,
     make_plot,
-    spread_apart,
+    spread_places,
 )
 from shipid.report.section import Section
 from shipid.report.selection import (
@@ -32,16 +32,16 @@ from shipid.report.selection import (
     close_up_models,
     data_driven,
     drawn_source,
+    figure_sizes,
     in_words,
     model_chips,
     nothing_learns,
     over_seeds,
-    shown_sizes,
     spread_items,
     thin_lines,
 )
 from shipid.report.tables import PageTable, TableColumn, frame_table
-from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text, shorten_name
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text, shorten_name
 
 LINE_COLUMNS = ["model", "source", "N_D"]
 ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
@@ -78,7 +78,7 @@ def horizon_figure(content: ReportContent) -> PageFigure | None:
         return None
     frame = _rows_of_close_up(content.horizon, content)
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
-    columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], shown_sizes(frame.N_D)
+    columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], figure_sizes(frame.N_D)
     means = over_seeds(frame, [*LINE_COLUMNS, "ahead"], columns)
     seeds = frame[frame.source.eq("cooperative")].groupby([*LINE_COLUMNS, "ahead"])[columns].agg(["min", "max", "size"])
     seeds = seeds.reset_index()
@@ -124,7 +124,7 @@ def _draw_horizon(
 def time_figure(content: ReportContent) -> PageFigure | None:
     """Error per instant of prediction of a test run, the commands below on the same axis; None without times."""
     frame = _rows_of_close_up(content.over_time, content)
-    runs, size = spread_items(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), shown_sizes(frame.N_D)[-1]
+    runs, size = spread_items(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), figure_sizes(frame.N_D)[-1]
     if not runs:
         return None
     means = over_seeds(frame[frame.run.isin(runs) & frame.N_D.isin([0, size])], [*LINE_COLUMNS, "run", "t"], ["error"])
@@ -171,15 +171,13 @@ def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFra
     frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
     frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
     kept = frame.model.isin(close_up_models(content)) | frame.source.eq("naive")
-    return frame[kept & frame.N_D.isin([0, *shown_sizes(frame.N_D)])]
+    return frame[kept & frame.N_D.isin([0, *figure_sizes(frame.N_D)])]
 
 
 def _models_of_close_up(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
-    words = (
-        f" Of {total} models, the middle one of each family by A, and the best in validation: {listed_names(shown, 6)}."
-    )
+    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {join_few_names(shown, 6)}."
     return words if len(shown) < total else ""
 
 
@@ -226,7 +224,7 @@ def _names_at_ends(traces: Sequence[Trace]) -> list[dict[str, Any]]:
         key=lambda end: end[:2],
     )
     ends = [ends[i] for i in even_places(len(ends), int(1 / NAME_SHARE))] if ends else []
-    heights = spread_apart([height for height, _, _ in ends], NAME_SHARE * most, 1.1 * most)
+    heights = spread_places([height for height, _, _ in ends], NAME_SHARE * most, 1.1 * most)
     notes = []
     for height, (end, place, trace) in zip(heights, ends, strict=True):
         name, colour = (

@@ -23,7 +23,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import thin_lines
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, word_cell
-from shipid.report.wording import counted_text, distance_text, listed_names, number_text
+from shipid.report.wording import counted_text, distance_text, join_few_names, number_text
 
 TRAINING_COLOUR, TEST_COLOUR, VALIDATION_COLOUR = (category_colour(i) for i in range(3))
 NEAR_PUBLISHED = 0.2  # of the published range: an end this close is met
@@ -52,7 +52,7 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
     bounds = [(float(tracks[column].min()), float(tracks[column].max())) for column in ("east", "north")]
     names, counts = names_in(tracks, "set"), tracks.groupby("set").run.nunique()
     east, north = (distance_text(high - low) for low, high in bounds)
-    runs = listed_names([f"{counted_text(int(counts[name]), 'run')} ({name})" for name in names], 6)
+    runs = join_few_names([f"{counted_text(int(counts[name]), 'run')} ({name})" for name in names], 6)
     return PageFigure(
         id="manoeuvres",
         title="The manoeuvres",
@@ -142,7 +142,7 @@ def _published_words(ours: pd.DataFrame, published: pd.DataFrame) -> str:
             known += bool(pd.notna(value))
             far += [f"{word} of {theirs.quantity}"] * (abs(float(value) - end) > NEAR_PUBLISHED * (high - low))
     text = f"{known - len(far)} of {known} published ends are met within {100 * NEAR_PUBLISHED:.0f} % of the published range"
-    return f"{text}; not {listed_names(far, 6)}." if far else f"{text}."
+    return f"{text}; not {join_few_names(far, 6)}." if far else f"{text}."
 
 
 def _beyond_words(frame: pd.DataFrame) -> str:
@@ -158,7 +158,7 @@ def _beyond_words(frame: pd.DataFrame) -> str:
     if not outside:
         return f"The test stays inside what the other sets cover in all {counted_text(len(tested), 'input')}."
     reach = f"{len(outside)} of {counted_text(len(tested), 'input')}"
-    return f"The test reaches outside what the other sets cover in {reach}: {listed_names(outside)}."
+    return f"The test reaches outside what the other sets cover in {reach}: {join_few_names(outside)}."
 
 
 def input_ranges(content: ReportContent) -> PageTable | None:
@@ -185,7 +185,7 @@ def repairs_table(content: ReportContent) -> PageTable | None:
     if content.repairs.empty:
         return None
     kinds = names_in(content.repairs, "kind")
-    takeaway = f"{counted_text(len(content.repairs), 'repair')}: {listed_names(kinds)}."
+    takeaway = f"{counted_text(len(content.repairs), 'repair')}: {join_few_names(kinds)}."
     return frame_table("repairs", "What the importer repaired", takeaway, content.repairs, REPAIR_COLUMNS)
 
 

@@ -30,7 +30,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import in_words, spread_items
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
-from shipid.report.wording import counted_text, difference_text, listed_names, number_text
+from shipid.report.wording import counted_text, difference_text, join_few_names, number_text
 
 OBSERVER_ROW, OBSERVER_GAP, OBSERVER_MARGIN = (
     118,
@@ -91,7 +91,7 @@ def observer_figure(content: ReportContent) -> PageFigure | None:
         "what the model lacks. The test is the mean squared error of the prediction of each measurement over its "
         "expected square: 1 where the assumptions hold, above it where the observer is too sure. "
         f"{_fade_words(frame)} Dotted upright lines are new orders.",
-        alternative=f"Lines over the time of one test run, one below the other: {listed_names(words, 6)}.",
+        alternative=f"Lines over the time of one test run, one below the other: {join_few_names(words, 6)}.",
         height=OBSERVER_MARGIN + len(rows) * (OBSERVER_ROW + OBSERVER_GAP),
         draw=lambda run: [
             _draw_observer(frame[frame.run.eq(run)], orders.t[orders.run.eq(run)] if len(orders) else (), rows)
@@ -175,7 +175,7 @@ def memory_gain(content: ReportContent) -> PageFigure | None:
         "Windows of one run are alike, so runs are drawn whole; with fewer than five runs there is none. Every "
         "interval is for one comparison alone: of many, one in twenty excludes 0 by chance."
         + (f" Of {total} models, {len(models)} spread over A have lines." if len(models) < total else "")
-        + (f" Not memory alone differs in {listed_names(differing)}." if differing else ""),
+        + (f" Not memory alone differs in {join_few_names(differing)}." if differing else ""),
         alternative="Lines of the position error H over the number of manoeuvres, in pairs with and without memory or "
         "observer; below, the difference of each pair with an interval. The numbers are in the table below.",
         height=640,

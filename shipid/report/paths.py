@@ -37,14 +37,14 @@ from shipid.report.selection import (
     close_up_models,
     data_driven,
     drawn_source,
+    figure_sizes,
     in_words,
     middle_models,
     models_by_accuracy,
-    shown_sizes,
     spread_items,
     thin_lines,
 )
-from shipid.report.wording import counted_text, listed_names, metres_text, number_text
+from shipid.report.wording import counted_text, join_few_names, metres_text, number_text
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
 MOST_SHOWN_WINDOWS = 600  # in all
@@ -74,7 +74,7 @@ def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
 
 def window_sizes(content: ReportContent) -> list[int]:
     """List the N_D a reader can choose from."""
-    return shown_sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
+    return figure_sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
 
 
 def browser_figure(content: ReportContent) -> PageFigure | None:
@@ -385,7 +385,7 @@ def _takeaway_row(content: ReportContent, panels: Sequence[tuple[WindowSnapshot,
             keys = {k for k in window.paths if k[1] == "cooperative" and k[2] == size and k[0] in models}
             means.append(_mean_end_error([window], keys))
         if np.isfinite(means).any():
-            return f"From panel to panel, {words} end {listed_names([number_text(m) for m in means])} m from the true place."
+            return f"From panel to panel, {words} end {join_few_names([number_text(m) for m in means])} m from the true place."
     return "No compensated path was recorded for these windows."
 
 
@@ -396,8 +396,8 @@ def _takeaway_models(window: WindowSnapshot, models: Sequence[str], counts: Sequ
         ends = [number_text(_mean_end_error([window], {(name, "cooperative", size)})) for size in counts]
         alone = _mean_end_error([window], {(name, "physics", 0)})
         physics = f" (physics alone {metres_text(alone)})" if np.isfinite(alone) else ""
-        parts.append(f"{in_words(name)} {listed_names(ends)} m{physics}")
-    numbers = listed_names([str(size) for size in counts])
+        parts.append(f"{in_words(name)} {join_few_names(ends)} m{physics}")
+    numbers = join_few_names([str(size) for size in counts])
     return f"Distance from the true place at the end, with N_D = {numbers}: {'; '.join(parts)}."
 
 

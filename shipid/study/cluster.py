@@ -168,7 +168,7 @@ def _results(
     waiting, given = iter(tasks), None
     try:
         watch.look()  # before anything is sent: what cannot be read ends a worker
-        given = client.submit(_given, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
+        given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         while mistake is None:
             watch.look()
             for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
@@ -211,7 +211,7 @@ def _results(
         raise ShipidError(f"{words}; {KEPT} and larger workers")
 
 
-def _given(shared: Shared) -> Shared:
+def _return_shared(shared: Shared) -> Shared:
     return shared
 
 

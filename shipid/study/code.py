@@ -66,12 +66,14 @@ def _with_imported(file: Path, depth: int) -> set[Path]:
         if one.is_file() and one not in files:
             files.add(one)
             folders = [folder for folder in one.parents if folder.is_relative_to(top)]
-            places = {place for name in _imported(one, top) for folder in folders for place in _places(folder, name)}
+            places = {
+                place for name in _imported_names(one, top) for folder in folders for place in _places(folder, name)
+            }
             left |= {place for place in places if place.is_relative_to(whole)}
     return files
 
 
-def _imported(file: Path, top: Path) -> Iterator[str]:
+def _imported_names(file: Path, top: Path) -> Iterator[str]:
     """Dotted names that a file may import as modules; a relative one is completed, as seen from the folder `top`."""
     try:
         tree = ast.parse(file.read_bytes())

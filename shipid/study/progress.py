@@ -16,7 +16,7 @@ BEGUN, COUNTED, TRIED = 0, 2, 4  # entries of Optuna's journal: a study, an attr
 
 
 @dataclass(frozen=True)
-class Searching:
+class SearchProgress:
     """A search that goes on: its cell, how many trials have ended, how many there will be, and the best value [m^2].
 
     count : None where a budget has not yet been turned into a number. best : inf where no trial has a value.
@@ -51,14 +51,14 @@ class Watch:
         }
         self._ends: dict[Path, int] = {}
         self._cells: dict[Path, list[str]] = {}
-        self._searches: dict[Path, dict[str, Searching]] = {}  # parts of a study have cells of the same names
+        self._searches: dict[Path, dict[str, SearchProgress]] = {}  # parts of a study have cells of the same names
         self._last: dict[tuple[Path, str], int] = {}
         self._looks = 0
 
-    def look(self) -> list[Searching]:
+    def look(self) -> list[SearchProgress]:
         """Return the searches that go on, those that were written to last first; none of units that are finished."""
         self._looks += 1
-        left: list[tuple[int, Searching]] = []
+        left: list[tuple[int, SearchProgress]] = []
         for folder, trials in self._trials.items():
             finished = seals.seal_names(folder)
             for file in (folder / JOURNALS).glob("*.log"):
@@ -94,9 +94,9 @@ class Watch:
             except (ValueError, KeyError, IndexError, TypeError):
                 continue  # half a line, or an entry of someone else
 
-    def _known(self, file: Path, cell: str, trials: Mapping[str, int | None]) -> Searching:
+    def _known(self, file: Path, cell: str, trials: Mapping[str, int | None]) -> SearchProgress:
         method = next((name for name in trials if f"{WITH}{name}-N" in cell), "")
-        return self._searches.get(file, {}).get(cell) or Searching(cell, 0, trials.get(method), inf)
+        return self._searches.get(file, {}).get(cell) or SearchProgress(cell, 0, trials.get(method), inf)
 
     def _count(self, file: Path, cell: str, count: int, trials: Mapping[str, int | None]) -> None:
         self._keep(file, replace(self._known(file, cell, trials), count=count))
@@ -105,6 +105,6 @@ class Watch:
         known = self._known(file, cell, trials)
         self._keep(file, replace(known, done=known.done + 1, best=min(known.best, inf if value is None else value)))
 
-    def _keep(self, file: Path, now: Searching) -> None:
+    def _keep(self, file: Path, now: SearchProgress) -> None:
         self._searches.setdefault(file, {})[now.cell] = now
         self._last[file, now.cell] = self._looks

@@ -60,7 +60,7 @@ def test_the_outline_of_a_band_is_closed_and_where_its_region_ends() -> None:
     ahead = np.broadcast_to([1.0, 0.0], (3, 1, 2))
     region = Region(ahead, np.full((3, 1), 2.0), np.full((3, 1), 1.0))
     path = np.array([[[1.0, 0.0]], [[2.0, 0.0]], [[3.0, 0.0]]])
-    outline = frames.band_outline(region, path, 0)
+    outline = frames.region_outline(region, path, 0)
     np.testing.assert_array_equal(outline[0], outline[-1])
     np.testing.assert_allclose(outline.max(axis=0), [5.0, 1.0])
     np.testing.assert_allclose(outline.min(axis=0), [0.0, -1.0])
@@ -176,9 +176,9 @@ def test_a_diverged_model_is_marked_and_left_out_of_curves(read: Results) -> Non
 
 def test_curves_and_paths_are_kept_for_three_amounts(read: Results) -> None:
     many = pd.concat([read.cells.assign(N_D=10 * k) for k in range(1, 11)], ignore_index=True)
-    assert frames.shown_amounts(replace(read, cells=many)) == [10, 30, 100]
-    assert frames.shown_amounts(read) == [4, 6]
-    assert frames.shown_amounts(replace(read, cells=read.cells[read.cells["N_D"] == 4])) == [4]
+    assert frames.figure_amounts(replace(read, cells=many)) == [10, 30, 100]
+    assert frames.figure_amounts(read) == [4, 6]
+    assert frames.figure_amounts(replace(read, cells=read.cells[read.cells["N_D"] == 4])) == [4]
     middle = pd.concat([read.cells.assign(N_D=amount) for amount in (4, 5, 6, 50)], ignore_index=True)
     shown = replace(read, cells=middle)
     for frame in (frames.horizon_frame(shown), frames.time_frame(shown)):
@@ -238,7 +238,7 @@ def test_of_many_test_runs_those_at_even_distances_are_shown(seed: int) -> None:
     for many in (count, frames.FEW_RUNS, 3):
         names = [f"R{place:03d}" for place in range(many)]
         results = SimpleNamespace(test=SimpleNamespace(spans=dict.fromkeys(names)))
-        shown = frames.shown_runs(results)  # type: ignore[arg-type]
+        shown = frames.figure_runs(results)  # type: ignore[arg-type]
         places = [names.index(name) for name in shown]
         assert len(shown) == min(many, frames.FEW_RUNS)
         assert (places[0], places[-1]) == (0, many - 1)

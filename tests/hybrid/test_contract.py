@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import pytest
 
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.contract import fault_of_corrector
-from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS, method_kind, method_of
-from shipid.hybrid.settings import Searched
+from shipid.hybrid.settings import SearchMethod
 
 
 class Shift:
@@ -38,21 +38,21 @@ class Shift:
         return cls()
 
 
-class Mine(Searched):
+class Mine(SearchMethod):
     """A method with all that is asked."""
 
     corrector: ClassVar[type[Any]] = Shift
     SEARCHED: ClassVar[tuple[str, ...]] = ("width",)
     width: float = 1.0
 
-    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+    def fit(self, task: Task) -> dict[str, FitResult]:  # noqa: ARG002
         return {}
 
 
 class Bare(Method):
     """A method without a corrector."""
 
-    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+    def fit(self, task: Task) -> dict[str, FitResult]:  # noqa: ARG002
         return {}
 
 
@@ -122,5 +122,5 @@ def test_what_a_corrector_lacks_is_said(name: str) -> None:
     assert fault_of_corrector(held) == f"Held in {__file__} lacks `{name}`"
     setattr(held, name, 3)
     assert fault_of_corrector(held) == ""
-    assert fault_of_corrector(Shift()) == fault_of_corrector(Unchanged({})) == ""
+    assert fault_of_corrector(Shift()) == fault_of_corrector(UnchangedPath({})) == ""
     assert fault_of_corrector(Shift).startswith("the corrector must be an object of Shift in ")

@@ -17,8 +17,8 @@ from shipid.hybrid.methods import METHODS, method_of
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, Search, SearchedAlone, affordable_trials
-from shipid.hybrid.settings import Searched
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.settings import SearchMethod
+from shipid.hybrid.stored import StoredData
 from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, ship, world
 
@@ -37,7 +37,7 @@ QUICK: dict[str, dict[str, Any]] = {
 
 
 DOCUMENTED = "linear"  # the method of docs/extending.md
-SEARCHING = [kind for kind, method in METHODS.items() if issubclass(method, Searched)] + [DOCUMENTED]
+SEARCHING = [kind for kind, method in METHODS.items() if issubclass(method, SearchMethod)] + [DOCUMENTED]
 
 
 @pytest.fixture(autouse=True)
@@ -181,7 +181,7 @@ class CountingProblem(LearningProblem):
 
 
 @dataclass(frozen=True)
-class Moved(Stored):
+class Moved(StoredData):
     hyperparameters: Any
     past: float
     metres: float

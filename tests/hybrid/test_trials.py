@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pydantic import PositiveInt
 
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.method import Fitted
+from shipid.hybrid.method import FitResult
 from shipid.hybrid.one_step import OneStep
-from shipid.hybrid.settings import Scale, Searched
+from shipid.hybrid.settings import Scale, SearchMethod
 from shipid.hybrid.trials import (
     diverged_result,
     fit_each,
@@ -34,7 +34,7 @@ def task(**options):
     return task_of(RUNS, (), targets, FOLDS, 0, **options)
 
 
-class Counting(Searched):
+class Counting(SearchMethod):
     """Whole numbers, shares, and a number by its logarithm."""
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("neighbours", "share", "width")
@@ -83,7 +83,7 @@ def test_every_foundation_is_fitted_or_has_diverged():
 
     def fit(name):
         asked.append(name)
-        return Fitted(Unchanged({}), [], 1.0)
+        return FitResult(UnchangedPath({}), [], 1.0)
 
     fitted = fit_each(here, OneStep(), lambda: [{"a": 1.0}, {"a": 2.0}], fit)
     assert asked == ["other"]

@@ -13,7 +13,7 @@ from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
 from shipid.identification.design import (
     Candidate,
-    Informed,
+    InformedCandidate,
     Limits,
     _cut_predictions,
     candidate_manoeuvres,
@@ -47,7 +47,7 @@ CHOICE = candidate_manoeuvres(SHIP, [3.0])
 
 
 @cache
-def informed_choice() -> list[Informed]:
+def informed_choice() -> list[InformedCandidate]:
     """What each candidate tells of the four factors."""
     return information_of_candidates(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
 
@@ -59,7 +59,7 @@ def kind(title: str) -> str:
 def alone(path: str, by: str) -> list[str]:
     """Manoeuvres in order, for one factor that is the only one unknown."""
     j = PATHS.index(path)
-    single = [Informed(one.candidate, one.information[j : j + 1, j : j + 1]) for one in informed_choice()]
+    single = [InformedCandidate(one.candidate, one.information[j : j + 1, j : j + 1]) for one in informed_choice()]
     return list(rank_candidates(single, (path,)).sort_values(by, ascending=False)["manoeuvre"])
 
 
@@ -83,7 +83,7 @@ def test_information_adds() -> None:
     first = informed_choice()[0]
     then = rank_candidates(informed_choice(), PATHS, first.information).set_index("manoeuvre")
     other = informed_choice()[1]
-    both = Informed(other.candidate, first.information + other.information)
+    both = InformedCandidate(other.candidate, first.information + other.information)
     assert rank_candidates([both], PATHS)["gain"][0] == pytest.approx(
         table["gain"][first.candidate.title] + then["gain"][other.candidate.title]
     )
@@ -94,7 +94,7 @@ def test_information_adds() -> None:
 def test_ranks_do_not_depend_on_scales_of_factors() -> None:
     """Gains are ratios of determinants: with the present information scaled alike, they are the same."""
     scale, there = np.diag([1e3, 1.0, 1e-2, 5.0]), np.diag([4.0, 25.0, 9.0, 1e4])
-    scaled = [Informed(one.candidate, scale @ one.information @ scale) for one in informed_choice()]
+    scaled = [InformedCandidate(one.candidate, scale @ one.information @ scale) for one in informed_choice()]
     one = rank_candidates(informed_choice(), PATHS, there - np.eye(4))
     other = rank_candidates(scaled, PATHS, scale @ there @ scale - np.eye(4))
     assert list(one["manoeuvre"]) == list(other["manoeuvre"])
@@ -110,7 +110,7 @@ def test_twice_the_value_is_twice_the_sensitivity() -> None:
 
 
 def test_the_gain_of_one_factor_is_what_its_standard_error_shrinks_by() -> None:
-    single = [Informed(one.candidate, one.information[:1, :1]) for one in informed_choice()]
+    single = [InformedCandidate(one.candidate, one.information[:1, :1]) for one in informed_choice()]
     table = rank_candidates(single, PATHS[:1])
     np.testing.assert_allclose(table["gain"], np.log2(table["before"] / table["after"]), rtol=1e-6)
     assert table["per_hour"].is_monotonic_decreasing

@@ -65,7 +65,7 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     table = bands.coverage_table(banded)
     assert table is not None
     assert "needs 9 runs" in table.takeaway
-    worst = bands.coverage_by_run(banded)
+    worst = bands.table_of_run_coverage(banded)
     assert worst is not None
     assert worst.rows[0][0].text == "M003"
 

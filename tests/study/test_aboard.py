@@ -11,7 +11,7 @@ import pytest
 from shipid.data.dataset import Dataset, read_dataset, stretches_of_runs, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.features import Memory
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
@@ -54,7 +54,7 @@ def banded(tmp_path_factory):
     bands = bands_of(rng, physics, instants, names, 1.0)
     bands = replace(bands, runs=10, kinds={"zigzag": 4}, by_kind=2 * bands.whole[None], far=100.0, slopes=np.zeros(5))
     fitted = Predictor(
-        physics, "alone", Unchanged({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known",
+        physics, "alone", UnchangedPath({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known",
         bands=replace(bands, along=50.0 * np.arange(1, 5), across=30.0 * np.arange(1, 5)),
     )  # fmt: skip
     return fitted, fitted.save(tmp_path_factory.mktemp("cell") / "banded.npz")
@@ -64,7 +64,7 @@ def banded(tmp_path_factory):
 def predictor(tmp_path_factory):
     physics = Physics(load_vessel("mariner"), 4, STEP, "rk4")
     file = tmp_path_factory.mktemp("cell") / "cell.npz"
-    return Predictor(physics, "alone", Unchanged({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known").save(file)
+    return Predictor(physics, "alone", UnchangedPath({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known").save(file)
 
 
 def saved(frame, folder):
@@ -276,7 +276,7 @@ def test_where_the_log_has_no_rows_there_is_no_error(banded, tmp_path):
 
 def test_errors_on_a_coarse_log_are_those_of_the_ship(tmp_path):
     """In a turn with rows 5 s apart and a step of 1 s errors are as with rows of 1 s, not those to a chord."""
-    steady = Predictor(Physics(None, 10, 1.0), "alone", Unchanged({}), {}, {}).save(tmp_path / "cell.npz")
+    steady = Predictor(Physics(None, 10, 1.0), "alone", UnchangedPath({}), {}, {}).save(tmp_path / "cell.npz")
     many, few = (
         play_aboard(
             steady, write_dataset(as_dataset(turning(np.arange(0.0, 101.0, apart), u=7.0)), tmp_path / "log.parquet")

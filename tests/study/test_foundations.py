@@ -24,7 +24,7 @@ from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
 from shipid.study.cells import accuracy_of
 from shipid.study.foundations import predictions
-from shipid.study.plan import Batch, Plan, fitted_families, judged_method, whole_unit
+from shipid.study.plan import Batch, Plan, fitted_families, verdict_method, whole_unit
 from shipid.study.prepare import instants_of, prepare, rows_apart_from_test
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
@@ -336,5 +336,5 @@ def test_the_prediction_of_the_study_is_the_default(recorded: Recorded) -> None:
     assert settings is not None
     assert (settings.horizon, settings.step, settings.method) == (5.0, 1.0, "euler")
     assert fitted_families(plan) == {"fitted"}
-    assert judged_method(plan) == "drawn"
+    assert verdict_method(plan) == "drawn"
     assert Batch(3, 0) in plan.batches

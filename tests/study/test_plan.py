@@ -27,13 +27,13 @@ from shipid.study.plan import (
     drawn_conditions,
     fitted_families,
     input_files,
-    judged_method,
     model_label,
     past_steps,
     plain_rival,
     plan_text,
     read_plan,
     run_command,
+    verdict_method,
 )
 from shipid.study.prepare import all_windows, obtain_runs
 from shipid.study.schema import Data
@@ -76,7 +76,7 @@ def test_every_bundled_study_is_tested() -> None:
 @pytest.mark.parametrize("name", ["quick", "full-scale", "zigzags", "constant-orders", "changing-orders"])
 def test_the_default_looks_back_and_loses_no_window_of_a_simulation(name: str) -> None:
     plan = read_plan(name)
-    judged = next(way.method for way in plan.methods if way.name == judged_method(plan))
+    judged = next(way.method for way in plan.methods if way.name == verdict_method(plan))
     assert isinstance(judged, PathDrawn)
     assert judged.choose
     assert {"history", "turned", "error"} <= judged.memory.model_fields_set
@@ -137,7 +137,7 @@ def test_worlds_of_memory_have_every_member_with_and_without_an_observer(name: s
     assert [one.variant for one in plain] == [one.variant for one in observed]
     assert len(plan.foundations) == 2 * 5 + 1
     assert past_steps(plan) == 20
-    assert judged_method(plan) == "memory"
+    assert verdict_method(plan) == "memory"
     assert plan.cells == (3 * 11 - 1) * 3 * 2  # physics alone does not meet `none`
 
 
@@ -424,7 +424,7 @@ def test_the_judged_method_is_the_first_that_learns_beside_physics(tmp_path: Pat
     still = {"name": "still", "kind": "alone"}
     both = tiny_plan(tmp_path, {"method": [alone, {"name": "drawn", **drawn}]})
     plans = both, tiny_plan(tmp_path, {"method": [alone, still]})
-    assert [judged_method(plan) for plan in plans] == ["drawn", "plain"]
+    assert [verdict_method(plan) for plan in plans] == ["drawn", "plain"]
 
 
 def test_a_digest_says_what_is_in_every_file_that_a_study_reads(tmp_path: Path) -> None:

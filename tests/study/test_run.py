@@ -22,7 +22,7 @@ from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import TEMPORARY, read_json, write_json
-from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.trials import trial_row
@@ -342,8 +342,8 @@ def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.Mo
     """One model without a compensator: its row says so, the others keep their results, the report's frames stand."""
     fit = PathDrawn.fit
 
-    def failing(method: PathDrawn, task: Task) -> dict[str, Fitted]:
-        return fit(method, task) | {"wrong-1": Fitted(None, [], 0.0)}
+    def failing(method: PathDrawn, task: Task) -> dict[str, FitResult]:
+        return fit(method, task) | {"wrong-1": FitResult(None, [], 0.0)}
 
     monkeypatch.setattr(PathDrawn, "fit", failing)
     run_here(tiny_plan(tmp_path), tmp_path / "run")
@@ -592,9 +592,9 @@ def test_methods_are_fitted_with_the_seed_of_their_batch(tmp_path: Path, monkeyp
     """Weights are drawn anew for each seed of the grid, not the order of the runs alone."""
     plan, seen = tiny_plan(tmp_path, {"grid.seeds": [3, 8], "grid.N_D": [4]}), []
 
-    def fit(_: PathDrawn, task: Task) -> dict[str, Fitted]:
+    def fit(_: PathDrawn, task: Task) -> dict[str, FitResult]:
         seen.append(task.seed)
-        return {name: Fitted(None, [], 0.0) for name in task.cases}
+        return {name: FitResult(None, [], 0.0) for name in task.cases}
 
     monkeypatch.setattr(PathDrawn, "fit", fit)
     prepared = prepare(plan, obtain_runs(plan))
@@ -637,12 +637,12 @@ class Faulty(Method):
 
     corrector: ClassVar[type[Any]] = Moved
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         if MISTAKE == "few runs":
             raise DataError("too few runs:\nmake more")
         given = SimpleNamespace(**vars(Moved({})), predict=None) if MISTAKE == "lacks" else Moved({})
         rows = {"no trial": [], "NaN": [trial_row(0, {}, 1.0, 0.0) | {"value": np.nan}]}
-        return dict.fromkeys(task.cases, Fitted(given, rows.get(MISTAKE, [trial_row(0, {}, 1.0, 0.0)]), 0.0))
+        return dict.fromkeys(task.cases, FitResult(given, rows.get(MISTAKE, [trial_row(0, {}, 1.0, 0.0)]), 0.0))
 
 
 def faulty_plan(folder: Path, monkeypatch: pytest.MonkeyPatch, mistake: str) -> Plan:
