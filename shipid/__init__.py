@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.hybrid.alone import Alone as Alone
     from shipid.hybrid.learned_force import LearnedForce as LearnedForce
     from shipid.hybrid.method import Case as Case
-    from shipid.hybrid.method import Fitted as Fitted
+    from shipid.hybrid.method import FitResult as FitResult
     from shipid.hybrid.method import Task as Task
     from shipid.hybrid.path_drawn import PathDrawn as PathDrawn
     from shipid.hybrid.path_trained import PathTrained as PathTrained
@@ -74,7 +74,7 @@ _PUBLIC = {
     "Comparison": "shipid.answer.compare",
     "Dataset": "shipid.data.dataset",
     "Family": "shipid.vessel.perturb",
-    "Fitted": "shipid.hybrid.method",
+    "FitResult": "shipid.hybrid.method",
     "Identify": "shipid.identification.settings",
     "Instants": "shipid.data.windows",
     "LearnedForce": "shipid.hybrid.learned_force",

@@ -30,7 +30,7 @@ from shipid.report.manoeuvre import ManoeuvreContent
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
-    from shipid.identification.outcome import Identified
+    from shipid.identification.outcome import Identification
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
@@ -161,27 +161,29 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
     return _draw(checks.checked_motion(content.series), [run], dark=dark)
 
 
-def estimates(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def estimates(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Estimates of an identification with 95 % intervals, as factors on the base values."""
     return _draw(identification.estimates_figure(_identification(source)), dark=dark)
 
 
-def correlations(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def correlations(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Correlations of the estimates of an identification; needs two of them."""
     return _draw(identification.correlations_figure(_identification(source)), dark=dark)
 
 
-def free_runs(source: Identified | IdentificationContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
+def free_runs(
+    source: Identification | IdentificationContent, run: str | None = None, *, dark: bool = False
+) -> go.Figure:
     """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
     return _draw(identification.free_runs_figure(_identification(source)), [run], dark=dark)
 
 
-def residuals(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def residuals(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Autocorrelation of the residuals of an identification."""
     return _draw(identification.residuals_figure(_identification(source)), dark=dark)
 
 
-def profiles(source: Identified | IdentificationContent, *, dark: bool = False) -> go.Figure:
+def profiles(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Profile likelihoods of an identification, of the paths that were asked for."""
     return _draw(identification.profiles_figure(_identification(source)), dark=dark)
 
@@ -236,13 +238,13 @@ def content_of(source: Source) -> ReportContent:
     return report_content(source)
 
 
-def _identification(source: Identified | IdentificationContent) -> IdentificationContent:
+def _identification(source: Identification | IdentificationContent) -> IdentificationContent:
     if isinstance(source, IdentificationContent):
         return source
     from shipid.identification.contents import identification_content
-    from shipid.identification.outcome import Identified
+    from shipid.identification.outcome import Identification
 
-    check_class("source", source, Identified, "as of `run_identification`")
+    check_class("source", source, Identification, "as of `run_identification`")
     return identification_content(source, "")
 
 

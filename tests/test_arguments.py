@@ -14,7 +14,7 @@ import shipid
 from shipid.arguments import as_float_array, as_names, check_number, check_positive, check_whole_number, whole_steps
 from shipid.errors import DataError, ShipidError
 from shipid.export.write import export_predictor, export_vessel
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.observer import filter_bank, run_observer
 from shipid.vessel.dynamics import vessel_dynamics
 
@@ -110,7 +110,7 @@ LOG = shipid.perform_manoeuvres(SHIP, STRAIGHT, step=1.0, duration=60.0)
 DATA = shipid.Dataset(LOG[[name for name in LOG if not str(name).startswith("actual.")]], {})
 WINDOWS = shipid.cut_windows(DATA, horizon=3, step=1.0)
 PHYSICS = shipid.Physics(SHIP, 3, 1.0)
-PREDICTOR = shipid.Predictor(PHYSICS, "alone", Unchanged({}))
+PREDICTOR = shipid.Predictor(PHYSICS, "alone", UnchangedPath({}))
 IDENTIFY = shipid.Identify(parameters=["hull.abkowitz.X_vv"])
 
 

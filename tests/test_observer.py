@@ -23,7 +23,7 @@ from shipid.engine import samples
 from shipid.engine.native import find_compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.metrics import position_error
 from shipid.observer import (
@@ -385,7 +385,7 @@ def test_a_band_is_promised_once_the_observer_has_run_as_long_as_in_training() -
     windows, bands = cut_windows(log, horizon=8, interval=0.7), made(0)[1]
     physics = Physics(vessel, 8, 1.0, "rk4", Observer(waves=(0.0,), change=(1.0,)))
     columns = estimates_at_windows(log, run_observer(vessel, log, physics.observer), windows)
-    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-50.0, 50.0)}, bands=bands, run_up=9.0)
+    predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (-50.0, 50.0)}, bands=bands, run_up=9.0)
     since = windows.t - np.where((windows.run == "a") & (windows.t >= 20), 20.0, 0.0)
     prediction = predictor.predict(windows.instants(estimates=columns), level=0.5)
     np.testing.assert_array_equal(prediction.outside, since < 9.0 - 1e-3)

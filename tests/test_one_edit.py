@@ -44,7 +44,7 @@ from shipid.simulation.standard import define_standard
 from shipid.simulation.truth import Truth, simulate_truth
 from shipid.study.envelope import envelope_table
 from shipid.study.plan import Plan, build_plan, orders_may_react
-from shipid.study.schema import Published
+from shipid.study.schema import PublishedEnvelope
 from shipid.units import DEGREE
 from shipid.vessel import perturb
 from shipid.vessel.dynamics import vessel_dynamics
@@ -156,7 +156,7 @@ def test_a_guess_knows_its_name_and_unit(tmp_path: Path, unit: str) -> None:
 @pytest.mark.usefixtures("flap")
 def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
     rows = [{"set": "D_4", "quantity": "tail.flap", "min": -0.1, "mean": 0.0, "max": 0.2}]
-    published = Published(source="a table", envelope={"flap_deg": (-6.0, 0.0, 12.0)})
+    published = PublishedEnvelope(source="a table", envelope={"flap_deg": (-6.0, 0.0, 12.0)})
     table = envelope_table(rows, published).set_index("set")
     assert set(table["unit"]) == {"deg"}
     assert table.loc["D_4", "max"] == pytest.approx(np.degrees(0.2))

@@ -15,7 +15,7 @@ import pytest
 from shipid.data.dataset import Dataset, read_dataset, write_dataset
 from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
@@ -51,7 +51,9 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
     """Each field has a value that is not its default, so that none can be left out of the file."""
     physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity")
     bands = made(0)[1]
-    first = Predictor(physics, "alone", Unchanged({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands, 7.0)
+    first = Predictor(
+        physics, "alone", UnchangedPath({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands, 7.0
+    )
     for one in (first, physics):
         for place in fields(one):
             value = getattr(one, place.name)
@@ -70,7 +72,7 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
 def test_what_a_user_notes_of_the_origin_is_saved(tmp_path: Path) -> None:
     """Before, a number of NumPy's, a date or a path among it ended in a TypeError."""
     noted = {"runs": np.int64(3), "mean": np.array([1.0, 2.0]), "day": date(2026, 11, 26), "log": Path("trials.csv")}
-    one = Predictor(Physics(load_vessel("mariner"), 3, 0.5), "alone", Unchanged({}), provenance=noted)
+    one = Predictor(Physics(load_vessel("mariner"), 3, 0.5), "alone", UnchangedPath({}), provenance=noted)
     known = Predictor.load(one.save(tmp_path / "one.npz")).provenance
     assert known == {"runs": 3, "mean": [1.0, 2.0], "day": "2026-11-26", "log": "trials.csv"}
 
@@ -111,7 +113,7 @@ def test_physics_alone_and_compensation_alone(tiny_run: Path, predictor: Predict
     instants = read_test(tiny_run)[0].instants()
     compensator, physics = predictor.corrector, predictor.physics
     assert isinstance(compensator, Compensator)
-    alone = Predictor(physics, "alone", Unchanged({}))
+    alone = Predictor(physics, "alone", UnchangedPath({}))
     pure = Predictor(replace(physics, vessel=None), "path-drawn", compensator)
     np.testing.assert_array_equal(alone.predict(instants), predictor.alone(instants))
     table = compensator.inputs.table(physics, instants)
@@ -280,7 +282,7 @@ def test_errors_along_the_test_runs_are_the_studys(tmp_path: Path, tiny_run: Pat
 def test_a_log_is_predicted_by_what_was_known(tmp_path: Path) -> None:
     """Speeds interpolated between fixes: another fix at 12 s changes no path that begins up to 10 s."""
     physics = Physics(load_vessel("gunnerus-28.9"), 5, 1.0)
-    Predictor(physics, "alone", Unchanged({}), causal=("u",)).save(cell_file(tmp_path, "one"))
+    Predictor(physics, "alone", UnchangedPath({}), causal=("u",)).save(cell_file(tmp_path, "one"))
     t, fixes = np.arange(31.0), np.arange(0.0, 31.0, 3.0)
     frames = []
     for later in (0.0, 1.0):

@@ -16,10 +16,10 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Instants, Windows, cut_windows
 from shipid.errors import DataError, ShipidError
-from shipid.hybrid.alone import Alone, Unchanged
+from shipid.hybrid.alone import Alone, UnchangedPath
 from shipid.hybrid.features import Memory
 from shipid.hybrid.forest import Forest
-from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
@@ -105,7 +105,7 @@ def test_held_commands_are_never_those_of_the_plan() -> None:
     ship = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
     now = WINDOWS.instants()
     planned = replace(now, planned={name: values + 0.5 for name, values in WINDOWS.planned.items()})
-    held = Predictor(ship, "alone", Unchanged({}))
+    held = Predictor(ship, "alone", UnchangedPath({}))
     known = replace(held, commands="known")
     np.testing.assert_array_equal(held.predict(planned), held.predict(now))
     np.testing.assert_array_equal(held.alone(planned), held.alone(now))
@@ -115,9 +115,9 @@ def test_held_commands_are_never_those_of_the_plan() -> None:
 class Shared(Method):
     """A method that holds out a fifth of the runs."""
 
-    corrector: ClassVar[type[Any]] = Unchanged
+    corrector: ClassVar[type[Any]] = UnchangedPath
 
-    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+    def fit(self, task: Task) -> dict[str, FitResult]:  # noqa: ARG002
         return {}
 
 
@@ -125,7 +125,7 @@ def test_a_method_without_a_name_is_refused_before_it_is_fitted() -> None:
     """A class that a user wrote, or one derived from a method of shipid: what it gave could not be saved."""
 
     class Mine(PathDrawn):
-        def fit(self, task: Task) -> dict[str, Fitted]:
+        def fit(self, task: Task) -> dict[str, FitResult]:
             raise AssertionError(task)
 
     for method, name in ((Shared(), "Shared"), (Mine(), "Mine")):
@@ -302,11 +302,11 @@ def test_a_method_changes_no_array_that_others_have(predict: Any) -> None:
 
 def test_a_method_changes_no_window_that_others_are_fitted_to(monkeypatch: pytest.MonkeyPatch) -> None:
     class Greedy(Shared):
-        def fit(self, task: Task) -> dict[str, Fitted]:
+        def fit(self, task: Task) -> dict[str, FitResult]:
             for array in (task.windows.future, task.windows.columns["u"], task.cases["none"].paths):
                 with pytest.raises(ValueError, match="read-only"):
                     array += 1.0
-            return {"none": Fitted(Unchanged({}), [trial_row(0, {}, 1.0, 0.0)], 0.0)}
+            return {"none": FitResult(UnchangedPath({}), [trial_row(0, {}, 1.0, 0.0)], 0.0)}
 
     monkeypatch.setitem(METHODS, "greedy", Greedy)
     fit(Greedy(), NONE, WINDOWS)

@@ -17,7 +17,7 @@ from shipid.evidence import share_interval
 from shipid.hybrid.bands import Region
 from shipid.metrics import coverage_share
 from shipid.predictor import NO_BAND
-from shipid.report.wording import listed_names
+from shipid.report.wording import join_few_names
 from shipid.study.results import Results
 from shipid.units import level_text, percent_text, plural_word
 
@@ -132,7 +132,7 @@ def answer_on_bands(results: Results) -> list[tuple[str, str]]:
     new = set(groups.loc[groups["note"].eq(NEW_KIND), "group"])
     sentences = [(sentence, "coverage")]
     if new:
-        text = f"Nothing is promised for {listed_names(sorted(new))}: no such run calibrated the bands."
+        text = f"Nothing is promised for {join_few_names(sorted(new))}: no such run calibrated the bands."
         sentences.append((text, "coverage-groups"))
     return sentences
 
@@ -141,7 +141,7 @@ def of_methods(results: Results, names: Sequence[str]) -> str:
     """Say whose bands are meant, ` of the method 'drawn'`; nothing in a study of one method."""
     if len(results.plan.methods) == 1:
         return ""
-    return f" of the {plural_word(len(names), 'method')} {listed_names([repr(str(name)) for name in names])}"
+    return f" of the {plural_word(len(names), 'method')} {join_few_names([repr(str(name)) for name in names])}"
 
 
 def refused_frame(results: Results) -> pd.DataFrame:

@@ -43,9 +43,9 @@ from shipid.answer.findings_simulation import (
 from shipid.answer.verdict import (
     EQUAL_A,
     ClaimRule,
-    JudgedClaim,
+    ClaimVerdict,
     Judgement,
-    Undecided,
+    UndecidedClaim,
     count_manoeuvres,
     difference_with_interval,
     judge_claims,
@@ -58,9 +58,9 @@ from shipid.answer.verdict import (
 )
 from shipid.evidence import Differences, all_significant, any_significant, paired_difference, share_interval
 from shipid.metrics import coverage_share, position_error, rank_correlation
-from shipid.report.wording import listed_names
+from shipid.report.wording import join_few_names
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import judged_method, unfair_reason
+from shipid.study.plan import unfair_reason, verdict_method
 from shipid.study.results import Results
 from shipid.units import level_text, percent_text
 
@@ -169,13 +169,13 @@ FULL_SCALE_RULES = {
 }
 
 
-def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[JudgedClaim]:
+def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[ClaimVerdict]:
     """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval, which needs a remedy."""
     few = too_few_manoeuvres(rivals.table.runs)
     return judge_claims(FULL_SCALE_RULES, rivals, f"{few}: {remedy}" if few else count_manoeuvres(rivals.table.runs))
 
 
-def full_scale_findings(results: Results) -> list[JudgedClaim]:
+def full_scale_findings(results: Results) -> list[ClaimVerdict]:
     """R1-R4 on the test manoeuvres of a study."""
     claims = results.plan.study.claims
     assert claims is not None
@@ -246,7 +246,7 @@ class BandEvidence:
     shares: Sequence[float] = ()
 
 
-def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[JudgedClaim]:
+def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[ClaimVerdict]:
     """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
 
     rivals : as in `Widths`.
@@ -256,7 +256,7 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     level, run, of = (
         results.plan.study.bands.level,
         results.test.run,
-        of_methods(results, [judged_method(results.plan)]),
+        of_methods(results, [verdict_method(results.plan)]),
     )
     widths, held = {}, {}
     for row, by_level, apart in cell_regions(results, [level]):
@@ -340,10 +340,10 @@ def _judge_promise(bands: BandEvidence) -> Judgement:
         like = np.isin(promise.kinds, list(promise.calibrated))
         these, count = sorted(set(promise.kinds[~like])), len(set(promise.run[~like]))
         if count:
-            left_out = f"no run of the kind {listed_names(these)} calibrated them, so they promise nothing for "
+            left_out = f"no run of the kind {join_few_names(these)} calibrated them, so they promise nothing for "
             left_out += count_manoeuvres(count)
         if not like.any():
-            raise Undecided(left_out)
+            raise UndecidedClaim(left_out)
         promise = replace(promise, held=promise.held[like], run=promise.run[like])
     decided, evidence, numbers = judge_held_share(promise)
     return decided, f"{evidence}; {left_out}" if left_out else evidence, numbers
@@ -367,7 +367,7 @@ BAND_RULES: dict[str, ClaimRule[BandEvidence]] = {
 }
 
 
-def judge_findings(results: Results) -> list[JudgedClaim]:
+def judge_findings(results: Results) -> list[ClaimVerdict]:
     """Verdicts on what the study claims: R1-R4 (method, section 5), S1-S7 (section 4), both or none; then B1-B2."""
     claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
@@ -376,7 +376,7 @@ def judge_findings(results: Results) -> list[JudgedClaim]:
     rivals, simulated = claims.accurate is not None, claims.moderate is not None
     roles = (claims.moderate, claims.high) if simulated else (claims.accurate, claims.inaccurate)
     physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]
-    verdicts: list[JudgedClaim] = []
+    verdicts: list[ClaimVerdict] = []
     if rivals:
         verdicts += leave_undecided(FULL_SCALE_RULES, unfair) if unfair else full_scale_findings(results)
     if simulated:

@@ -37,9 +37,9 @@ from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, Metri
 from shipid.answer.verdict import (
     SAME_A,
     ClaimRule,
-    JudgedClaim,
+    ClaimVerdict,
     Judgement,
-    Undecided,
+    UndecidedClaim,
     Verdict,
     count_manoeuvres,
     difference_with_interval,
@@ -67,9 +67,9 @@ from shipid.evidence import (
     which_significant,
 )
 from shipid.metrics import path_roughness, rank_correlation
-from shipid.report.wording import listed_names
+from shipid.report.wording import join_few_names
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import judged_method
+from shipid.study.plan import verdict_method
 from shipid.study.results import Results
 from shipid.units import percent_text, plural_word
 
@@ -103,15 +103,15 @@ class ErrorGrid:
         """Members of a family with a result in every cell, of both for `physics`; Undecided without one."""
         names: tuple[str, ...] = getattr(self, family)
         if not names:
-            raise Undecided(f"no {family} model has a result in every cell")
+            raise UndecidedClaim(f"no {family} model has a result in every cell")
         return names
 
 
-def simulation_findings(results: Results) -> list[JudgedClaim]:
+def simulation_findings(results: Results) -> list[ClaimVerdict]:
     """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
     try:
         grid = read_grid(results)
-    except Undecided as reason:
+    except UndecidedClaim as reason:
         return leave_undecided(SIMULATION_RULES, str(reason))
     left_out = f"left out for want of results: {model_list(grid.left_out)}" if grid.left_out else ""
     notes = [note for note in (too_few_manoeuvres(grid.table.runs), left_out) if note]
@@ -123,13 +123,13 @@ def read_grid(results: Results) -> ErrorGrid:
     claims, cells = results.plan.study.claims, results.judged_cells
     assert claims is not None
     if not results.complete:
-        raise Undecided(results.missing)
+        raise UndecidedClaim(results.missing)
     if NO_MODEL not in set(cells["model"]):
-        raise Undecided(f"the method {judged_method(results.plan)!r} is not run without physics")
+        raise UndecidedClaim(f"the method {verdict_method(results.plan)!r} is not run without physics")
     if NO_MODEL in set(cells["model"][cells["status"] != "ok"]):
-        raise Undecided(f"{quoted_model(NO_MODEL)} has no result in every cell")
+        raise UndecidedClaim(f"{quoted_model(NO_MODEL)} has no result in every cell")
     if cells["N_D"].nunique() < 2:
-        raise Undecided("the findings are about a growing N_D, and the study has one")
+        raise UndecidedClaim("the findings are about a growing N_D, and the study has one")
     families = (claims.moderate, claims.high)
     names = {f: tuple(one.name for one in results.plan.foundations if one.family == f) for f in families}
     every = [name for family in families for name in names[family]]
@@ -144,7 +144,7 @@ def read_grid(results: Results) -> ErrorGrid:
     return ErrorGrid(by_mean, moderate, high, left_out, table("H_90"), results)
 
 
-def _range_of(differences: Differences) -> str:
+def _difference_range(differences: Differences) -> str:
     """The least and the greatest of some differences, with their intervals."""
     ends = dict.fromkeys((int(differences.mean.argmin()), int(differences.mean.argmax())))
     return " to ".join(difference_with_interval(differences, index) for index in ends)
@@ -162,7 +162,7 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
         f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown "
-        f"to beat no physics ({grid.table.metres(NO_MODEL, 0)}), which has an error larger by {_range_of(leads[0])}; "
+        f"to beat no physics ({grid.table.metres(NO_MODEL, 0)}), which has an error larger by {_difference_range(leads[0])}; "
         f"that most keep the lead is {keeps}: {later}"
     )
     numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
@@ -178,7 +178,7 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
     left = float(np.median([grid.table.mean(model, end) / grid.table.mean(model, 0) for model in models]))
     evidence = (
         f"H is shown to fall for {fallen.sum() or 'none'} of {len(models)} models; twice the runs lower it by "
-        f"{_range_of(falls)}; N_D = {last} leaves {percent_text(left)} of the error at {first} in the median"
+        f"{_difference_range(falls)}; N_D = {last} leaves {percent_text(left)} of the error at {first} in the median"
     )
     if not fallen.all():
         evidence += f"; not shown for: {model_list(m for m, good in zip(models, fallen, strict=True) if not good)}"
@@ -189,10 +189,10 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
 def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[ErrorTerm]]]:
     """A of models [m], and at each amount of data the terms of the rise of H for twice the A; Undecided without."""
     if len(models) < FEWEST_MODELS:
-        raise Undecided(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
+        raise UndecidedClaim(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])
     if np.isclose(A.min(), A.max()):
-        raise Undecided(SAME_A)
+        raise UndecidedClaim(SAME_A)
     weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
     return A, [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
 
@@ -227,7 +227,7 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
     lead = table.lead(NO_MODEL, high, place)
     better, worse = which_significant(lead.above), which_significant(lead.below)
     worst = [model for model, behind in zip(high, worse, strict=True) if behind]
-    names = f" ({listed_names([f'{model} {grid.table.metres(model, place)}' for model in worst])})" if worst else ""
+    names = f" ({join_few_names([f'{model} {grid.table.metres(model, place)}' for model in worst])})" if worst else ""
     evidence = (
         f"at N_D = {grid.table.amounts[-1]}, {better.sum()} of {len(better)} high models "
         f"{plural_word(better.sum(), 'is', 'are')} shown to beat no physics ({grid.table.metres(NO_MODEL, place)}), "
@@ -287,7 +287,7 @@ def _judge_metric(grid: ErrorGrid) -> Judgement:
     words = [f"{key} is {by_90} instead of {by_mean}" for key, (by_mean, by_90) in changed.items()]
     evidence = (
         f"rank correlation of H and H_90 over {both[0].size} cells {alike:.3f}; by H_90 "
-        f"{listed_names(words) if words else 'S1-S4 are the same'}"
+        f"{join_few_names(words) if words else 'S1-S4 are the same'}"
     )
     enough = grid.table.runs >= FEWEST_RUNS
     decided = verdict_of(enough and alike >= ALIKE and not opposite, enough and (opposite or alike < UNLIKE))
@@ -311,16 +311,16 @@ class SavingPair:
 def _judge_savings(grid: ErrorGrid) -> Judgement:
     grid.members("moderate")
     if len(grid.physics) < 2:
-        raise Undecided("one physics model: there is no other to compare it with")
+        raise UndecidedClaim("one physics model: there is no other to compare it with")
     small = [k for k, amount in enumerate(grid.table.amounts) if amount <= grid.table.amounts[-1] / 2]
     if not small:
-        raise Undecided(f"no N_D is at most half of the largest, {grid.table.amounts[-1]}")
+        raise UndecidedClaim(f"no N_D is at most half of the largest, {grid.table.amounts[-1]}")
     kinds = {
         "no physics with more runs": _pairs_with_more_data(grid, small),
         "more accurate physics alone": _pairs_with_better_physics(grid, small[-1]),
     }
     if not all(kinds.values()):
-        raise Undecided("no physics model is more accurate than a moderate one")
+        raise UndecidedClaim("no physics model is more accurate than a moderate one")
     parts, examples, numbers = [], [], {}
     for what, pairs in kinds.items():
         first, second = (
@@ -372,8 +372,8 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     physics, results = grid.members("physics"), grid.results
     assert results is not None
     if results.test.horizon < 3:
-        raise Undecided("a second difference needs three steps ahead")
-    terms = next(way.method.traits.terms for way in results.plan.methods if way.name == judged_method(results.plan))
+        raise UndecidedClaim("a second difference needs three steps ahead")
+    terms = next(way.method.traits.terms for way in results.plan.methods if way.name == verdict_method(results.plan))
     if terms is not None and terms < results.plan.study.prediction.horizon:
         evidence = "the compensation is a polynomial of time, which is smooth whatever it learned"
         return "not testable", f"{evidence}; 'path-trained' is not", {}

@@ -29,14 +29,14 @@ CLOCK = 6  # digits after the point of a time in a run [s]
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
 
-def shown_amounts(results: Results) -> list[int]:
+def figure_amounts(results: Results) -> list[int]:
     """Return the N_D that curves and paths are kept for: smallest, middle (of the logarithm) and largest."""
     amounts = sorted(set(results.cells["N_D"]))
     middle = np.sqrt(amounts[0] * amounts[-1])
     return sorted({amounts[0], min(amounts, key=lambda amount: abs(np.log(amount / middle))), amounts[-1]})
 
 
-def shown_runs(results: Results) -> list[str]:
+def figure_runs(results: Results) -> list[str]:
     """Test runs that figures over time show: of many some at even distances, first and last included."""
     return spread_items(list(results.test.spans), FEW_RUNS)
 
@@ -52,9 +52,9 @@ def _finite_physics(results: Results) -> dict[str, np.ndarray]:
     return {m: path for m, path in results.physics.items() if m != NO_MODEL and np.isfinite(path).all()}
 
 
-def _shown_paths(results: Results) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+def _figure_paths(results: Results) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """Keys of a curve and its path: physics alone, where no cell has the same name, and the cells of shown amounts."""
-    alone, amounts = alone_models(results), shown_amounts(results)
+    alone, amounts = alone_models(results), figure_amounts(results)
     for model, path in _finite_physics(results).items():
         if model not in alone:
             yield {"model": model, "N_D": 0, "seed": 0, "source": "physics"}, path
@@ -72,7 +72,7 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     true, test = results.test.future, results.test
     ahead, parts = test.step * np.arange(1, test.horizon + 1), []
     naive = {"model": "naive", "N_D": 0, "seed": 0, "source": "naive"}, constant_motion(test)
-    for keys, path in (naive, *_shown_paths(results)):
+    for keys, path in (naive, *_figure_paths(results)):
         errors = error_of_steps(position_error(path, true)) | over_horizon_by_axis(path, true)
         errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
         parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors}))
@@ -81,9 +81,9 @@ def horizon_frame(results: Results) -> pd.DataFrame:
 
 def time_frame(results: Results) -> pd.DataFrame:
     """Mean error over the horizon [m] per instant of prediction [s] in the shown test runs, first seed."""
-    test, seed, mask = results.test, int(results.cells["seed"].min()), np.isin(results.test.run, shown_runs(results))
+    test, seed, mask = results.test, int(results.cells["seed"].min()), np.isin(results.test.run, figure_runs(results))
     curves = [({"model": "naive", "N_D": 0, "source": "naive"}, results.naive)]
-    for keys, path in _shown_paths(results):
+    for keys, path in _figure_paths(results):
         if keys["seed"] == seed or keys["source"] == "physics":
             curves.append((keys, position_error(path, test.future)))
     columns = ["run", "t", "model", "N_D", "seed", "source", "error"]
@@ -150,7 +150,7 @@ def insert_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 def commands_frame(results: Results) -> pd.DataFrame:
     """Commands over time in the shown test runs, in the units of sailors; equal commands are shown once."""
     frame = results.dataset.frame
-    frame = frame[frame["run"].isin(shown_runs(results))]
+    frame = frame[frame["run"].isin(figure_runs(results))]
     shown: dict[str, str] = {}
     for name in results.dataset.commands:
         alike = (other for other in shown if signal_of(other) == signal_of(name))
@@ -173,7 +173,7 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
     )
     begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     test, level, origin = results.test, results.plan.study.bands.level, np.zeros((1, 2))
-    seed, amounts, alone = int(results.cells["seed"].min()), shown_amounts(results), alone_models(results)
+    seed, amounts, alone = int(results.cells["seed"].min()), figure_amounts(results), alone_models(results)
     paths = {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     edges: dict[tuple[str, str, int], Region] = {}
     for row in results.rows:
@@ -183,8 +183,8 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
             if bands is not None and bands.promises(level):
                 edges[key] = bands.region(paths[key], test.columns, test.step, level)
     paths["", "naive", 0] = constant_motion(test)
-    windows, most = [], min(INSTANTS, max(3, MOST_WINDOWS // len(shown_runs(results))))
-    for run in shown_runs(results):
+    windows, most = [], min(INSTANTS, max(3, MOST_WINDOWS // len(figure_runs(results))))
+    for run in figure_runs(results):
         indices = np.flatnonzero(test.run == run)
         for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             lines = {key: path[:, index] for key, path in paths.items() if np.isfinite(path[:, index]).all()}
@@ -197,13 +197,13 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
                     truth=np.concatenate([origin, test.future[:, index]]),
                     paths={key: np.concatenate([origin, line]) for key, line in lines.items()},
                     wind=_wind_in_frame(test.columns, int(index)),
-                    bands={key: band_outline(region, paths[key], index) for key, region in edges.items()},
+                    bands={key: region_outline(region, paths[key], index) for key, region in edges.items()},
                 )
             )
     return windows
 
 
-def band_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
+def region_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
     """Outline (n, 2) [m] of a band in the frame (11): port side, round the last region, and back along starboard."""
     path, ahead = paths[:, index], region.ahead[:, index]
     aside = np.column_stack([-ahead[:, 1], ahead[:, 0]])

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from shipid.answer.frames import insert_gaps, shown_runs
+from shipid.answer.frames import figure_runs, insert_gaps
 from shipid.evidence import CellErrors, compare_cells
 from shipid.observer import filter_bank, run_observer
 from shipid.predictor import Predictor
@@ -176,7 +176,7 @@ def observer_frame(results: Results) -> pd.DataFrame:
     if predictor is None or predictor[1].vessel is None:
         return pd.DataFrame()
     name, vessel, settings = predictor[0], predictor[1].vessel, predictor[1].physics.observer
-    part = results.dataset.select(shown_runs(results))
+    part = results.dataset.select(figure_runs(results))
     known = run_observer(vessel, known_by_then(results.plan.study, part), settings)
     begins = np.isnan(known.innovation).all(axis=1)
     table = pd.DataFrame({**part.frame[["run", "t", "u", "v", "r"]], **known.columns})[["run", "t", *OBSERVER_COLUMNS]]

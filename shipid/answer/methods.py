@@ -14,7 +14,7 @@ from shipid.arguments import check_class
 from shipid.evidence import ROUNDING, CellErrors, compare_cells, world_interval
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import judged_method, learns_from_runs
+from shipid.study.plan import learns_from_runs, verdict_method
 from shipid.study.results import Results
 
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
@@ -38,7 +38,7 @@ def compare_methods(results: Results) -> pd.DataFrame:
     Raises ShipidError for results that are none.
     """
     check_class("results", results, Results, "as of `read_results`")
-    return method_table(method_cells(results), judged_method(results.plan))
+    return method_table(method_cells(results), verdict_method(results.plan))
 
 
 def methods_frame(results: Results) -> pd.DataFrame:

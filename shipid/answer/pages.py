@@ -22,7 +22,7 @@ from shipid.report.methods import MethodsContent, sentences_on_methods
 from shipid.study import store
 from shipid.study.declared import NO_MODEL
 from shipid.study.lock import PAGES, sole_writer
-from shipid.study.plan import Plan, judged_method, model_label, plan_text, run_command
+from shipid.study.plan import Plan, model_label, plan_text, run_command, verdict_method
 from shipid.study.results import Results, read_results
 
 Say = Callable[[str], object]
@@ -60,7 +60,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         findings=[ReportFinding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in judge_findings(results)],
         cells=results.cells,
         naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
-        models=_shown_models(results),
+        models=_drawable_models(results),
         factors=frames.factors_frame(results),
         trials=frames.trials_frame(results),
         horizon=frames.horizon_frame(results),
@@ -73,15 +73,15 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         provenance=frames.provenance_words(results),
         study_document=plan_text(plan),
         command=run_command(plan),
-        best="" if best is None else model_label(plan, best, judged_method(plan)),
+        best="" if best is None else model_label(plan, best, verdict_method(plan)),
         alone=frames.alone_models(results),
         frames=tables,
     )
 
 
-def _shown_models(results: Results) -> pd.DataFrame:
+def _drawable_models(results: Results) -> pd.DataFrame:
     """The models; without `none` where no method that the study judges by meets it: nothing of it can be drawn."""
-    judged = (NO_MODEL, judged_method(results.plan)) in {(name, way.name) for name, way in results.plan.pairs}
+    judged = (NO_MODEL, verdict_method(results.plan)) in {(name, way.name) for name, way in results.plan.pairs}
     return results.models if judged else results.models[results.models["model"].ne(NO_MODEL)]
 
 
@@ -126,7 +126,7 @@ def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> Path:
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = methods.method_table(pd.concat(cells, ignore_index=True), judged_method(plan))
+    frame = methods.method_table(pd.concat(cells, ignore_index=True), verdict_method(plan))
     write_table(folder / METHODS, frame)
     content = MethodsContent(
         title=plan.study.question,

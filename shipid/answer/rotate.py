@@ -15,7 +15,7 @@ import pandas as pd
 from shipid import document as documents
 from shipid.answer.error_table import ErrorTable
 from shipid.answer.findings import FULL_SCALE_RULES, Rivals, judge_rivals
-from shipid.answer.verdict import JudgedClaim, leave_undecided
+from shipid.answer.verdict import ClaimVerdict, leave_undecided
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError, suggest_name
 from shipid.study import store
@@ -24,12 +24,12 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.plan import (
     Plan,
     build_plan,
-    families_aside,
     families_set_from,
-    judged_method,
     own_code,
     rotated_plan,
+    uncounted_families,
     unfair_reason,
+    verdict_method,
 )
 from shipid.study.prepare import all_windows, partition
 from shipid.study.results import read_cells
@@ -113,7 +113,7 @@ def turns_table(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[JudgedClaim]:
+def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[ClaimVerdict]:
     """Verdicts on R1-R4 over the turns, each a test manoeuvre; R4 by the mean over the horizon.
 
     Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Undecided where
@@ -126,8 +126,8 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[JudgedClaim]:
     tests = set(frame["test"])
     if unfair := unfair_reason(plan, tests):
         return leave_undecided(FULL_SCALE_RULES, unfair)
-    aside = {*families_aside(plan), *families_set_from(plan, tests)}
-    mine = frame[(frame["method"] == judged_method(plan)) & ~frame["family"].isin(aside)]
+    aside = {*uncounted_families(plan), *families_set_from(plan, tests)}
+    mine = frame[(frame["method"] == verdict_method(plan)) & ~frame["family"].isin(aside)]
     good, bad = claims.accurate, claims.inaccurate
     mine = mine.assign(model=mine["family"].where(mine["family"].isin([good, bad]), mine["foundation"]))
     H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["model", "seed"], values="H")

@@ -27,9 +27,9 @@ from shipid.answer.verdict import (
 from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
-from shipid.report.wording import listed_names
+from shipid.report.wording import join_few_names
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import families_set_from, fitted_families, judged_method, learning_methods, orders_may_react
+from shipid.study.plan import families_set_from, fitted_families, learning_methods, orders_may_react, verdict_method
 from shipid.study.results import Results
 from shipid.units import percent_text, plural_word
 
@@ -175,7 +175,7 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
         (chart, _physics_that_pays(case)),
         (chart, _runs_that_physics_saves(case)),
         ("gain", _headline(case)),
-        ("cells", _judged_method(case) if several else ()),
+        ("cells", _method_sentence(case) if several else ()),
         ("horizon", _error_left(case)),
         ("gain", (*_harm_of_compensation(case), *_harm_of_data(case), *_against_constant_motion(case))),
         ("models", saw_test),
@@ -211,12 +211,12 @@ def _families_that_saw_the_test(results: Results) -> Iterator[str]:
 def _no_comparison(results: Results, rows: pd.DataFrame) -> str:
     """Why physics with data is compared with nothing, and the errors that are known; empty where it is compared."""
     plan, largest = results.plan, int(rows["N_D"].max()) if len(rows) else 0
-    learns = any(way.method.compensates for way in plan.methods if way.name == judged_method(plan))
+    learns = any(way.method.compensates for way in plan.methods if way.name == verdict_method(plan))
     if learns and not rows[(rows["N_D"] == largest) & (rows["family"] != NO_MODEL)].empty:
         return ""
     if not learns:
-        reason = f"The method {judged_method(plan)!r} learns nothing from data"
-    elif {name for name, way in plan.pairs if way.name == judged_method(plan)} == {NO_MODEL}:
+        reason = f"The method {verdict_method(plan)!r} learns nothing from data"
+    elif {name for name, way in plan.pairs if way.name == verdict_method(plan)} == {NO_MODEL}:
         reason = "No method that learns from data has physics in this study"
     else:
         return "No cell with physics and data that counts has a result yet, so there is no conclusion."
@@ -230,7 +230,7 @@ def _least_errors(errors: pd.Series[float]) -> str:
     shown = errors.sort_values(kind="stable")[:MOST_SHOWN]
     of = f" (the least of {len(errors)})" if len(errors) > MOST_SHOWN else ""
     words = [f"{quoted_model(str(name))} {length_in_metres(value)}" for name, value in shown.items()]
-    return f"{of}: {listed_names(words, MOST_SHOWN)}"
+    return f"{of}: {join_few_names(words, MOST_SHOWN)}"
 
 
 def _horizon_in_words(results: Results) -> str:
@@ -240,7 +240,7 @@ def _horizon_in_words(results: Results) -> str:
 def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
     """How good physics must be to pay, at the smallest and at the largest amount of data."""
     if NO_MODEL not in case.table.H:
-        planned = (NO_MODEL, judged_method(case.results.plan)) in {
+        planned = (NO_MODEL, verdict_method(case.results.plan)) in {
             (name, way.name) for name, way in case.results.plan.pairs
         }
         reason = "not every cell without physics has a result" if planned else "the study has no cell without physics"
@@ -316,7 +316,7 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     pure = case.rows[(case.rows["family"] == NO_MODEL) & (case.rows["N_D"] == largest)]
     without = f" Without physics: {case.H(NO_MODEL, largest)}." if len(pure) else ""
     if case.best is None:
-        method = judged_method(case.results.plan)
+        method = verdict_method(case.results.plan)
         text = f"no trial of the method {method!r} has a value, so no model is {BEST}. Mean errors "
         text += f"{_horizon_in_words(case.results)} ahead{_least_errors(rows['H'])}"
     else:
@@ -328,10 +328,10 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     yield f"With {count_runs(largest)}, {text}.{without}"
 
 
-def _judged_method(case: AnswerCase) -> Iterator[str]:
+def _method_sentence(case: AnswerCase) -> Iterator[str]:
     plan = case.results.plan
     words = f"The study has {len(learning_methods(plan))} methods that learn from data; the other sentences speak of"
-    yield f"{words} {judged_method(plan)!r}, the one that the study judges by."
+    yield f"{words} {verdict_method(plan)!r}, the one that the study judges by."
 
 
 def _sides_in_words(case: AnswerCase, sides: ModelSides) -> str:
@@ -412,7 +412,7 @@ def _against_constant_motion(case: AnswerCase) -> Iterator[str]:
 def _how_to_read(case: AnswerCase) -> Iterator[str]:
     """What "no physics" is, what identified models, models set from the runs and known commands mean, and brackets."""
     results, plan, top = case.results, case.results.plan, case.at(case.largest)
-    judged = next(way.method for way in plan.methods if way.name == judged_method(plan))
+    judged = next(way.method for way in plan.methods if way.name == verdict_method(plan))
     if NO_MODEL in case.table.H and judged.traits.mirror:
         yield '"No physics" may use that port and starboard are mirror images, which is a little physics.'
     fitted = top[top["family"].isin(fitted_families(plan))]

@@ -9,8 +9,8 @@ from typing import Any, Generic, Literal, TypedDict, TypeVar
 import numpy as np
 
 from shipid.evidence import FEWEST_RUNS, Differences
-from shipid.report.content import spoken_model
-from shipid.report.wording import listed_names
+from shipid.report.content import model_text
+from shipid.report.wording import join_few_names
 from shipid.study.declared import NO_MODEL
 from shipid.units import length_decimals, plural_word
 
@@ -22,7 +22,7 @@ SAME_A = "all physics models have the same A, so nothing can rise with it"
 EQUAL_A = "it is not shown which of them is more accurate"
 
 
-class JudgedClaim(TypedDict):
+class ClaimVerdict(TypedDict):
     """A claim of the method with its verdict, the evidence in words, and its key numbers by name and unit."""
 
     id: str
@@ -32,7 +32,7 @@ class JudgedClaim(TypedDict):
     numbers: Mapping[str, float]
 
 
-class Undecided(Exception):
+class UndecidedClaim(Exception):
     """Raised by a rule that lacks what it needs; its text says what that is."""
 
 
@@ -47,24 +47,24 @@ class ClaimRule(Generic[Judged]):
         """Verdict, evidence and numbers; undecided, with the reason as evidence, where something lacks."""
         try:
             return self.judge(case)
-        except Undecided as reason:
+        except UndecidedClaim as reason:
             return "undecided", str(reason), {}
 
 
-def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[JudgedClaim]:
+def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[ClaimVerdict]:
     """The finding of each rule, in order. note : what is added to the evidence of all."""
-    findings: list[JudgedClaim] = []
+    findings: list[ClaimVerdict] = []
     for key, rule in rules.items():
         decided, evidence, numbers = rule.decide(case)
         words = "; ".join(part for part in (evidence, note) if part)
-        findings.append(JudgedClaim(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
+        findings.append(ClaimVerdict(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
     return findings
 
 
-def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[JudgedClaim]:
+def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[ClaimVerdict]:
     """Every claim undecided, for the same reason."""
     return [
-        JudgedClaim(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()
+        ClaimVerdict(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()
     ]
 
 
@@ -81,14 +81,14 @@ def weakest_verdict(verdicts: Iterable[Verdict]) -> Verdict:
 
 def length_in_metres(value: float) -> str:
     """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
-    return f"{_fixed(value, _decimal_places(value))} m"
+    return f"{_fixed_decimals(value, _decimal_places(value))} m"
 
 
 def _decimal_places(value: float) -> int:
     return 1 if abs(value) >= 9.995 else length_decimals(value)
 
 
-def _fixed(value: float, places: int) -> str:
+def _fixed_decimals(value: float, places: int) -> str:
     """Return a number with so many decimals, and no minus zero."""
     return f"{round(value, places) + 0.0:.{places}f}"
 
@@ -96,14 +96,16 @@ def _fixed(value: float, places: int) -> str:
 def interval_after(low: float, high: float, value: float) -> str:
     """Return ` [low, high]` with the decimals of the value that it follows, or nothing where there is none."""
     places = _decimal_places(value)
-    return f" [{_fixed(low, places)}, {_fixed(high, places)}]" if np.isfinite([low, high]).all() else ""
+    return (
+        f" [{_fixed_decimals(low, places)}, {_fixed_decimals(high, places)}]" if np.isfinite([low, high]).all() else ""
+    )
 
 
 def difference_with_interval(differences: Differences, index: int = 0) -> str:
     """Return a difference with its 95 % interval, all with the decimals of the greatest."""
     mean, low, high = (float(values[index]) for values in (differences.mean, differences.low, differences.high))
     greatest = float(np.nanmax(np.abs([mean, low, high])))
-    return f"{_fixed(mean, _decimal_places(greatest))} m{interval_after(low, high, greatest)}"
+    return f"{_fixed_decimals(mean, _decimal_places(greatest))} m{interval_after(low, high, greatest)}"
 
 
 def least_to_greatest(*numbers: str) -> str:
@@ -131,10 +133,10 @@ def count_runs(count: int) -> str:
 def quoted_model(model: str) -> str:
     """Name a model inside a sentence; that without physics in quotes: `no physics is worse` would say that none is."""
     name, plus, method = model.partition(" + ")  # of a method beside the one that the study judges by
-    return f'"{spoken_model(name)}"{plus}{method}' if name == NO_MODEL else model
+    return f'"{model_text(name)}"{plus}{method}' if name == NO_MODEL else model
 
 
 def model_list(models: Iterable[str]) -> str:
     """Return names as in a sentence, the first few of many."""
     names = [quoted_model(model) for model in models]
-    return listed_names(names, MOST_NAMES + 1) if names else ""
+    return join_few_names(names, MOST_NAMES + 1) if names else ""

@@ -19,7 +19,7 @@ from shipid.units import interval_text, join_names, plural_word
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
-    from shipid.identification.outcome import Identified
+    from shipid.identification.outcome import Identification
     from shipid.identification.settings import Identify
     from shipid.study.structures import StructureComparison
     from shipid.vessel.load import Vessel
@@ -290,7 +290,7 @@ def _nuisance_widths(given: list[str]) -> list[str] | dict[str, Any]:
     return named | parse_assignments([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
-def _show_nuisances(outcome: Identified, answer: Answer) -> None:
+def _show_nuisances(outcome: Identification, answer: Answer) -> None:
     """Print the unknowns of each run, such as a current; initial states are many: the answer for programs has them."""
     from shipid.identification.settings import UNITS_OF_NUISANCES
 
@@ -306,7 +306,7 @@ def _show_nuisances(outcome: Identified, answer: Answer) -> None:
     answer.rows("nuisances", rows, text_table(["run", *heads], shown) if scalars else None)
 
 
-def _show_identified(outcome: Identified, answer: Answer) -> None:
+def _show_identified(outcome: Identification, answer: Answer) -> None:
     """Print estimates, what is not identified, free runs, manoeuvres, manoeuvres to run next, and warnings."""
     from shipid.identification.sides import HEADS, side_table_rows
 
@@ -333,7 +333,7 @@ def _show_identified(outcome: Identified, answer: Answer) -> None:
         typer.echo(f"warning: {warning}", err=True)
 
 
-def _show_estimates(outcome: Identified, answer: Answer) -> None:
+def _show_estimates(outcome: Identification, answer: Answer) -> None:
     """Print how the fit ended, the factors with their intervals, and what the data cannot separate."""
     solution = outcome.solution
     fitted = (
@@ -368,7 +368,7 @@ def _show_estimates(outcome: Identified, answer: Answer) -> None:
     answer.say("\n".join(f"  {sentence}" for sentence in outcome.unseen), unseen=outcome.unseen)
 
 
-def _show_free_runs(outcome: Identified, answer: Answer) -> None:
+def _show_free_runs(outcome: Identification, answer: Answer) -> None:
     """Print errors of free runs, and of measured outputs, before the fit and after it."""
     from shipid.identification.free_run import ALL
 
@@ -386,7 +386,7 @@ def _show_free_runs(outcome: Identified, answer: Answer) -> None:
         answer.records("outputs", outcome.outputs, columns | {"after": "after"})
 
 
-def _show_manoeuvres(outcome: Identified, answer: Answer) -> None:
+def _show_manoeuvres(outcome: Identification, answer: Answer) -> None:
     """Print measures of standard manoeuvres before the fit and after it, and which of them the runs do not cover."""
     banded = "low" in outcome.manoeuvres
     compared = [

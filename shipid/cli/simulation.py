@@ -90,7 +90,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     ranges = envelope_table(rows_of_sets, plan.study.published)
     units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
     rows = [
-        [str(name), *(_range_words(part[part["quantity"] == quantity]) for quantity in units)]
+        [str(name), *(_extremes_text(part[part["quantity"] == quantity]) for quantity in units)]
         for name, part in ranges.groupby("set", sort=False)
     ]
     write_dataset(dataset, file)
@@ -106,7 +106,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
         answer.rows("envelope", ranges, text_table(heads, rows))
 
 
-def _range_words(row: Any) -> str:
+def _extremes_text(row: Any) -> str:
     return " / ".join(f"{row[name].iloc[0]:.1f}" for name in ("min", "mean", "max")) if len(row) else ""
 
 

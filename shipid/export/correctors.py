@@ -14,7 +14,7 @@ from casadi import MX
 from shipid.errors import ShipidError
 from shipid.export.equations import Equations, function_by_names, split_by_name, symbols_of
 from shipid.export.known import PredictorInputs, all_within, column_of_entries, feature_expressions, turn_vectors
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Normaliser
 from shipid.hybrid.features import MOTIONS
@@ -91,7 +91,7 @@ def compensated_path(known: PredictorInputs, corrector: Compensator) -> MX:
     return known.path + mean_of(paths)
 
 
-def physics_path(known: PredictorInputs, corrector: Unchanged) -> MX:  # noqa: ARG001
+def physics_path(known: PredictorInputs, corrector: UnchangedPath) -> MX:  # noqa: ARG001
     """Path of the physics; a learned force is among its terms already."""
     return known.path
 
@@ -373,7 +373,7 @@ def _inputs_of_compensator(corrector: Compensator) -> CorrectorInputs:
 
 
 CORRECTORS: dict[type[Any], Counterpart] = {
-    Unchanged: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
+    UnchangedPath: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
     ForceCorrector: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
     Compensator: Counterpart(compensated_path, _inputs_of_compensator),
     TrajectoryCompensator: Counterpart(compensated_path, _inputs_of_compensator),

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.stored import StoredData
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Unchanged(Stored):
+class UnchangedPath(StoredData):
     """The corrector that leaves the path of the physics as it is."""
 
     hyperparameters: Mapping[str, float]
@@ -34,13 +34,13 @@ class Alone(Method):
 
     compensates: ClassVar[bool] = False
     meets_none: ClassVar[bool] = False
-    corrector: ClassVar[type[Any]] = Unchanged
+    corrector: ClassVar[type[Any]] = UnchangedPath
 
     @property
     def together(self) -> bool:
         """There is nothing to compute: a unit of work for each foundation would cost more than the fit."""
         return True
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         """Return the unchanged physics for every foundation; its errors on the windows are fair: it learned nothing."""
-        return {name: Fitted(Unchanged({}), [], 0.0, left_out) for name, left_out in task.targets.items()}
+        return {name: FitResult(UnchangedPath({}), [], 0.0, left_out) for name, left_out in task.targets.items()}

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, suggest_name
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.stored import StoredData
 from shipid.metrics import vector_lengths
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Bands(Stored):
+class Bands(StoredData):
     """Calibrated bands of a predictor.
 
     Parameters

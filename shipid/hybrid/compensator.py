@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from shipid.data.windows import Instants
 from shipid.hybrid.features import Inputs, select_inputs
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.stored import StoredData
 
 Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
 
 
 @dataclass(frozen=True)
-class Normaliser(Stored):
+class Normaliser(StoredData):
     """The z-score of the training samples: (value - mean) / std of each named feature.
 
     Parameters
@@ -48,7 +48,7 @@ class Normaliser(Stored):
 
 
 @dataclass(frozen=True)
-class Network(Stored):
+class Network(StoredData):
     """One trained network with what belongs to its data: inputs, statistics, shapes of its outputs.
 
     Parameters
@@ -74,7 +74,7 @@ class Network(Stored):
 
 
 @dataclass(frozen=True)
-class Compensator(Stored):
+class Compensator(StoredData):
     """The mean of some networks: what is known at an instant -> compensation of the path after it.
 
     Parameters

@@ -23,8 +23,8 @@ from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, SearchedAlone
 from shipid.hybrid.settings import Point, seed_of
-from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs
+from shipid.hybrid.stored import StoredData
+from shipid.hybrid.units import VaryingInputs
 
 Array = NDArray[np.float64]
 Leaf = Annotated[float, Field(ge=1.0)]
@@ -33,7 +33,7 @@ LEAF = -1  # the child of a node that has none
 
 
 @dataclass(frozen=True)
-class Trees(Stored):
+class Trees(StoredData):
     """Regression trees as arrays of nodes, one tree after the other.
 
     first : (trees,) root of each tree. left, right : (nodes,) children, -1 for a leaf; a sample goes left where its
@@ -81,7 +81,7 @@ class Trees(Stored):
 
 
 @dataclass(frozen=True)
-class ForestCorrector(Stored):
+class ForestCorrector(StoredData):
     """Trees that give the compensation of the path.
 
     inputs : which quantities the trees may take. names : those that they take, in order.
@@ -120,7 +120,7 @@ class ForestProblem(LearningProblem):
         """Return a forest grown on some windows."""
         method, seed = self.method, seed_of(self.task.seed, number)
         here = {name: values[windows] for name, values in self.table.items()}
-        seen, outputs = SeenInputs.of(here, method.mirror), self.outputs[windows]
+        seen, outputs = VaryingInputs.of(here, method.mirror), self.outputs[windows]
         if seen.reflection is not None:
             outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(self.basis.T))])
         grower = _new_forest(method.trees, round(point["leaf"]), point["share"], seed)

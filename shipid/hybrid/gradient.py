@@ -16,16 +16,16 @@ from optuna.trial import TrialState
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
 from shipid.hybrid.features import Inputs, choose_features
 from shipid.hybrid.journal import distributions, frozen_trial
-from shipid.hybrid.method import Fitted, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.method import FitResult, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.search import Search, best_trials, trial_row
-from shipid.hybrid.settings import Searched, seed_of
+from shipid.hybrid.settings import SearchMethod, seed_of
 from shipid.hybrid.training import Length, StackSettings, train_stack
 
 Stack = Mapping[str, Mapping[str, float]]
 """Models that train together: name -> hyperparameters."""
 
 
-def tune_gradient(task: Task, method: Searched, inputs: Inputs, length: Length) -> dict[str, Fitted]:
+def tune_gradient(task: Task, method: SearchMethod, inputs: Inputs, length: Length) -> dict[str, FitResult]:
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
@@ -82,7 +82,7 @@ class _TrialOutcome:
 class _StackTrainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(self, task: Task, method: Searched, inputs: Inputs, length: Length) -> None:
+    def __init__(self, task: Task, method: SearchMethod, inputs: Inputs, length: Length) -> None:
         self.task, self.method, self.inputs, self.length = task, method, inputs, length
         self.tables = shared_tables(task, inputs)
         self.outputs = {key: flatten_paths(paths) for key, paths in task.targets.items()}
@@ -120,17 +120,17 @@ class _StackTrainer:
                 made[key].append((network, loss, int(trained.epochs[k])))
         return {key: _outcome_of_folds(number, results) for key, results in made.items()}
 
-    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome) -> Fitted:
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome) -> FitResult:
         """The networks of the best trial; those of an earlier session are trained once more, in the same stack."""
         seconds = sum(row["seconds"] for row in rows[key])
         kept = best_trials(rows[key])
         if not kept:
-            return Fitted(None, rows[key], seconds)
+            return FitResult(None, rows[key], seconds)
         number = kept[0]["number"]
         if number != best.number:
             stacks = self.stacks({name: mine[number]["params"] for name, mine in rows.items()})
             best = self.train(next(stack for stack in stacks if key in stack), number)[key]
-        return Fitted(Compensator(self.inputs, best.networks, kept[0]["params"]), rows[key], seconds)
+        return FitResult(Compensator(self.inputs, best.networks, kept[0]["params"]), rows[key], seconds)
 
 
 def _stack_settings(members: Sequence[Mapping[str, float]], length: Length) -> StackSettings:

@@ -26,16 +26,16 @@ from shipid.hybrid.method import Index
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale
-from shipid.hybrid.stepping import Stepped, Stepper, StepProblem, step_alone, stepped_paths
-from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs, apply_blocks, solve_ridges
+from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths
+from shipid.hybrid.stored import StoredData
+from shipid.hybrid.units import VaryingInputs, apply_blocks, solve_ridges
 
 Array = NDArray[np.float64]
 MISSED_NAMES = ("missed.u", "missed.v", "missed.r")
 
 
 @dataclass(frozen=True)
-class LinearLaw(Stored):
+class LinearLaw(StoredData):
     """The linear law, with its inputs.
 
     commands : names of the command columns. delays : number of past steps.
@@ -97,7 +97,7 @@ def past_rows(physics: Physics, instants: Instants, delays: int, commands: tuple
 
 
 @dataclass(frozen=True)
-class HankelCorrector(Stored):
+class HankelCorrector(StoredData):
     """The law, rolled over the horizon from the past of the instants."""
 
     law: LinearLaw
@@ -127,7 +127,7 @@ class HankelProblem(StepProblem):
         delays = count_steps(point["delays"], self.task.windows.step)
         chosen, table = self.steps.of(windows), self.table(delays)
         here = {key: values[chosen] for key, values in table.items()}
-        seen, missing = SeenInputs.of(here, self.method.mirror), self.steps.missing[chosen]
+        seen, missing = VaryingInputs.of(here, self.method.mirror), self.steps.missing[chosen]
         if seen.reflection is not None:
             missing = np.concatenate([missing, missing * [1.0, -1.0, -1.0]])
         values = (seen.samples(here) - seen.normaliser.mean) / seen.normaliser.std
@@ -154,7 +154,7 @@ class HankelProblem(StepProblem):
         return delayed_inputs(steps.at.columns, before, delays, self.task.commands)
 
 
-class HankelDMD(Stepped):
+class HankelDMD(StepMethod):
     """A linear law with delays and control; it needs a past, and works with and without physics.
 
     Parameters
@@ -162,7 +162,7 @@ class HankelDMD(Stepped):
     delays : how far back the law may look [s]; each is a trial, with every ridge, and judged by the path. `trials`
         is therefore refused.
     ridge : weight of the squared weights of normalised inputs; 8 from low to high.
-    mirror, samples : as in `Stepped`; the image of every step in the mirror counts, too.
+    mirror, samples : as in `StepMethod`; the image of every step in the mirror counts, too.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("ridge",)

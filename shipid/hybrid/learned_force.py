@@ -25,7 +25,7 @@ from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_values
 from shipid.hybrid.settings import Point, Scale, seed_of
 from shipid.hybrid.stepping import true_steps
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import solve_ridges
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -42,7 +42,7 @@ LEAST_SCALE = 1e-3  # m/s and rad/s: of a motion that does not vary
 
 
 @dataclass(frozen=True)
-class ForceCorrector(Stored):
+class ForceCorrector(StoredData):
     """A force added to the equations: numbers of the block `hull.learned`, name -> (units,) or (1,)."""
 
     block: Mapping[str, Array]

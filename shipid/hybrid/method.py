@@ -137,7 +137,7 @@ class Task:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FitResult:
     """Result of a method for one foundation.
 
     corrector : the fitted method; None where every trial failed (targets that are not numbers).
@@ -226,7 +226,7 @@ class Method(CheckedModel, BaseModel, ABC):
         return 1
 
     @abstractmethod
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         """Fit every foundation of a task; name of the foundation -> result."""
 
 
@@ -235,7 +235,7 @@ TRIAL_COLUMNS = ("cell", "model", "N_D", "seed", "chosen", "number", "value", "e
 
 
 class TrialRow(BaseModel):
-    """What the row of a trial holds, see `Fitted`."""
+    """What the row of a trial holds, see `FitResult`."""
 
     model_config = ConfigDict(extra="forbid")
     number: NonNegativeInt
@@ -255,7 +255,7 @@ class TrialRow(BaseModel):
         return self
 
 
-def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
+def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
     """Fit every foundation of a task; DataError where a method that somebody wrote gives something else.
 
     DataError for a vessel that the method cannot work with. ShipidError where it ends the process, for what runs it
@@ -271,13 +271,13 @@ def fit_all(method: Method, task: Task) -> dict[str, Fitted]:
         raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
     for case in task.cases:
         one = given.get(case)
-        if not isinstance(one, Fitted):
+        if not isinstance(one, FitResult):
             raise DataError(f"{name}.fit must give a Fitted for {case!r}, not {type(one).__name__}")
         _check_fitted(f"{name}.fit", one, shape, method.compensates)
     return dict(given)
 
 
-def _check_fitted(where: str, one: Fitted, shape: tuple[int, ...], learns: bool) -> None:
+def _check_fitted(where: str, one: FitResult, shape: tuple[int, ...], learns: bool) -> None:
     """DataError where the parts of a result are not what a study stores: it could not be read back."""
     try:
         rows: list[TrialRow] = [

@@ -28,9 +28,9 @@ from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem
 from shipid.hybrid.settings import Point, Scale, seed_of
-from shipid.hybrid.stepping import Stepped, StepProblem, step_alone, stepped_paths
-from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs, Units, apply_blocks, solve_ridges
+from shipid.hybrid.stepping import StepMethod, StepProblem, step_alone, stepped_paths
+from shipid.hybrid.stored import StoredData
+from shipid.hybrid.units import Units, VaryingInputs, apply_blocks, solve_ridges
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import term_blocks, upstream_signals
@@ -69,7 +69,7 @@ def module_accelerations(reduced: list[Physics], at: Instants, whole: Array, ste
 
 
 @dataclass(frozen=True)
-class Alarm(Stored):
+class Alarm(StoredData):
     """How far a moment is from the training data: the distance to the nearest of some of its moments.
 
     centres : (C, d) normalised inputs. radius : how far the moments of one run of training are from the other runs, at
@@ -110,7 +110,7 @@ def _distance_to_centres(z: Array, centres: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class ModulesCorrector(Stored):
+class ModulesCorrector(StoredData):
     """Factors of the modules of the physics.
 
     commands : names of the command columns. modules : names, in order.
@@ -166,7 +166,7 @@ class ModulesProblem(StepProblem):
         chosen = steps.of(windows)
         table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
         table = {key: values for key, values in table.items() if not key.endswith("_rw")}  # factors are of the ship
-        units = SeenInputs.of(table, method.mirror).draw(point, method.units, seed_of(task.seed, number))
+        units = VaryingInputs.of(table, method.mirror).draw(point, method.units, seed_of(task.seed, number))
         even, _ = units.parts(table)
         missing, acting = steps.missing[chosen], self.parts[chosen]
         size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
@@ -179,7 +179,7 @@ class ModulesProblem(StepProblem):
         return ModulesCorrector(task.commands, modules, units, weights, alarm, method.limit, method.fade, dict(point))
 
 
-class Modules(Stepped):
+class Modules(StepMethod):
     """Bounded factors of hull, thrusters and rudders: a constant each, and a small network of state and commands.
 
     Parameters
@@ -191,7 +191,7 @@ class Modules(Stepped):
     limit : greatest departure of a factor from 1, below 1.
     centres : moments of training that the alarm keeps, at most.
     fade : distance beyond the training data, in standard deviations of the inputs, at which all factors are 1.
-    mirror, samples : as in `Stepped`.
+    mirror, samples : as in `StepMethod`.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "offset", "ridge")

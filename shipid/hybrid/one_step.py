@@ -21,15 +21,15 @@ from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, windows_of_folds
 from shipid.hybrid.settings import Point, Scale, seed_of
-from shipid.hybrid.stepping import Stepped, StepProblem, stepped_paths
-from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs, Units, apply_blocks, solve_ridges
+from shipid.hybrid.stepping import StepMethod, StepProblem, stepped_paths
+from shipid.hybrid.stored import StoredData
+from shipid.hybrid.units import Units, VaryingInputs, apply_blocks, solve_ridges
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class OutputWeights(Stored):
+class OutputWeights(StoredData):
     """One network: hidden units and their output weights, (M + 1, 1) for surge and (M or M + 1, 2) for sway and yaw.
 
     Weights may have R more in front, (R, M + 1, 1) and (R, M, 2), for R networks on the same units.
@@ -46,7 +46,7 @@ class OutputWeights(Stored):
 
 
 @dataclass(frozen=True)
-class OneStepCorrector(Stored):
+class OneStepCorrector(StoredData):
     """The mean of some networks, applied at every step of the rollout.
 
     commands : names of the command columns.
@@ -78,7 +78,9 @@ class OneStepProblem(StepProblem):
         """Return networks on the steps of some windows for all ridges; one ridge has no axis in front."""
         chosen = self.steps.of(windows)
         here = {key: values[chosen] for key, values in self.table.items()}
-        units = SeenInputs.of(here, self.method.mirror).draw(point, self.method.units, seed_of(self.task.seed, number))
+        units = VaryingInputs.of(here, self.method.mirror).draw(
+            point, self.method.units, seed_of(self.task.seed, number)
+        )
         missing = self.steps.missing[chosen]
         size = np.maximum(missing.std(axis=0), 1e-12)
         even, odd = units.parts(here)
@@ -95,7 +97,7 @@ class OneStepProblem(StepProblem):
         return OneStepCorrector(self.task.commands, heads, solved[0].hyperparameters)
 
 
-class OneStep(Stepped):
+class OneStep(StepMethod):
     """Networks with drawn hidden units on the missing acceleration, applied at every step of the rollout.
 
     Every trial draws hidden units, solves them for 8 ridges on the training steps, and is judged by the path on the
@@ -109,7 +111,7 @@ class OneStep(Stepped):
     ridge : weight of the squared output weights beside the mean squared error of the accelerations, each axis by its
         standard deviation; from low to high, the best of 8 is taken for each trial.
     averaged : the accelerations are the mean of the networks of so many best trials.
-    mirror, samples : as in `Stepped`.
+    mirror, samples : as in `StepMethod`.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("motion_scale", "command_scale", "wind_scale", "offset", "ridge")

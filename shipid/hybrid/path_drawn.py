@@ -15,9 +15,9 @@ from pydantic import model_validator as validator
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.search import ridge_values, setting_at_share
-from shipid.hybrid.settings import Probability, Scale, Searched, spread_points
+from shipid.hybrid.settings import Probability, Scale, SearchMethod, spread_points
 
 RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory
@@ -28,7 +28,7 @@ MEMORIES = (*MEMORY_CHOICES, *OBSERVER_CHOICES, ("history",), ("error", "observe
 Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 
 
-class PathDrawn(Searched):
+class PathDrawn(SearchMethod):
     """Networks with drawn hidden units on the errors of the path, solved in closed form.
 
     All ranges are searched by their logarithm, with the same trials for all foundations. The defaults were chosen on
@@ -151,7 +151,7 @@ class PathDrawn(Searched):
         """Return the ridges of which each trial takes one for each model, rising, evenly spread by their logarithm."""
         return ridge_values(self.ridge, RIDGES)
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
         from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
 

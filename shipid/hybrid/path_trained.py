@@ -12,11 +12,11 @@ from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveIn
 
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Fitted, Task
-from shipid.hybrid.settings import Probability, Scale, Searched
+from shipid.hybrid.method import FitResult, Task
+from shipid.hybrid.settings import Probability, Scale, SearchMethod
 
 
-class PathTrained(Searched):
+class PathTrained(SearchMethod):
     """Networks trained on the errors of the path, as in the paper; the defaults are the paper's, or pinned for it.
 
     Parameters
@@ -60,7 +60,7 @@ class PathTrained(Searched):
         """Networks of one architecture train as one stack; where it is searched, hardly any two are alike."""
         return not any(isinstance(getattr(self, name), tuple) for name in self.COUNTS)
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
         from shipid.hybrid.training import Length

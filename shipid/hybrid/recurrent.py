@@ -26,8 +26,8 @@ from shipid.hybrid.method import Index, Row, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, mean_squared_error
 from shipid.hybrid.settings import Point, Scale, seed_of
-from shipid.hybrid.stored import Stored
-from shipid.hybrid.units import SeenInputs
+from shipid.hybrid.stored import StoredData
+from shipid.hybrid.units import VaryingInputs
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Sequences:
 
 
 @dataclass(frozen=True)
-class SequenceReader(Stored):
+class SequenceReader(StoredData):
     """Names, statistics and mirrors of what a network reads.
 
     past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
@@ -76,7 +76,7 @@ def past_signals(instants: Instants, steps: int, commands: tuple[str, ...]) -> l
 
 
 @dataclass(frozen=True)
-class GatedNetwork(Stored):
+class GatedNetwork(StoredData):
     """One trained network: what it reads, its layers by name, and its basis (T, r) [m]."""
 
     reader: SequenceReader
@@ -112,7 +112,7 @@ def _logistic(values: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class RecurrentCorrector(Stored):
+class RecurrentCorrector(StoredData):
     """The mean of the networks of the folds."""
 
     inputs: Inputs
@@ -165,7 +165,7 @@ class RecurrentProblem(LearningProblem):
         steps = count_steps(self.method.seconds, self.task.windows.step)
         rows = past_signals(self.task.windows.select(training).instants(), steps, self.task.commands)
         along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-        past, now = (SeenInputs.of(part, self.method.mirror) for part in (along, self._rows(training)))
+        past, now = (VaryingInputs.of(part, self.method.mirror) for part in (along, self._rows(training)))
         if past.reflection is None or now.reflection is None:
             return SequenceReader(past.normaliser, now.normaliser, None, steps)
         return SequenceReader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)

@@ -28,14 +28,14 @@ from torch import Tensor
 from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, input_group
-from shipid.hybrid.method import Array, Fitted, Index, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.products import gram_matrix, hidden_layer, matrix_product, sums_of_squares
 from shipid.hybrid.search import CLOSING_TRIALS, Search, diverged_result, trial_row, windows_of_folds
-from shipid.hybrid.settings import Point, Searched, seed_of
-from shipid.hybrid.units import SeenInputs, Units
+from shipid.hybrid.settings import Point, SearchMethod, seed_of
+from shipid.hybrid.units import Units, VaryingInputs
 
 Mask = NDArray[np.bool_]
-Seeing = tuple[SeenInputs, Tensor]
+Seeing = tuple[VaryingInputs, Tensor]
 """Windows as hidden units see them: what is seen, and its values (S, d), normalised."""
 
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
@@ -65,7 +65,7 @@ class Recipe:
     left_out: Callable[[Point], frozenset[str]]
 
 
-def tune_ridge(task: Task, method: Searched, recipe: Recipe) -> dict[str, Fitted]:
+def tune_ridge(task: Task, method: SearchMethod, recipe: Recipe) -> dict[str, FitResult]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -211,7 +211,7 @@ class _RidgeTuning:
     windows as judges; first : those that judge all trials. rows : of each foundation, its trials.
     """
 
-    def __init__(self, task: Task, method: Searched, recipe: Recipe) -> None:
+    def __init__(self, task: Task, method: SearchMethod, recipe: Recipe) -> None:
         self.task, self.method, self.recipe = task, method, recipe
         self.windows, self.targets = windows_of_folds(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
@@ -275,7 +275,7 @@ class _RidgeTuning:
                 for key in names:
                     self.rows[key][number]["seconds"] += (time.process_time() - start) / len(names)
 
-    def fitted(self, key: str) -> Fitted:
+    def fitted(self, key: str) -> FitResult:
         """The mean of the best networks of a foundation, and its errors on runs left out.
 
         With a single fold there are none: nothing but that fold can choose the trials that judge it.
@@ -290,7 +290,7 @@ class _RidgeTuning:
             errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
         params, networks = zip(*(kept for _, kept in best.networks), strict=True)
         corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
-        return Fitted(corrector, rows, sum(row["seconds"] for row in rows), errors)
+        return FitResult(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
     def _groups(self, number: int, *, whole: bool = False) -> list[_FoundationGroup]:
         """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""
@@ -438,7 +438,7 @@ def _fold_blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: s
 
 def _normalised_inputs(table: Mapping[str, Array], device: str, *, mirror: bool) -> Seeing:
     """Choose and normalise the inputs; with a mirror, by the windows and their images."""
-    seen = SeenInputs.of(table, mirror)
+    seen = VaryingInputs.of(table, mirror)
     return seen, _double_tensor(seen.normaliser.apply(table), device)
 
 
@@ -670,7 +670,7 @@ def _hidden_weights(units: Units) -> tuple[Array, Array]:
 
 
 def _solved_network(
-    seen: SeenInputs,
+    seen: VaryingInputs,
     layer: tuple[Array, Array],
     parts: Sequence[_Coordinate],
     columns: slice,

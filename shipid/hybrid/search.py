@@ -18,8 +18,8 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.hybrid.method import Corrector, Fitted, Index, Row, Task
-from shipid.hybrid.settings import Point, Searched, seed_of, spread_points
+from shipid.hybrid.method import Corrector, FitResult, Index, Row, Task
+from shipid.hybrid.settings import Point, SearchMethod, seed_of, spread_points
 
 Array = NDArray[np.float64]
 Any_ = TypeVar("Any_")
@@ -62,7 +62,13 @@ class Search:
     """
 
     def __init__(
-        self, task: Task, names: Iterable[str], method: Searched, *, again: bool = False, closing: int = CLOSING_TRIALS
+        self,
+        task: Task,
+        names: Iterable[str],
+        method: SearchMethod,
+        *,
+        again: bool = False,
+        closing: int = CLOSING_TRIALS,
     ) -> None:
         self.begun, self.closing = time.process_time(), closing
         self.method, self.journal = method, task.journal
@@ -123,7 +129,7 @@ class Search:
             self.journal.decide(list(self.cells.values()), self.count)
 
 
-def trial_points(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
+def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
     """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
 
     A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
@@ -136,7 +142,7 @@ def trial_points(method: Searched, idle: frozenset[str] = frozenset({"ridge"})) 
         yield {**fixed, **point}
 
 
-def setting_at_share(method: Searched, name: str, share: float) -> float:
+def setting_at_share(method: SearchMethod, name: str, share: float) -> float:
     """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
     low, high = method.ranges()[name]
     if name in method.LINEAR:
@@ -150,11 +156,11 @@ def ridge_values(ridge: float | tuple[float, float], count: int) -> list[float]:
     return [float(r) for r in np.geomspace(*ridge, count)] if isinstance(ridge, tuple) else [float(ridge)]
 
 
-def diverged_result(method: Searched, points: Iterable[Mapping[str, float]]) -> Fitted:
+def diverged_result(method: SearchMethod, points: Iterable[Mapping[str, float]]) -> FitResult:
     """The result where the physics is not finite: no corrector, every trial diverged."""
     blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
     some = islice(points, 1 if method.budget else None)
-    return Fitted(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
+    return FitResult(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
 
 
 def ridge_trial(
@@ -250,7 +256,7 @@ class LearningProblem:
         return self.solve(best[0]["number"], best[0]["params"], windows_of_folds(self.task))
 
 
-class SearchedAlone(Searched):
+class SearchedAlone(SearchMethod):
     """A method that searches for one foundation after the other: its formula is its `problem`.
 
     IDLE : settings that a trial chooses by itself, so that they differ in no point.
@@ -265,7 +271,7 @@ class SearchedAlone(Searched):
         """Return the trials: a value of everything searched, evenly spread."""
         return trial_points(self, self.IDLE)
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         """Search for every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
         every, fitted = windows_of_folds(task), {}
         for name, case in task.cases.items():
@@ -273,7 +279,7 @@ class SearchedAlone(Searched):
             fitted[name] = self._fit(task, name) if finite else diverged_result(self, self.points())
         return fitted
 
-    def _fit(self, task: Task, name: str) -> Fitted:
+    def _fit(self, task: Task, name: str) -> FitResult:
         """Search for one foundation; the best trials make its corrector."""
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
         for number, point in search.left(self.points()):
@@ -282,4 +288,4 @@ class SearchedAlone(Searched):
             search.record({name: trial_row(number, judged.params, judged.value, start, judged.epochs)})
         rows = search.rows[name]
         best = best_trials(rows)[: self.num_chosen()]
-        return Fitted(problem.corrector(best) if best else None, rows, search.seconds)
+        return FitResult(problem.corrector(best) if best else None, rows, search.seconds)

@@ -31,7 +31,7 @@ class SearchSpan:
     whole: bool = False
 
 
-class Searched(Method):
+class SearchMethod(Method):
     """A method that tries sets of hyperparameters and keeps the best by validation.
 
     SEARCHED : names of the settings that may be ranges, searched by their logarithm. LINEAR : those of them that are

@@ -185,7 +185,7 @@ def join_instants(parts: Sequence[Instants]) -> Instants:
 class StepProblem(LearningProblem):
     """A foundation whose true steps are solved for all ridges; a trial takes the ridge that predicts the path best."""
 
-    def __init__(self, method: Stepped, task: Task, name: str) -> None:
+    def __init__(self, method: StepMethod, task: Task, name: str) -> None:
         super().__init__(method, task, name)
         self.steps = true_steps(task, name)
 
@@ -205,7 +205,7 @@ class StepProblem(LearningProblem):
         return TrialWorth(value, {**point, "ridge": ridge})
 
 
-class Stepped(SearchedAlone):
+class StepMethod(SearchedAlone):
     """A method that adds to each step: a trial is solved on true steps for all ridges, and judged by the path.
 
     RIDGES : how many ridges are solved where `ridge` is a range.

@@ -17,7 +17,7 @@ from shipid.errors import ResultError
 Arrays = Mapping[str, NDArray[Any]]
 
 
-class Stored:
+class StoredData:
     """Base of frozen dataclasses that are written as plain JSON and arrays, and rebuilt from them.
 
     Fields may be numbers, texts, arrays, pydantic models, other such dataclasses, and tuples, mappings and `| None` of

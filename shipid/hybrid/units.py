@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import choose_features, input_group, select_inputs
 from shipid.hybrid.mirror import mirror_matrix as mirror_of
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.stored import StoredData
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SeenInputs:
+class VaryingInputs:
     """Inputs that vary in training, their z-score, and their mirror.
 
     features : name of each input -> the columns that were equal to it in training.
@@ -53,7 +53,7 @@ class SeenInputs:
 
 
 @dataclass(frozen=True)
-class Units(Stored):
+class Units(StoredData):
     """Hidden units tanh(z w + c) of normalised inputs z: `even` ones do not feel the mirror, `odd` ones change sign.
 
     weight : (d, M). offset : (M,). reflection : (d, d), or None: then even and odd are the same, plain units.

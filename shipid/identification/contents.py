@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pandas as pd
 
-from shipid.identification.outcome import Identified
+from shipid.identification.outcome import Identification
 from shipid.report.identification import IdentificationContent
 from shipid.version import __version__
 
 
-def identification_content(outcome: Identified, dataset: str | Path, command: str = "") -> IdentificationContent:
+def identification_content(outcome: Identification, dataset: str | Path, command: str = "") -> IdentificationContent:
     """Assemble the page content.
 
     outcome : a finished identification. dataset : file of the runs. command : command line that reproduces the outcome.

@@ -78,7 +78,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Informed:
+class InformedCandidate:
     """A candidate with its Fisher information (n, n) of the factors, for the declared standard deviations."""
 
     candidate: Candidate
@@ -151,7 +151,7 @@ def information_of_candidates(
     horizon: float = 30.0,
     interval: float = 1.0,
     step: float | None = None,
-) -> list[Informed]:
+) -> list[InformedCandidate]:
     """Simulate candidates and compute the Fisher information of the factors that each adds.
 
     Parameters
@@ -178,10 +178,12 @@ def information_of_candidates(
     signals = {name: width for signal, width in weights.items() for name in WEIGHTED[signal]}
     by_factor, by_start = _finite_difference_sensitivities(vessel, cut, groups, scale, signals, fine, every)
     each = _project_out_start(by_factor, by_start)
-    return [Informed(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
+    return [InformedCandidate(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
 
 
-def information_where_possible(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[Informed]:
+def information_where_possible(
+    vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any
+) -> list[InformedCandidate]:
     """As `information_of_candidates`, without the candidates that cannot be simulated; ShipidError where none can."""
     try:
         return information_of_candidates(vessel, choice, *args, **how)
@@ -330,7 +332,7 @@ def _project_out_start(by_factor: Array, by_start: Array) -> Array:
 
 
 def rank_candidates(
-    contributions: Sequence[Informed], paths: Sequence[str], present: Array | None = None
+    contributions: Sequence[InformedCandidate], paths: Sequence[str], present: Array | None = None
 ) -> pd.DataFrame:
     """Candidates: `manoeuvre`, `hours`, `gain` [bits], `per_hour` [bits/h], `narrows`, `before`, `after`.
 

@@ -111,14 +111,14 @@ def search_factors(
         begin = np.clip(factors, problem.unknown.low, problem.unknown.high)
         watch = _IterationMonitor(progress, held, before)
         run = _SearchState(
-            problem, evaluate_factors(problem, begin, deepest_valley(problem, begin, point) or point), free, watch
+            problem, evaluate_factors(problem, begin, best_valley(problem, begin, point) or point), free, watch
         )
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.to_the_end(tolerance, most)
         best = run.best
         for _ in range(VALLEYS):
-            deeper = deepest_valley(problem, best.factors, best.point) if word == "ok" else None
+            deeper = best_valley(problem, best.factors, best.point) if word == "ok" else None
             if deeper is None:
                 break
             there = evaluate_factors(problem, best.factors, deeper)
@@ -131,7 +131,7 @@ def search_factors(
     return Result(best.factors, best.at, best.objective, watch.iterations, word)
 
 
-def deepest_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
+def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
     """Unknowns of the runs in the deepest valley of several: each run may have one for each guess of its current.
 
     Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.

@@ -21,7 +21,7 @@ CONSIDERABLE = 0.006  # of the time in which a ship goes her length: so late, N_
 
 
 @dataclass(frozen=True)
-class Late:
+class LateCommands:
     """Commands that steer and change between rows. interval : of the rows [s]."""
 
     interval: float
@@ -44,7 +44,7 @@ def row_interval(dataset: Dataset, runs: Sequence[str]) -> float:
     return float(rows.groupby("run", sort=False)["t"].diff().median())
 
 
-def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late | None:
+def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> LateCommands | None:
     """How late the commands of some runs come, where that is considerable for how fast the ship turns; else None.
 
     A vessel without a length is not judged.
@@ -55,7 +55,7 @@ def late_commands(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> Late
     steering = [name for name in steering if (by_run[name].nunique() > 1).any()]
     if not steering or vessel.length is None:
         return None
-    late = Late(row_interval(dataset, runs))
+    late = LateCommands(row_interval(dataset, runs))
     return late if late.delay * float(rows["u"].abs().mean()) / vessel.length >= CONSIDERABLE else None
 
 

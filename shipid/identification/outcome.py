@@ -81,7 +81,7 @@ class SettingsFile(BaseModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class Identification:
     """Result of an identification with its statistics and its validation.
 
     vessel : the base vessel. runs, held_out : runs of the fit, and of the test. digest : of the dataset.
@@ -258,7 +258,7 @@ def run_identification(
     programme: bool = False,
     band: float | None = None,
     progress: Progress | None = None,
-) -> Identified:
+) -> Identification:
     """Identify a vessel from recorded runs, and validate it by free runs, also of the runs held out.
 
     Parameters
@@ -312,7 +312,7 @@ def run_identification(
             *shared,
             *solution.warnings,
             *filter(None, (_in_log(solution, dataset, judged),)),
-            *unmeasured(vessel, dataset, fitted, settings),
+            *warn_of_unmeasured_inputs(vessel, dataset, fitted, settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
             *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER])),
@@ -335,7 +335,7 @@ def run_identification(
             warnings += tuple(filter(None, (missing,)))
         if refused:
             warnings = (*warnings, f"no bands on standard manoeuvres: {refused}")
-        return Identified(
+        return Identification(
             vessel=vessel,
             solution=solution,
             statistics=judged,
@@ -484,7 +484,7 @@ def check_identification(
     return fitted, tested
 
 
-def write_patch(outcome: Identified, file: Path) -> Path:
+def write_patch(outcome: Identification, file: Path) -> Path:
     """Write the identified vessel as a patch on its base; an existing file is never overwritten."""
     return write_new(outcome.patch(file), file, "patch")
 
@@ -674,7 +674,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
     )
 
 
-def unmeasured(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
+def warn_of_unmeasured_inputs(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> list[str]:
     """A warning if the vessel feels what nobody measured: the numbers make up for it."""
     lacking = missing_inputs(vessel, dataset, settings, runs)
     if not lacking:

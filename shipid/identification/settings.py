@@ -237,7 +237,7 @@ def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
         scales.append(tuple(settings.scale.get(path, base[path]) for path in group))
     centre = np.array([0.0 if base[group[0]] == 0 else 1.0 for group in groups])
     high, prior = np.full(len(groups), np.inf), np.full(len(groups), np.inf)
-    key = _Digested(vessel.digest, vessel)
+    key = _VesselKey(vessel.digest, vessel)
     low = np.array([max(_smallest_factor(key, path) for path in group) for group in groups])
     place = {path: i for i, group in enumerate(groups) for path in group}
     if settings.ranges:
@@ -286,7 +286,7 @@ def _without_dimensions(asked: Sequence[str], settings: Identify) -> list[str]:
 
 
 @dataclass(frozen=True)
-class _Digested:
+class _VesselKey:
     """A vessel as a key of a cache: two are equal if their documents have one digest."""
 
     digest: str
@@ -294,7 +294,7 @@ class _Digested:
 
 
 @lru_cache(maxsize=4096)
-def _smallest_factor(key: _Digested, path: str) -> float:
+def _smallest_factor(key: _VesselKey, path: str) -> float:
     """Smallest factor that the vessel's checks accept: -inf; 0 if they refuse the other sign; `POSITIVE` if also 0."""
     vessel, base = key.vessel, key.vessel.parameters[path]
     if base == 0 or _accepts_value(vessel, path, -base):

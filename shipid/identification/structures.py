@@ -97,7 +97,7 @@ PLANAR = re.compile(r"[XYN]_[uvr|]+")  # a coefficient that a structure may have
 
 
 @dataclass(frozen=True, eq=False)
-class Exchanged:
+class HullExchange:
     """A vessel with another hull.
 
     settings : with its coefficients free. misfit : axis -> RMS over the rows of the data of what the starting values
@@ -121,7 +121,7 @@ def check_structures(names: Sequence[str]) -> None:
 
 def exchange_structure(
     vessel: Vessel, name: str, dataset: Dataset, runs: Sequence[str], settings: Identify
-) -> Exchanged:
+) -> HullExchange:
     """Exchange the hull of a vessel for that of a structure, with starting values that make the same forces.
 
     Parameters
@@ -137,7 +137,7 @@ def exchange_structure(
     """
     check_structures([name])
     if name == PRESENT:
-        return Exchanged(vessel, settings, dict.fromkeys(AXES, 0.0))
+        return HullExchange(vessel, settings, dict.fromkeys(AXES, 0.0))
     structure = STRUCTURES[name]
     rudders = _rudders_behind_propellers(vessel) if structure.rudder else {}
     paths = [*structure.hull, *(f"{rudder}.{term}" for rudder in rudders for term in structure.rudder)]
@@ -148,7 +148,7 @@ def exchange_structure(
     positive = np.array([path.endswith("hull.mmg.R_0") for path in paths])
     begun = np.where(positive, np.maximum(c, LEAST * sizes), begun)
     result = bare.with_values(dict(zip(paths, begun.tolist(), strict=True)))
-    return Exchanged(result, _settings_of_exchange(vessel, result, settings, rudders, paths, begun, sizes), misfit)
+    return HullExchange(result, _settings_of_exchange(vessel, result, settings, rudders, paths, begun, sizes), misfit)
 
 
 def _rudders_behind_propellers(vessel: Vessel) -> dict[str, Mapping[str, Any]]:

@@ -40,7 +40,7 @@ def common_instants(
     first, last = max(times[0] for times in spans.values()), min(times[-1] for times in spans.values())
     slack = clock_slack(t)
     if step is not None:
-        t = even_instants(first, last + slack, step, [*spans.values()], file, "clock.step")
+        t = instants_at_step(first, last + slack, step, [*spans.values()], file, "clock.step")
     shared: NDArray[np.float64] = t[(t >= first - slack) & (t <= last + slack)]
     if len(shared) < 2:
         late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))
@@ -50,7 +50,7 @@ def common_instants(
     return shared
 
 
-def even_instants(
+def instants_at_step(
     first: float, last: float, step: float, times: list[NDArray[np.float64]], file: Path, path: str
 ) -> NDArray[np.float64]:
     """Return the instants [s] that are `step` [s] apart from first to last; none where it is before first.

@@ -52,7 +52,7 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
     """
     row = signal_row(name)
     ordered = row is not None and row.angle and is_command(name)
-    if column.wrap and ordered and not is_all_round(name) and not begins_again(values[np.isfinite(values)], name):
+    if column.wrap and ordered and not is_all_round(name) and not may_wrap(values[np.isfinite(values)], name):
         raise DataError(f"{column.source!r} {_not_of_turns(values)}", file=file, path=f"columns.{name}")
     if column.wrap or not (is_wrapped_angle(name) or name == "course" or ordered):
         return
@@ -67,7 +67,7 @@ def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: flo
         count = "once" if len(places) == 1 else f"{len(places)} times, first"
         sentence = f"{column.source!r} jumps by a whole turn, {count} at {format_moment(times[places[0] + 1])}"
         remedy = "write wrap = true"
-        if ordered and not begins_again(values[known], name):
+        if ordered and not may_wrap(values[known], name):
             remedy = f"it {_not_of_turns(values)}"
         elif ordered and not is_all_round(name):
             remedy = "is the unit right? If it counts from 0 to 360 deg, write wrap = true"
@@ -79,7 +79,7 @@ def _not_of_turns(values: Array) -> str:
     return f"goes from {low:.4g} to {high:.4g} deg, as no such angle does that begins again: is the unit right?"
 
 
-def begins_again(values: Array, command: str) -> bool:
+def may_wrap(values: Array, command: str) -> bool:
     """Whether angles (N,) [rad] of a command may begin again after a whole turn; a rudder does so about amidships."""
     near = is_all_round(command) or bool(np.all(np.cos(values) > 0.0))
     return near and bool(np.max(values, initial=-np.inf) - np.min(values, initial=np.inf) < 1.02 * TURN)

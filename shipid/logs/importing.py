@@ -36,7 +36,7 @@ from shipid.logs.channels import (
     Channel,
     close_gaps,
     common_instants,
-    even_instants,
+    instants_at_step,
     interpolation_rule,
     resample_channel,
 )
@@ -77,7 +77,7 @@ Begins = list[tuple[float, str]]
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedLog:
     """One log in SI units and body-fixed axes, with its repairs, the number of rows read and the origin [deg].
 
     begins : time [s] and name of every run in it, where the mapping parts it.
@@ -126,7 +126,7 @@ def import_log(
             path="source.sha256",
         )
     logs = run_files(mapping.source, source)
-    each: list[tuple[str, Imported]] = []
+    each: list[tuple[str, ImportedLog]] = []
     for run, log, table in _run_tables(mapping, logs, progress):
         each.append((run, _import_table(mapping, log, table, off)))
         if mapping.origin is None and (first := each[0][1].origin) is not None:  # that of all runs
@@ -288,7 +288,7 @@ def _run_texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_
     return np.asarray(column.astype(str).str.strip().to_numpy(dtype=object))
 
 
-def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> Imported:
+def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[str, ...]) -> ImportedLog:
     rows, first, read, begins = _mapped_columns(mapping, file, log)
     _check_breaks(mapping, rows["t"].to_numpy(), off, file)
     wrapping = [repair for repair in mapping.repair if isinstance(repair, WrapInterpolation)]
@@ -324,7 +324,9 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
         if mapping.resamples or "latitude" in mapping.columns
         else list(rows.columns)
     )
-    return Imported(rows[order].reset_index(drop=True), first + records + gaps + more + estimated, read, origin, begins)
+    return ImportedLog(
+        rows[order].reset_index(drop=True), first + records + gaps + more + estimated, read, origin, begins
+    )
 
 
 def _add_records(parts: list[Records]) -> Records:
@@ -478,7 +480,7 @@ def _cut_into_runs(rows: pd.DataFrame, segments: Iterable[Segment], unit: float,
     return runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
 
 
-def _split_runs(log: Imported, name: str) -> Iterator[pd.DataFrame]:
+def _split_runs(log: ImportedLog, name: str) -> Iterator[pd.DataFrame]:
     """Yield the runs of a log, each after its name in it; a run of a single row is no run."""
     t = log.rows["t"].to_numpy()
     starts = np.array([start for start, _ in log.begins])
@@ -514,7 +516,7 @@ def _resample_log(dataset: Dataset, step: float, file: Path) -> Dataset:
     def resample() -> Iterator[pd.DataFrame]:
         for run, rows in stretches_of_runs(dataset):
             t = rows["t"].to_numpy()
-            instants = even_instants(t[0], t[-1] + clock_slack(t), step, [t], file, "resample.step")
+            instants = instants_at_step(t[0], t[-1] + clock_slack(t), step, [t], file, "resample.step")
             frame = pd.DataFrame({"t": instants, **sample_columns(rows, instants)})
             frame.insert(0, "run", pd.Series([run] * len(frame), dtype="str"))
             # a break that stays flagged while its row is held over several instants would break each of them

@@ -168,18 +168,18 @@ def _from_main_talker(t: Array, main: NDArray[np.bool_]) -> NDArray[np.bool_]:
     A receiver may change its letters with the satellites in sight, as from GP to GN. Two receivers speak side by side.
     """
     places = np.flatnonzero(main)
-    steps = _time_apart(t[places][1:], t[places][:-1])
+    steps = _time_gap(t[places][1:], t[places][:-1])
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     behind = np.searchsorted(places, np.arange(len(t)))
     first, last = np.maximum(behind - 1, 0), np.minimum(behind, len(places) - 1)
     before, after = np.where(behind > 0, t[places[first]], t), np.where(behind < len(places), t[places[last]], t)
-    gap = _time_apart(after, before) * np.where(
+    gap = _time_gap(after, before) * np.where(
         (behind > 0) & (behind < len(places)), 1.0, 2.0
     )  # half of it is in the log
     return np.asarray(main | (gap > SILENT * usual))
 
 
-def _time_apart(after: Array, before: Array) -> Array:
+def _time_gap(after: Array, before: Array) -> Array:
     """Return how far times (N,) [s] are apart, over midnight, too."""
     return np.asarray(np.abs((after - before + HALF_DAY) % DAY - HALF_DAY))
 

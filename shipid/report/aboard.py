@@ -105,13 +105,13 @@ def paths_figure(content: AboardContent) -> PageFigure:
         "drawn." + (" Ellipses are the band at a few steps of each path." if banded else ""),
         alternative="The measured track, with the paths predicted along it and those of the physics alone.",
         height=520,
-        draw=lambda run: [_draw_seen(content, run, drawn)],
+        draw=lambda run: [_draw_moments(content, run, drawn)],
         controls=[_control_of_runs(content)],
         chips=[Chip(name, name, str(LOOKS[name]["color"]), str(LOOKS[name]["dash"])) for name in drawn],
     )
 
 
-def _draw_seen(content: AboardContent, run: str, drawn: Sequence[str]) -> Panel:
+def _draw_moments(content: AboardContent, run: str, drawn: Sequence[str]) -> Panel:
     track, points = (frame[frame["run"] == run] for frame in (content.track, content.points))
     traces = [make_line(LOGGED_TRACK, track["east"], track["north"], [LOGGED_TRACK], line=LOOKS[LOGGED_TRACK])]
     times = points["t"].unique()

@@ -24,9 +24,9 @@ from shipid.report.figure import (
 )
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
 from shipid.report.section import Section
-from shipid.report.selection import close_styles, close_up_models, model_chips, shown_sizes
+from shipid.report.selection import close_styles, close_up_models, figure_sizes, model_chips
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
-from shipid.report.wording import counted_text, listed_names, metres_text
+from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.units import level_text, percent_text, plural_word
 
 GROUP_WORDS = {"kind": "manoeuvre", "ahead": "time ahead"}
@@ -61,8 +61,8 @@ def coverage_figure(content: ReportContent) -> PageFigure | None:
     names = [name for name in close_up_models(content) if len(frame) and name in set(frame.model)]
     if not names:
         return None
-    counts, banded = shown_sizes(frame.N_D), frame.model.nunique()
-    drawn = f" Of {banded} models, {listed_names(names, 6)} {plural_word(len(names), 'is', 'are')} drawn."
+    counts, banded = figure_sizes(frame.N_D), frame.model.nunique()
+    drawn = f" Of {banded} models, {join_few_names(names, 6)} {plural_word(len(names), 'is', 'are')} drawn."
     return PageFigure(
         id="coverage",
         title="What bands promise, and what they hold",
@@ -120,7 +120,7 @@ def _takeaway_coverage(frame: pd.DataFrame, size: int) -> str:
     text += f"({least.model})" + (f" to {metres_text(most.width)} ({most.model}). " if len(mine) > 1 else ". ")
     if below.empty:
         return text + "No interval lies below its promise."
-    return text + f"Below their promise, interval and all: {listed_names([str(name) for name in below.model])}."
+    return text + f"Below their promise, interval and all: {join_few_names([str(name) for name in below.model])}."
 
 
 def width_figure(content: ReportContent) -> PageFigure | None:
@@ -165,7 +165,7 @@ def coverage_table(content: ReportContent) -> PageTable | None:
     if frame.empty:
         return None
     reasons = [
-        f"{listed_names([f'{row.model} at N_D = {row.N_D}' for row in rows_as_tuples(part)])}: {reason}"
+        f"{join_few_names([f'{row.model} at N_D = {row.N_D}' for row in rows_as_tuples(part)])}: {reason}"
         for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
     ]
     promised = [TableCell(level_text(level), level) for level in frame.level]

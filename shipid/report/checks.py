@@ -26,7 +26,7 @@ from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, listed_names, scientific_text, set_sentence, short_text
+from shipid.report.wording import counted_text, join_few_names, scientific_text, set_sentence, short_text
 
 CHECK_COLUMNS = {
     "run": TableColumn("run"),
@@ -72,7 +72,7 @@ class CheckContent(PageContent):
             return [AnswerSentence(f"All {every} of {runs} passed.")]
         return [
             AnswerSentence(f"{len(failed)} of {every} failed, in {failed['run'].nunique()} of {runs}."),
-            AnswerSentence(f"What failed: {listed_names(names_in(failed, 'check'), 8)}."),
+            AnswerSentence(f"What failed: {join_few_names(names_in(failed, 'check'), 8)}."),
         ]
 
 

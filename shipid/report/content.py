@@ -22,7 +22,7 @@ MODEL_NAME_COLUMNS = ("model", "without", "with")  # columns that name a model
 PUBLISHED = "published"  # the set of the envelope that holds the paper's numbers
 
 
-def spoken_model(model: str) -> str:
+def model_text(model: str) -> str:
     """Name of a model or family for people, with the method that may follow: `none` is `no physics`."""
     alone = model == DATA_DRIVEN or model.startswith(f"{DATA_DRIVEN} + ")
     return model.replace(DATA_DRIVEN, NO_PHYSICS, 1) if alone else model
@@ -175,26 +175,26 @@ class ReportContent(PageContent):
     def __post_init__(self) -> None:
         """Give the model without physics its name for people, wherever a model is named."""
         for name in ("cells", "models", "factors", "trials", "horizon", "over_time"):
-            object.__setattr__(self, name, with_spoken_models(getattr(self, name)))
-        object.__setattr__(self, "frames", {name: with_spoken_models(frame) for name, frame in self.frames.items()})
-        object.__setattr__(self, "snapshots", [window_with_spoken_models(snapshot) for snapshot in self.snapshots])
-        object.__setattr__(self, "alone", {spoken_model(model) for model in self.alone})
+            object.__setattr__(self, name, name_models(getattr(self, name)))
+        object.__setattr__(self, "frames", {name: name_models(frame) for name, frame in self.frames.items()})
+        object.__setattr__(self, "snapshots", [name_window_models(snapshot) for snapshot in self.snapshots])
+        object.__setattr__(self, "alone", {model_text(model) for model in self.alone})
 
     def frame(self, name: str) -> pd.DataFrame:
         """One of `frames`; without rows and columns where there is none of that name."""
         return self.frames.get(name, pd.DataFrame())
 
 
-def with_spoken_models(frame: pd.DataFrame) -> pd.DataFrame:
+def name_models(frame: pd.DataFrame) -> pd.DataFrame:
     """A frame whose models have their names for people."""
     columns = [column for column in MODEL_NAME_COLUMNS if column in frame]
-    return frame.assign(**{column: frame[column].map(spoken_model, na_action="ignore") for column in columns})
+    return frame.assign(**{column: frame[column].map(model_text, na_action="ignore") for column in columns})
 
 
-def window_with_spoken_models(snapshot: WindowSnapshot) -> WindowSnapshot:
+def name_window_models(snapshot: WindowSnapshot) -> WindowSnapshot:
     """A window whose models have their names for people."""
     paths, bands = (
-        {(spoken_model(model), source, size): line for (model, source, size), line in lines.items()}
+        {(model_text(model), source, size): line for (model, source, size), line in lines.items()}
         for lines in (snapshot.paths, snapshot.bands)
     )
     return replace(snapshot, paths=paths, bands=bands)

@@ -30,16 +30,16 @@ from shipid.report.selection import (
     close_up_models,
     data_driven,
     drawn_source,
+    figure_sizes,
     in_words,
     model_chips,
     nothing_learns,
     over_seeds,
-    shown_sizes,
     spread_items,
     thin_lines,
 )
 from shipid.report.tables import PageTable, TableColumn, frame_table
-from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text
 
 LINE_COLUMNS = ["model", "source", "N_D"]
 ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
@@ -73,7 +73,7 @@ def horizon_figure(content: ReportContent) -> PageFigure | None:
         return None
     frame = _rows_of_close_up(content.horizon, content)
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
-    columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], shown_sizes(frame.N_D)
+    columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], figure_sizes(frame.N_D)
     means = over_seeds(frame, [*LINE_COLUMNS, "ahead"], columns)
     return PageFigure(
         id="horizon",
@@ -100,7 +100,7 @@ def _draw_horizon(content: ReportContent, means: pd.DataFrame, statistic: str, s
 def time_figure(content: ReportContent) -> PageFigure | None:
     """Error per instant of prediction of a test run, the commands below on the same axis; None without times."""
     frame = _rows_of_close_up(content.over_time, content)
-    runs, size = spread_items(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), shown_sizes(frame.N_D)[-1]
+    runs, size = spread_items(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), figure_sizes(frame.N_D)[-1]
     if not runs:
         return None
     means = over_seeds(frame[frame.run.isin(runs) & frame.N_D.isin([0, size])], [*LINE_COLUMNS, "run", "t"], ["error"])
@@ -147,15 +147,13 @@ def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFra
     frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
     frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
     kept = frame.model.isin(close_up_models(content)) | frame.source.eq("naive")
-    return frame[kept & frame.N_D.isin([0, *shown_sizes(frame.N_D)])]
+    return frame[kept & frame.N_D.isin([0, *figure_sizes(frame.N_D)])]
 
 
 def _models_of_close_up(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
-    words = (
-        f" Of {total} models, the middle one of each family by A, and the best in validation: {listed_names(shown, 6)}."
-    )
+    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {join_few_names(shown, 6)}."
     return words if len(shown) < total else ""
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, ReportContent, rows_as_tuples, spoken_model
+from shipid.report.content import DATA_DRIVEN, ReportContent, model_text, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MARKERS,
@@ -26,7 +26,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import models_by_accuracy
 from shipid.report.tables import PageTable, TableColumn, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, listed_names, metres_text, number_text, shorten_name
+from shipid.report.wording import counted_text, join_few_names, metres_text, number_text, shorten_name
 
 STRIP_HEIGHT = 42  # height of a model [px]
 MOST_LETTERS_OF_ROW = 11  # characters of a name that fit beside its errors on a phone
@@ -60,7 +60,7 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
         how="One dot per perturbed number, at its factor on the base model, logarithmic; rows by "
         "rising A, with the mean absolute error along and across the heading at the instant of prediction where known."
         + (" A factor that is not positive lies at the left edge: 0 removes the term." if crosses else "")
-        + (f" Not perturbed: {listed_names(untouched, 6)}." if untouched else ""),
+        + (f" Not perturbed: {join_few_names(untouched, 6)}." if untouched else ""),
         alternative=f"Dots at the factors of {counted_text(len(names), 'model')}; the table of models has A.",
         height=STRIP_HEIGHT * len(names) + 70,
         draw=lambda: [_draw_strips(content, frame, names)],
@@ -153,7 +153,7 @@ def models_table(content: ReportContent) -> PageTable:
         "models",
         "Every model",
         takeaway,
-        with_failures(frame).assign(family=frame.family.map(spoken_model)),
+        with_failures(frame).assign(family=frame.family.map(model_text)),
         MODEL_COLUMNS,
     )
 

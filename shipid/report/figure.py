@@ -248,7 +248,7 @@ def row_name(row: int, words: str) -> dict[str, Any]:
     return {**place, "text": words, "font": {"size": 12}, "bgcolor": "var(--page)", "borderpad": 0}
 
 
-def spread_apart(places: Sequence[float], gap: float, most: float) -> list[float]:
+def spread_places(places: Sequence[float], gap: float, most: float) -> list[float]:
     """Move rising places at least `gap` apart and none beyond `most`, each as little as those before it allow."""
     moved: list[float] = []
     for place in places:

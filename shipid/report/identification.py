@@ -42,7 +42,7 @@ from shipid.report.tables import (
     with_cells,
     word_cell,
 )
-from shipid.report.wording import counted_text, listed_names, number_text, scientific_text, set_sentence
+from shipid.report.wording import counted_text, join_few_names, number_text, scientific_text, set_sentence
 from shipid.units import interval_text
 
 PARAMETER_HEIGHT, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
@@ -144,7 +144,7 @@ def _errors_before_and_after(content: IdentificationContent) -> str:
         for rms in [rows[name].astype(float)]
     ]
     return (
-        f"On {runs}, the root mean square error of a free run {_run_length(content)} goes in {listed_names(changes)}."
+        f"On {runs}, the root mean square error of a free run {_run_length(content)} goes in {join_few_names(changes)}."
     )
 
 
@@ -162,11 +162,11 @@ def estimates_figure(content: IdentificationContent) -> PageFigure:
     return PageFigure(
         id="estimates",
         title="The estimates",
-        takeaway=f"Not identified: {listed_names(vague, 8)}." if vague else "Every parameter is identified.",
+        takeaway=f"Not identified: {join_few_names(vague, 8)}." if vague else "Every parameter is identified.",
         how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
         "an interval wider than ±100 % of the base value, or the estimate is at a bound or was dropped."
         + (
-            f" The base has 0 for {listed_names(none, 8)}: there factors are on the scale, which is dotted."
+            f" The base has 0 for {join_few_names(none, 8)}: there factors are on the scale, which is dotted."
             if none
             else ""
         )
@@ -347,7 +347,7 @@ def residuals_figure(content: IdentificationContent) -> PageFigure | None:
     return PageFigure(
         id="residuals",
         title="Autocorrelation of the residuals",
-        takeaway=f"The correlation of residuals one sample apart is {listed_names(first)}.",
+        takeaway=f"The correlation of residuals one sample apart is {join_few_names(first)}.",
         how="Autocorrelation of the weighted residuals, pooled over runs. White residuals drop to 0; a long "
         "tail shows effects that the model, or the data on wind and current, lack; standard errors then count runs.",
         alternative="Autocorrelation of the residuals of each signal over lag.",

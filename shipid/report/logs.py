@@ -23,7 +23,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import thin_lines
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, word_cell
-from shipid.report.wording import counted_text, distance_text, listed_names, number_text
+from shipid.report.wording import counted_text, distance_text, join_few_names, number_text
 
 TRAINING_COLOUR, TEST_COLOUR, VALIDATION_COLOUR = (category_colour(i) for i in range(3))
 TRACK_DETAIL = 2000  # a track needs no more detail than extent / PIXELS
@@ -49,7 +49,7 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
     bounds = [(float(tracks[column].min()), float(tracks[column].max())) for column in ("east", "north")]
     names, counts = names_in(tracks, "set"), tracks.groupby("set").run.nunique()
     east, north = (distance_text(high - low) for low, high in bounds)
-    runs = listed_names([f"{counted_text(int(counts[name]), 'run')} ({name})" for name in names], 6)
+    runs = join_few_names([f"{counted_text(int(counts[name]), 'run')} ({name})" for name in names], 6)
     return PageFigure(
         id="manoeuvres",
         title="The manoeuvres",
@@ -127,7 +127,7 @@ def _beyond_words(frame: pd.DataFrame) -> str:
     if not outside:
         return f"The test stays inside what the other sets cover in all {counted_text(len(tested), 'input')}."
     reach = f"{len(outside)} of {counted_text(len(tested), 'input')}"
-    return f"The test reaches outside what the other sets cover in {reach}: {listed_names(outside)}."
+    return f"The test reaches outside what the other sets cover in {reach}: {join_few_names(outside)}."
 
 
 def input_ranges(content: ReportContent) -> PageTable | None:
@@ -154,7 +154,7 @@ def repairs_table(content: ReportContent) -> PageTable | None:
     if content.repairs.empty:
         return None
     kinds = names_in(content.repairs, "kind")
-    takeaway = f"{counted_text(len(content.repairs), 'repair')}: {listed_names(kinds)}."
+    takeaway = f"{counted_text(len(content.repairs), 'repair')}: {join_few_names(kinds)}."
     return frame_table("repairs", "What the importer repaired", takeaway, content.repairs, REPAIR_COLUMNS)
 
 

@@ -29,7 +29,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import in_words, spread_items
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
-from shipid.report.wording import counted_text, difference_text, listed_names, number_text
+from shipid.report.wording import counted_text, difference_text, join_few_names, number_text
 
 MOST_MEMORY_LINES = 6  # models that have a line in a figure
 COMPARISON_COLUMNS = {
@@ -70,7 +70,7 @@ def memory_gain(content: ReportContent) -> PageFigure | None:
         "Windows of one run are alike, so runs are drawn whole; with fewer than five runs there is none. Every "
         "interval is for one comparison alone: of many, one in twenty excludes 0 by chance."
         + (f" Of {total} models, {len(models)} spread over A have lines." if len(models) < total else "")
-        + (f" Not memory alone differs in {listed_names(differing)}." if differing else ""),
+        + (f" Not memory alone differs in {join_few_names(differing)}." if differing else ""),
         alternative="Lines of the position error H over the number of manoeuvres, in pairs with and without memory or "
         "observer; below, the difference of each pair with an interval. The numbers are in the table below.",
         height=640,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, AnswerSentence, PageContent, ReportContent, rows_as_tuples, spoken_model
+from shipid.report.content import DATA_DRIVEN, AnswerSentence, PageContent, ReportContent, model_text, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MARKERS,
@@ -31,7 +31,7 @@ from shipid.report.figure import (
 )
 from shipid.report.section import Section
 from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, difference_text, ends_text, listed_names, number_text, shorten_name
+from shipid.report.wording import counted_text, difference_text, ends_text, join_few_names, number_text, shorten_name
 from shipid.units import plural_word
 
 ALL_WITH_PHYSICS = "with physics"
@@ -99,7 +99,7 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     best, alike = whole.iloc[0], whole.H.iloc[0] * (1 + ALIKE_ERRORS) >= whole.H
     tied, over = [str(name) for name in whole.method[alike]], " over all cells with physics" if first else ""
     err = plural_word(len(tied), "errs", "err alike,")
-    text = f"with N_D = {N_D} {listed_names(tied)} {err} least{over}, {number_text(best.H)} m"
+    text = f"with N_D = {N_D} {join_few_names(tied)} {err} least{over}, {number_text(best.H)} m"
     leads = best.reference in tied
     for row in rows_as_tuples(whole[~alike if leads else alike][:1]):
         if math.isfinite(row.low):
@@ -108,12 +108,12 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     partial = set(mine.method[mine.missing.gt(0)])
     if ahead := [name for name in best.ahead.split(", ") if name in partial]:
         text += (
-            f", but over the cells that both have {listed_names(ahead)} {plural_word(len(ahead), 'errs', 'err')} less"
+            f", but over the cells that both have {join_few_names(ahead)} {plural_word(len(ahead), 'errs', 'err')} less"
         )
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in rows_as_tuples(mine[mine.failed.gt(0)])]
-    text += f", without a result: {listed_names(failed)}" if failed else ""
+    text += f", without a result: {join_few_names(failed)}" if failed else ""
     partly = [str(row.method) for row in rows_as_tuples(mine[mine.missing.gt(mine.failed)])]
-    return text + (f" (left out: {listed_names(partly)}, not on every model)" if partly else "")
+    return text + (f" (left out: {join_few_names(partly)}, not on every model)" if partly else "")
 
 
 def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
@@ -143,7 +143,7 @@ def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
         ),
         controls=[Control("Condition", conditions), sizes] if len(conditions) > 1 else [sizes],
         chips=[
-            Chip(f"family:{name}", spoken_model(name), str(look["color"]), "none", symbol=str(look["symbol"]))
+            Chip(f"family:{name}", model_text(name), str(look["color"]), "none", symbol=str(look["symbol"]))
             for name in families
             for look in [_family_marker(name, families)]
         ],
@@ -209,9 +209,9 @@ def _dots_of_family(
     words: Sequence[str],
 ) -> Trace:
     y = [order.index(name) + shift for name in rows.method]
-    hover = [f"{spoken_model(family)}, {name}: {text}" for name, text in zip(rows.method, words, strict=True)]
+    hover = [f"{model_text(family)}, {name}: {text}" for name, text in zip(rows.method, words, strict=True)]
     look: Trace = {"mode": "markers", "marker": _family_marker(family, families)}
-    return make_line(spoken_model(family), values, y, [f"family:{family}"], hover=list(map(escape_name, hover)), **look)
+    return make_line(model_text(family), values, y, [f"family:{family}"], hover=list(map(escape_name, hover)), **look)
 
 
 def methods_table(content: ReportContent | MethodsContent) -> PageTable:
@@ -222,7 +222,7 @@ def methods_table(content: ReportContent | MethodsContent) -> PageTable:
         TableCell(f"{row['failed']} of {row['cells']}", float(row["failed"]), bool(row["failed"])) for row in records
     ]
     paired = {name: [_paired_cell(row, name) for row in records] for name in ("over_runs", "better_runs", "by_world")}
-    shown = with_cells(frame.assign(family=frame.family.map(spoken_model)), without=failed, **paired)
+    shown = with_cells(frame.assign(family=frame.family.map(model_text)), without=failed, **paired)
     shown = shown.drop(columns="condition") if frame.condition.nunique() < 2 else shown
     counts = frame.loc[frame.family.ne(ALL_WITH_PHYSICS), ["failed", "cells"]].sum()
     bad, every = int(counts["failed"]), counted_text(int(counts["cells"]), "cell")

@@ -37,8 +37,8 @@ from shipid.report.selection import (
     close_up_models,
     data_driven,
     drawn_source,
+    figure_sizes,
     in_words,
-    shown_sizes,
     spread_items,
     thin_lines,
 )
@@ -72,7 +72,7 @@ def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
 
 def window_sizes(content: ReportContent) -> list[int]:
     """List the N_D a reader can choose from."""
-    return shown_sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
+    return figure_sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
 
 
 def browser_figure(content: ReportContent) -> PageFigure | None:

@@ -29,7 +29,7 @@ from shipid.report.figure import (
     make_axis,
     make_line,
     make_plot,
-    spread_apart,
+    spread_places,
 )
 from shipid.report.section import Section
 from shipid.report.selection import (
@@ -46,7 +46,7 @@ from shipid.report.selection import (
     spread_items,
     words_on_left_out,
 )
-from shipid.report.wording import CONSTANT_MOTION, counted_text, listed_names, metres_text, number_text, shorten_name
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text, shorten_name
 
 HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
@@ -230,7 +230,7 @@ def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
     known = rows[rows.A.notna()].reset_index(drop=True)
     room = 1 + int(np.ptp(known.y) / top * INSIDE / NAME_HEIGHT)
     some = even_places(len(known), max(room, FEW_MODELS))
-    heights = spread_apart(known.y[some].tolist(), NAME_HEIGHT / INSIDE * top, float(known.y.max()))
+    heights = spread_places(known.y[some].tolist(), NAME_HEIGHT / INSIDE * top, float(known.y.max()))
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
     return [
         {
@@ -314,7 +314,7 @@ def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
 def _not_on_map(content: ReportContent) -> str:
     """Sentence on the methods whose place on the map another has; empty if there are none."""
     names = list(overview_models(content).loc[same_physics, "model"])
-    return f" Not on the map, where another method has their place: {listed_names(names, 6)}." if names else ""
+    return f" Not on the map, where another method has their place: {join_few_names(names, 6)}." if names else ""
 
 
 def _model_without_physics(rows: pd.DataFrame) -> str:
@@ -353,7 +353,7 @@ def cells_without_result(content: ReportContent) -> str:
         count = every[model, size]
         share = f", {len(failed)} of {count} seeds" if len(failed) < count else ""
         names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
-    return f" Not plotted: {listed_names(names, 6)}; reasons in the table of cells." if names else ""
+    return f" Not plotted: {join_few_names(names, 6)}; reasons in the table of cells." if names else ""
 
 
 def gain_lack(content: ReportContent) -> str:

@@ -25,7 +25,7 @@ from shipid.report.figure import (
     make_plot,
 )
 from shipid.report.section import Section
-from shipid.report.selection import shown_sizes
+from shipid.report.selection import figure_sizes
 from shipid.report.tables import PageTable, TableColumn, frame_table
 from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, short_text
 
@@ -55,7 +55,7 @@ def search_figure(content: ReportContent) -> PageFigure | None:
     names, frame = searched_names(content), _with_ratio(content.trials)
     if not names or frame.empty:
         return None
-    counts = shown_sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
+    counts = figure_sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
     early = "triangles are those that a part of the windows judged, and that were not among the best; "
     thinned = f"of many, at most {MOST_DOTS + MOST_CHOSEN:,} are drawn in a panel; "
     tried = sorted({int(kind) for kind in frame.memory.dropna()}) if "memory" in names else []

@@ -179,7 +179,7 @@ def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping
     ]
 
 
-def shown_sizes(values: pd.Series[int], count: int = 3) -> list[int]:
+def figure_sizes(values: pd.Series[int], count: int = 3) -> list[int]:
     """Small, middle and large N_D among those present; physics alone (N_D = 0) counts only if there is nothing else."""
     present = sorted({int(value) for value in values if value > 0}) or [0]
     return [int(size) for size in spread_items([str(size) for size in present], count)]

@@ -24,7 +24,7 @@ from shipid.report.tables import (
     with_cells,
     word_cell,
 )
-from shipid.report.wording import fixed_text, listed_names
+from shipid.report.wording import fixed_text, join_few_names
 from shipid.units import digit_decimals
 
 GROUP_ERRORS = {
@@ -124,7 +124,7 @@ def structure_manoeuvres(content: StructuresContent) -> PageTable:
     cautions = {
         why: [name for name, own in content.cautions.items() if own == why] for why in content.cautions.values()
     }
-    words = [f"{listed_names(which, len(which))}: {why}" for why, which in cautions.items() if why]
+    words = [f"{join_few_names(which, len(which))}: {why}" for why, which in cautions.items() if why]
     takeaway += f" Intervals may be too narrow. {'; '.join(words)}." if words else ""
     columns = {name: TableColumn(name) for name in place} | {name: TableColumn(name, numeric=True) for name in names}
     columns |= {

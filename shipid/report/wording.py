@@ -81,7 +81,7 @@ def distance_text(value: float) -> str:
     return f"{value / 1000:.1f} km" if value >= 1000 else f"{value:.0f} m"
 
 
-def listed_names(names: Sequence[str], limit: int = 4) -> str:
+def join_few_names(names: Sequence[str], limit: int = 4) -> str:
     """Join as `a, b and c`; what exceeds the limit is counted."""
     shown = [*names] if len(names) <= limit else [*names[: limit - 1], f"{len(names) - limit + 1} more"]
     return units.join_names(shown) or "none"

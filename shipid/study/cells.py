@@ -11,14 +11,14 @@ import numpy as np
 from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, shorten_line
-from shipid.hybrid.method import Case, Corrector, Fitted, Task, TrialJournal, fit_all
+from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
 from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, StudyMethod
-from shipid.study.foundations import Prediction, predictions
+from shipid.study.foundations import FoundationPrediction, predictions
 from shipid.study.plan import Batch, Unit
 from shipid.study.prepare import (
-    Prepared,
+    PreparedStudy,
     at_instants,
     instants_of,
     physics_of,
@@ -41,15 +41,15 @@ class Work(NamedTuple):
     known : foundation -> what it predicts for the batch.
     """
 
-    prepared: Prepared
+    prepared: PreparedStudy
     batch: Batch
     windows: Windows
     ways: Mapping[str, StudyMethod]
-    known: Mapping[str, Prediction]
+    known: Mapping[str, FoundationPrediction]
     device: str
 
 
-def work_of(prepared: Prepared, unit: Unit, ways: tuple[StudyMethod, ...], device: str) -> Work:
+def work_of(prepared: PreparedStudy, unit: Unit, ways: tuple[StudyMethod, ...], device: str) -> Work:
     """The windows of a unit, and its foundations, those fitted that are to be."""
     runs = prepared.runs(unit.batch)
     windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
@@ -60,7 +60,7 @@ def work_of(prepared: Prepared, unit: Unit, ways: tuple[StudyMethod, ...], devic
     )
 
 
-def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None) -> dict[str, Fitted]:
+def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None) -> dict[str, FitResult]:
     """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
     mine = {name: work.known[name] for name in way.foundations}
@@ -89,10 +89,10 @@ def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None
         )
         return fit_all(method, task)
     except DataError as error:
-        return {name: Fitted(None, [], 0.0, sentence=error.message) for name in mine}
+        return {name: FitResult(None, [], 0.0, sentence=error.message) for name in mine}
 
 
-def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, Fitted]]) -> Errors:
+def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -> Errors:
     """(Foundation, method) -> errors (T, S, 2) [m] by cells fitted without these runs, and seconds that they took.
 
     Of the pairs that have no such errors for nothing: methods that learn step by step, and foundations fitted to the
@@ -153,7 +153,7 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, Fitted]]) -> E
 def evaluate_cell(
     work: Work,
     pair: tuple[str, str],
-    fitted: Mapping[str, Mapping[str, Fitted]],
+    fitted: Mapping[str, Mapping[str, FitResult]],
     left_out: Errors,
     origin: Mapping[str, str],
 ) -> Cell:
@@ -172,7 +172,9 @@ def evaluate_cell(
     row |= {"minutes": covered_time(work.windows) / 60, "seconds": result.seconds + one.seconds + seconds}
     row["trials"] = result.trials
     if result.corrector is None:
-        return Cell(row | _failed("failed", shorten_line(result.sentence or one.sentence or "no training converged")))
+        return Cell(
+            row | _failed_columns("failed", shorten_line(result.sentence or one.sentence or "no training converged"))
+        )
     if not any(other.fitted for other in prepared.foundations if other.family == foundation.family):
         errors = result.left_out if result.left_out is not None else errors  # fair: the physics saw none of these runs
     predictor = _predictor(work, foundation, way, result.corrector, origin)
@@ -181,7 +183,7 @@ def evaluate_cell(
     predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **without})
     chosen = result.corrector.hyperparameters
     words = ", ".join(f"{key} {chosen[key]:.3g}" for key in way.method.varied() if key in chosen)
-    outcome, paths = _tested(prepared, one, predictor, way)
+    outcome, paths = _test_errors(prepared, one, predictor, way)
     return Cell({**row, **outcome, "hyperparameters": words}, predictor, paths)
 
 
@@ -191,21 +193,21 @@ def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
     return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"]}
 
 
-def _failed(status: str, sentence: str) -> dict[str, Any]:
+def _failed_columns(status: str, sentence: str) -> dict[str, Any]:
     """The columns of a row without a result."""
     blank = dict.fromkeys(("H", "H_90", "rms", "coverage", "width"), np.nan)
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
-def _tested(
-    prepared: Prepared, one: Prediction, predictor: Predictor, way: StudyMethod
+def _test_errors(
+    prepared: PreparedStudy, one: FoundationPrediction, predictor: Predictor, way: StudyMethod
 ) -> tuple[dict[str, Any], Array | None]:
     """Errors [m] of a predictor on the test windows, and its paths where they are finite and within reach of a ship."""
     test, study = prepared.test, prepared.study
     failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
     if failed.any():
         share = f"physics diverges on {percent_text(failed.mean(), 1)} of the test windows"
-        return _failed("diverged", share if np.isfinite(one.paths).all() else one.sentence), None
+        return _failed_columns("diverged", share if np.isfinite(one.paths).all() else one.sentence), None
     instants = instants_of(study, predictor.vessel, prepared.data, test, one.estimates)
     predictor.check_restored(instants, one.test_paths, way.method.corrector)
     paths = predictor.predict(instants, one.test_paths)
@@ -214,7 +216,9 @@ def _tested(
     )  # where physics has diverged, too
     if failed.any():
         where = f"{percent_text(failed.mean(), 1)} of the test windows"
-        return _failed("diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"), None
+        return _failed_columns(
+            "diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"
+        ), None
     error = summarise_errors(position_error(paths, test.future))
     outcome = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"], "coverage": np.nan, "width": np.nan}
     level = study.bands.level

@@ -15,14 +15,14 @@ from shipid.units import plural_word
 
 
 @dataclass(frozen=True)
-class Checked:
+class FolderCheck:
     """Result of a check: lines for people, and the files that are not as they were written."""
 
     lines: list[str]
     faults: list[Fault]
 
 
-def check_folder(folder: Path) -> Checked:
+def check_folder(folder: Path) -> FolderCheck:
     """Check the files of a run's folder against their digests, those of all its parts included.
 
     Raises ResultError if it is not the folder of a run, or if its study, vessels or provenance were edited. Of a study
@@ -37,11 +37,11 @@ def check_folder(folder: Path) -> Checked:
     try:
         plan = store.stored_plan(folder)
     except store.NotTaken as error:
-        return Checked([*lines, f"{_count_words(every)}; how far the run is cannot be said: {error}"], every)
+        return FolderCheck([*lines, f"{_count_words(every)}; how far the run is cannot be said: {error}"], every)
     for name, part in plan.parts.items():
         place = store.check_part(folder, name, part.plan)
         lines += _state(place, part.plan, faults[place], f"{name}: ") if place in faults else [f"{name}: not begun"]
-    return Checked([*lines, *_state(folder, plan, faults[folder])], every)
+    return FolderCheck([*lines, *_state(folder, plan, faults[folder])], every)
 
 
 def _count_words(faults: list[Fault]) -> str:

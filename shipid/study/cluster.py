@@ -162,7 +162,7 @@ def _results(
     mistake: Exception | None = None
     waiting, given = iter(tasks), None
     try:
-        given = client.submit(_given, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
+        given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         while mistake is None:
             watch.look()
             for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
@@ -207,7 +207,7 @@ def _results(
         raise ShipidError(f"{words}; {REMEDY}, or take larger workers; {KEPT}")
 
 
-def _given(shared: Shared) -> Shared:
+def _return_shared(shared: Shared) -> Shared:
     return shared
 
 

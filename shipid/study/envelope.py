@@ -11,7 +11,7 @@ import pandas as pd
 from shipid.data.windows import Windows
 from shipid.hybrid.features import choose_features, feature_table
 from shipid.physics.signals import read_unit, signal_of
-from shipid.study.schema import Published, published_keys
+from shipid.study.schema import PublishedEnvelope, published_keys
 
 ENVELOPE_COLUMNS = ("min", "mean", "max")
 
@@ -36,7 +36,7 @@ def input_envelope(
     ]
 
 
-def envelope_table(rows: Iterable[Mapping[str, Any]], published: Published | None) -> pd.DataFrame:
+def envelope_table(rows: Iterable[Mapping[str, Any]], published: PublishedEnvelope | None) -> pd.DataFrame:
     """The envelope in degrees and rpm, a row per set and quantity; what is published is the set of that name."""
     shown = []
     for row in rows:
@@ -45,7 +45,7 @@ def envelope_table(rows: Iterable[Mapping[str, Any]], published: Published | Non
     return pd.DataFrame([*shown, *_published_rows(published, [row["quantity"] for row in shown])])
 
 
-def _published_rows(published: Published | None, quantities: Sequence[str]) -> list[dict[str, Any]]:
+def _published_rows(published: PublishedEnvelope | None, quantities: Sequence[str]) -> list[dict[str, Any]]:
     """Rows of the published envelope for those quantities that the study has."""
     rows = []
     for key, limits in (published.envelope if published else {}).items():

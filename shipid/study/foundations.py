@@ -14,7 +14,7 @@ from shipid.data.windows import Windows
 from shipid.errors import ShipidError
 from shipid.observer import Estimates
 from shipid.study.declared import Foundation
-from shipid.study.prepare import Prepared, chosen_observer, estimates_of, paths_of, rows_apart_from_test
+from shipid.study.prepare import PreparedStudy, chosen_observer, estimates_of, paths_of, rows_apart_from_test
 
 if TYPE_CHECKING:
     from shipid.identification.settings import Identify
@@ -24,7 +24,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Prediction:
+class FoundationPrediction:
     """What a foundation of one batch predicts before any method improves it.
 
     foundation : with the numbers that were identified and the observer that was chosen, if any.
@@ -43,8 +43,8 @@ class Prediction:
 
 
 def predictions(
-    prepared: Prepared, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
-) -> dict[str, Prediction]:
+    prepared: PreparedStudy, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
+) -> dict[str, FoundationPrediction]:
     """Every foundation for some runs of the pool; those to be fitted see these runs, and no moment of the test.
 
     wanted : names of foundations; None: all.
@@ -59,22 +59,22 @@ def predictions(
             continue
         if not one.fitted:
             paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
-            result[one.name] = Prediction(one, *paths, estimates=prepared.estimates.get(one.name))
+            result[one.name] = FoundationPrediction(one, *paths, estimates=prepared.estimates.get(one.name))
         else:
             data = rows_apart_from_test(prepared.data, prepared.test) if data is None else data
-            result[one.name] = _fitted(prepared, one, runs, data, windows, device, known)
+            result[one.name] = _fit_foundation(prepared, one, runs, data, windows, device, known)
     return result
 
 
-def _fitted(
-    prepared: Prepared,
+def _fit_foundation(
+    prepared: PreparedStudy,
     foundation: Foundation,
     runs: tuple[str, ...],
     data: Dataset,
     windows: Windows,
     device: str,
     known: dict[Any, Solution],
-) -> Prediction:
+) -> FoundationPrediction:
     """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone."""
     study = prepared.study
     now, sentence, seconds = foundation, "", 0.0
@@ -83,7 +83,7 @@ def _fitted(
         if foundation.identify is not None:
             solution = _solution(foundation, foundation.identify, runs, data, known)
             if solution.status != "ok":
-                return _nothing(foundation, windows, prepared.test, f"{words}: {solution.sentence}")
+                return _failed_prediction(foundation, windows, prepared.test, f"{words}: {solution.sentence}")
             assert foundation.variant is not None
             values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
             now = replace(foundation, variant=replace(foundation.variant, values=values))
@@ -96,10 +96,12 @@ def _fitted(
         estimates = estimates_of(study, now, prepared.data, prepared.test, calls) if now.observer is not None else None
         pair = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
-        return _nothing(foundation, windows, prepared.test, f"{words}: {error.message}")
+        return _failed_prediction(foundation, windows, prepared.test, f"{words}: {error.message}")
     if not np.isfinite(pair[0]).all():
-        return _nothing(foundation, windows, prepared.test, f"{words}: the model diverges on training windows")
-    return Prediction(now, *pair, sentence, seconds, estimates)
+        return _failed_prediction(
+            foundation, windows, prepared.test, f"{words}: the model diverges on training windows"
+        )
+    return FoundationPrediction(now, *pair, sentence, seconds, estimates)
 
 
 def _solution(
@@ -116,7 +118,7 @@ def _solution(
     return known[key]
 
 
-def _nothing(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> Prediction:
+def _failed_prediction(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> FoundationPrediction:
     """A foundation without a result: paths that are no numbers, and why."""
     here, there = (np.full_like(part.future, np.nan) for part in (windows, test))
-    return Prediction(foundation, here, there, sentence)
+    return FoundationPrediction(foundation, here, there, sentence)

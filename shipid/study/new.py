@@ -219,7 +219,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     fixed += [*_folds_and_grid(amounts), method]
     warnings = _warn_of_failed_checks(seen, data)
     warnings += [*over_gaps(dataset, all_windows(plan, dataset)), *warn_of_constant_commands(dataset, usable)]
-    warnings += _warn_of_seen_tests(families, tests)
+    warnings += _warn_of_identified_tests(families, tests)
     try:
         choices, plan = _first_that_runs(fixed, every, families, out, vessels, dataset)
     except DivergenceError as error:
@@ -232,7 +232,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     return Draft(_study_text(choices, warnings), tuple(choices), plan, tuple(warnings), looks)
 
 
-def _warn_of_seen_tests(families: Sequence[Mapping[str, Any]], tests: Sequence[str]) -> Iterator[str]:
+def _warn_of_identified_tests(families: Sequence[Mapping[str, Any]], tests: Sequence[str]) -> Iterator[str]:
     """A warning for each family as it is whose vessel was identified from test runs."""
     for family in families:
         runs = [run for run in family.get("seen", []) if run in tests]

@@ -196,7 +196,7 @@ def input_files(plan: Plan) -> list[Path]:
     named = [] if data is None else [mapping_of(data, here), data.log, data.dataset]
     vessels = [Path(vessel.file) for vessel in plan.vessels.values()]
     of_parts = (name for part in plan.parts.values() for name in input_files(part.plan))
-    mine = (path_beside_study(here.parent, name) for name in named if name is not None)
+    mine = (path_from_study(here.parent, name) for name in named if name is not None)
     return list(dict.fromkeys([here, *vessels, *mine, *of_parts]))
 
 
@@ -276,7 +276,7 @@ def whole_unit(plan: Plan, batch: Batch) -> Unit:
     return Unit(batch, tuple((name, way.name) for name, way in plan.pairs), batch.key)
 
 
-def judged_method(plan: Plan) -> str:
+def verdict_method(plan: Plan) -> str:
     """Name of the method that findings and the answer speak of."""
     named = plan.study.claims.method if plan.study.claims else None
     learning = [way for way in plan.methods if way.method.compensates]
@@ -286,7 +286,7 @@ def judged_method(plan: Plan) -> str:
 
 def plain_rival(plan: Plan) -> str | None:
     """Name of the method that predicts without physics and without mirror symmetry, if there is one."""
-    judged = judged_method(plan)
+    judged = verdict_method(plan)
     alone = [way for way in plan.methods if way.foundations == (NO_MODEL,) and way.name != judged]
     return next((way.name for way in alone if way.method.traits.mirror is False), None)
 
@@ -307,7 +307,7 @@ def learns_from_runs(plan: Plan, family: str, method: str) -> bool:
     return family in fitted_families(plan) or any(way.method.compensates for way in plan.methods if way.name == method)
 
 
-def families_aside(plan: Plan) -> set[str]:
+def uncounted_families(plan: Plan) -> set[str]:
     """Families that are shown, but that no claim and no sentence of the answer counts."""
     return plan.study.claims.not_judged if plan.study.claims else set()
 
@@ -326,7 +326,7 @@ def unfair_reason(plan: Plan, tests: Iterable[str]) -> str:
 
 def model_label(plan: Plan, foundation: str, method: str) -> str:
     """Name of a model for people: the foundation, with the method where that is not the one judged."""
-    return foundation if method == judged_method(plan) else f"{foundation} {WITH} {method}"
+    return foundation if method == verdict_method(plan) else f"{foundation} {WITH} {method}"
 
 
 def orders_may_react(plan: Plan) -> bool:
@@ -409,7 +409,7 @@ def _check_and_expand(
     )
     truth = None
     if study.truth is not None:
-        _check_amounts(study, study.truth, file)
+        _check_truth_amounts(study, study.truth, file)
         base = named_vessel(study.truth.vessel, file, "truth.vessel", known)
         try:
             truth = truth_vessel(study.truth, base)
@@ -521,7 +521,7 @@ def _check_memory(plan: Plan) -> None:
     check_memory(numbers, words, "prediction.interval", plan.file)
 
 
-def path_beside_study(folder: Path, name: str) -> Path:
+def path_from_study(folder: Path, name: str) -> Path:
     """A file that a study names: from the study's folder, else from the working folder."""
     return folder / name if (folder / name).exists() else Path(name)
 
@@ -529,7 +529,7 @@ def path_beside_study(folder: Path, name: str) -> Path:
 def mapping_of(data: Data, file: Path) -> str | None:
     """The mapping that a study names: a bundled name as it is, a path from the study's folder on."""
     named = data.mapping
-    return str(path_beside_study(file.parent, named)) if named is not None and named.endswith(".toml") else named
+    return str(path_from_study(file.parent, named)) if named is not None and named.endswith(".toml") else named
 
 
 def _sources(data: Data | None, file: Path) -> dict[str, str]:
@@ -542,13 +542,13 @@ def _sources(data: Data | None, file: Path) -> dict[str, str]:
         digests["mapping"] = mapping.digest
         if data.log is not None:
             with suppress(DataError):
-                digests["log"] = log_digest(mapping, path_beside_study(file.parent, data.log))
-    if data.dataset is not None and path_beside_study(file.parent, data.dataset).is_file():
-        digests["dataset"] = file_digest(path_beside_study(file.parent, data.dataset))
+                digests["log"] = log_digest(mapping, path_from_study(file.parent, data.log))
+    if data.dataset is not None and path_from_study(file.parent, data.dataset).is_file():
+        digests["dataset"] = file_digest(path_from_study(file.parent, data.dataset))
     return digests
 
 
-def _check_amounts(study: Study, truth: Truth, file: Path) -> None:
+def _check_truth_amounts(study: Study, truth: Truth, file: Path) -> None:
     """Refuse a truth with too few manoeuvres for the grid, or too short ones for the horizon."""
     test, most, ahead = study.split.test, max(study.grid.N_D), study.prediction.horizon * study.prediction.step
     if not isinstance(test, int):

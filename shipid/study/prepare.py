@@ -43,7 +43,7 @@ from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of_runs
-from shipid.study.plan import Batch, Plan, mapping_of, past_steps, path_beside_study
+from shipid.study.plan import Batch, Plan, mapping_of, past_steps, path_from_study
 from shipid.study.ranges import check_memory, window_numbers
 from shipid.study.schema import Study
 from shipid.units import percent_text, plural_word
@@ -56,7 +56,7 @@ MOST_REDRAWS = 100
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PreparedStudy:
     """All that cells need, the same for every worker.
 
     study : the checked document, with the seeds of its world.
@@ -109,7 +109,7 @@ class Prepared:
 
 
 @contextmanager
-def _located(plan: Plan) -> Iterator[None]:
+def _name_study_file(plan: Plan) -> Iterator[None]:
     """Name the file of the study in an error that names none."""
     try:
         yield
@@ -121,7 +121,7 @@ def obtain_runs(plan: Plan) -> Dataset:
     """The runs of a study: simulated by its truth, imported from its log, or read."""
     study, folder = plan.study, Path(plan.file).parent
     if study.truth is not None and plan.truth is not None:
-        with _located(plan):
+        with _name_study_file(plan):
             frame = simulate_truth(study.truth, plan.truth)
         runs = map(str, frame["run"].unique())
         kinds = {run: kind_in_name(kind_name(one)) for run, one in zip(runs, draw_manoeuvres(study.truth), strict=True)}
@@ -130,10 +130,10 @@ def obtain_runs(plan: Plan) -> Dataset:
         return Dataset(frame, {**known, "manoeuvres": manoeuvres})
     assert study.data is not None
     if study.data.dataset is not None:
-        return read_dataset(path_beside_study(folder, study.data.dataset))
+        return read_dataset(path_from_study(folder, study.data.dataset))
     source = mapping_of(study.data, Path(plan.file))
     assert source is not None
-    log = fetch_log(source) if study.data.log is None else path_beside_study(folder, study.data.log)
+    log = fetch_log(source) if study.data.log is None else path_from_study(folder, study.data.log)
     return import_log(read_mapping(source), log, without=study.data.without)
 
 
@@ -142,7 +142,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
 
     Raises DocumentError where the runs do not suffice.
     """
-    with _located(plan):
+    with _name_study_file(plan):
         windows = all_windows(plan, dataset)
         is_test = np.isin(windows.run, _test_runs(plan.study, windows))
         test, rest = windows.select(is_test), windows.select(~is_test)
@@ -210,7 +210,7 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     except DataError as error:
         raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
     if study.data is not None and study.data.causal:
-        with _located(plan):
+        with _name_study_file(plan):
             known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
         windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
@@ -218,7 +218,7 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     return windows
 
 
-def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
+def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
     """Cut windows, set the test runs aside, and roll every model out on all of them.
 
     A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
@@ -238,9 +238,9 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> Prepared:
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
     estimates: dict[str, Estimates] = {}
-    with _located(plan):
+    with _name_study_file(plan):
         foundations, paths = _roll_out(plan, dataset, [rest, test], notes, device, estimates)
-    return Prepared(
+    return PreparedStudy(
         study=plan.study,
         data=dataset,
         pool=rest,

@@ -17,7 +17,7 @@ BEGUN, COUNTED, TRIED = 0, 2, 4  # entries of Optuna's journal: a study, an attr
 
 
 @dataclass(frozen=True)
-class Searching:
+class SearchProgress:
     """A search that goes on: its cell, how many trials have ended, how many there will be, and the best value [m^2].
 
     count : None where a budget has not yet been turned into a number. best : inf where no trial has a value.
@@ -43,10 +43,10 @@ class Watch:
     plan: Plan
     folder: Path
 
-    def look(self) -> list[Searching]:
+    def look(self) -> list[SearchProgress]:
         """Return the searches that go on, those that were written to last first; none of units that are finished."""
         plans = {part_folder(self.folder, name): part.plan for name, part in self.plan.parts.items()}
-        left: list[tuple[float, list[Searching]]] = []
+        left: list[tuple[float, list[SearchProgress]]] = []
         for folder, plan in (plans or {self.folder: self.plan}).items():
             counts = {way.name: way.method.num_trials() for way in plan.methods if way.method.compensates}
             finished = seals.seal_names(folder)
@@ -58,10 +58,10 @@ class Watch:
         return [one for _, searches in newest for one in searches if one.done != one.count]
 
 
-def _searches_of_journal(content: bytes, counts: Mapping[str, int | None]) -> list[Searching]:
+def _searches_of_journal(content: bytes, counts: Mapping[str, int | None]) -> list[SearchProgress]:
     """The searches of a journal, those that were written to last first. counts : method -> trials of a search."""
     cells: list[str] = []
-    known: dict[str, Searching] = {}
+    known: dict[str, SearchProgress] = {}
     for line in content.splitlines():
         try:
             entry = json.loads(line)
@@ -74,7 +74,7 @@ def _searches_of_journal(content: bytes, counts: Mapping[str, int | None]) -> li
                     entry.get("value"),
                 )
                 method = next((name for name in counts if f"{WITH}{name}-N" in cell), "")
-                one = known.pop(cell, None) or Searching(cell, 0, counts.get(method), inf)
+                one = known.pop(cell, None) or SearchProgress(cell, 0, counts.get(method), inf)
                 if entry["op_code"] == TRIED:
                     one = replace(one, done=one.done + 1, best=min(one.best, inf if value is None else value))
                 known[cell] = replace(one, count=count or one.count)

@@ -23,7 +23,7 @@ from shipid.predictor import check_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
 from shipid.study.kinds import kinds_of_runs
-from shipid.study.plan import Plan, families_aside, families_set_from, judged_method, model_label
+from shipid.study.plan import Plan, families_set_from, model_label, uncounted_families, verdict_method
 
 CELLS_BETWEEN_WORDS = 20  # cells read between words on how far it is
 MOST_KEPT = 2**30  # bytes of predicted paths in memory
@@ -105,7 +105,7 @@ class Results:
     @property
     def aside(self) -> set[str]:
         """Families that are shown, but that no claim and no sentence of the answer counts."""
-        return {*families_aside(self.plan), *self.saw_test}
+        return {*uncounted_families(self.plan), *self.saw_test}
 
     @property
     def saw_test(self) -> set[str]:
@@ -135,7 +135,7 @@ class Results:
     @property
     def judged_cells(self) -> pd.DataFrame:
         """Rows of the cells of the method that findings and the answer speak of; `model` is the foundation."""
-        cells = self.cells[self.cells["method"] == judged_method(self.plan)]
+        cells = self.cells[self.cells["method"] == verdict_method(self.plan)]
         return cells.assign(model=cells["foundation"])
 
 

@@ -30,7 +30,7 @@ from shipid.study.cluster import Known, Line, SentSearches, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
-from shipid.study.prepare import Prepared, foundation_record, obtain_runs, prepare, runs_by_amount
+from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
 from shipid.study.sessions import Code, Sessions, check_workers, machine, session_at_worker, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
@@ -150,7 +150,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
 
 
 def run_unit(
-    plan: Plan, prepared: Prepared, unit: Unit, device: str, journal: Searches | None = None
+    plan: Plan, prepared: PreparedStudy, unit: Unit, device: str, journal: Searches | None = None
 ) -> list[store.Cell]:
     """All cells of one unit of work. Pure: the same on every worker. journal : in which its searches go on."""
     use_threads(1)
@@ -173,7 +173,7 @@ def _dataset(plan: Plan, folder: Path, sessions: Sessions) -> Dataset:
     return read_dataset(folder / store.DATASET)
 
 
-def _write_common(plan: Plan, folder: Path, prepared: Prepared, sessions: Sessions) -> None:
+def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy, sessions: Sessions) -> None:
     """Store what all batches share, so that a report needs nothing else."""
     store.check_place(sessions.folder, plan.digest)
     sessions.note_engine(noted_engine())
@@ -191,7 +191,7 @@ def _write_common(plan: Plan, folder: Path, prepared: Prepared, sessions: Sessio
 
 
 def _compute(
-    plan: Plan, prepared: Prepared, units: Iterable[Unit], place: Path, sessions: Sessions, means: Means
+    plan: Plan, prepared: PreparedStudy, units: Iterable[Unit], place: Path, sessions: Sessions, means: Means
 ) -> Computed:
     """Units and their results in the order in which they finish; what they were computed with is noted before."""
     journals = partial(open_journal, place.absolute() / store.JOURNALS, plan.digest)
@@ -220,7 +220,7 @@ def open_journal(folder: Path, digest: str, unit: str) -> Journal:
 
 
 def _on_pool(
-    plan: Plan, prepared: Prepared, journals: Callable[[str], Journal], device: str, unit: Unit
+    plan: Plan, prepared: PreparedStudy, journals: Callable[[str], Journal], device: str, unit: Unit
 ) -> tuple[str | None, list[store.Cell]]:
     """A unit on a worker of this machine: the engine that the worker has by now, and the results."""
     results = run_unit(plan, prepared, unit, device, journals(unit.key))
@@ -228,7 +228,7 @@ def _on_pool(
 
 
 def _on_cluster(
-    shared: tuple[Plan, Prepared, str, Code], task: tuple[Unit, Mapping[str, Known]], line: Line
+    shared: tuple[Plan, PreparedStudy, str, Code], task: tuple[Unit, Mapping[str, Known]], line: Line
 ) -> tuple[list[dict[str, Any]], list[store.Cell]]:
     """A unit on a worker of a cluster: what it was computed with, before and after, and the results."""
     plan, prepared, device, code = shared
@@ -243,7 +243,7 @@ def _searches(unit: Unit, journal: Journal) -> dict[str, Known]:
     return {cell: (journal.rows(cell), journal.count(cell)) for cell in cells}
 
 
-def _finish(plan: Plan, folder: Path, prepared: Prepared, device: str, begun: float) -> None:
+def _finish(plan: Plan, folder: Path, prepared: PreparedStudy, device: str, begun: float) -> None:
     """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
     record = store.provenance(folder)
     if seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in record:

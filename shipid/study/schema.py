@@ -178,14 +178,14 @@ class Claims(Strict):
         return {*self.aside, *([self.nominal] if self.nominal else [])}
 
 
-class Published(Strict):
+class PublishedEnvelope(Strict):
     """`[published]`: the input envelope that others report, to be shown beside that of the study."""
 
     source: Annotated[str, Field(min_length=3)]
     envelope: dict[str, list[FiniteFloat]] = Field(description="key -> [min, mean, max]")
 
     @model_validator(mode="after")
-    def _sensible(self) -> Published:
+    def _sensible(self) -> PublishedEnvelope:
         for key, limits in self.envelope.items():
             if key not in published_keys():
                 raise ValueError(f"envelope.{key} is no input of a study: {suggest_name(key, published_keys())}")
@@ -230,7 +230,7 @@ class Study(Strict):
     grid: Grid
     method: Annotated[list[MethodBlock], Field(min_length=1)] = [MethodBlock(name="drawn", kind="path-drawn")]
     claims: Claims | None = None
-    published: Published | None = None
+    published: PublishedEnvelope | None = None
     bands: BandsBlock = BandsBlock()
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     family: Annotated[list[Family], Field(min_length=1)]

@@ -31,8 +31,8 @@ from shipid.identification.outcome import (
     TRIED,
     pick_runs,
     residual_spacing,
-    unmeasured,
     unrecorded_time_warning,
+    warn_of_unmeasured_inputs,
     without_shared,
 )
 from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
@@ -228,7 +228,7 @@ def compare_structures(
         digest=digest,
         shared=(
             *shared,
-            *unmeasured(vessel, dataset, fitted, settings),
+            *warn_of_unmeasured_inputs(vessel, dataset, fitted, settings),
             *unrecorded_time_warning(dataset, fitted, settings),
         ),
         ahead=length,

@@ -143,7 +143,7 @@ def _serve(connection: Connection) -> None:
     except EOFError:
         return
     except Exception as error:  # a class of the user that cannot be imported here, or no more threads for this user
-        connection.send_bytes(_packed(error))
+        connection.send_bytes(_pack_result(error))
         _listen(connection, tasks)  # so that the task that comes first is no write to a closed connection
     while True:
         result = None
@@ -153,10 +153,10 @@ def _serve(connection: Connection) -> None:
         except Exception as error:
             error.add_note("".join(traceback.format_exception(error)))
             result = error
-        connection.send_bytes(_packed(result))
+        connection.send_bytes(_pack_result(result))
 
 
-def _packed(result: Any) -> Any:
+def _pack_result(result: Any) -> Any:
     """The result as bytes, or an error where it cannot be sent: what a user's own method makes may be of any class."""
     try:
         content = ForkingPickler.dumps(result)

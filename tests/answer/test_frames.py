@@ -46,7 +46,7 @@ def test_the_outline_of_a_band_is_closed_and_where_its_region_ends() -> None:
     ahead = np.broadcast_to([1.0, 0.0], (3, 1, 2))
     region = Region(ahead, np.full((3, 1), 2.0), np.full((3, 1), 1.0))
     path = np.array([[[1.0, 0.0]], [[2.0, 0.0]], [[3.0, 0.0]]])
-    outline = frames.band_outline(region, path, 0)
+    outline = frames.region_outline(region, path, 0)
     np.testing.assert_array_equal(outline[0], outline[-1])
     np.testing.assert_allclose(outline.max(axis=0), [5.0, 1.0])
     np.testing.assert_allclose(outline.min(axis=0), [0.0, -1.0])
@@ -181,8 +181,8 @@ def test_trials_know_the_chosen_one(read: Results) -> None:
 
 def test_curves_are_kept_for_the_ends_and_the_middle_of_the_amounts(read: Results) -> None:
     many = pd.concat([read.cells.assign(N_D=10 * k) for k in range(1, 11)], ignore_index=True)
-    assert frames.shown_amounts(replace(read, cells=many)) == [10, 30, 100]
-    assert frames.shown_amounts(replace(read, cells=read.cells[read.cells["N_D"] == 4])) == [4]
+    assert frames.figure_amounts(replace(read, cells=many)) == [10, 30, 100]
+    assert frames.figure_amounts(replace(read, cells=read.cells[read.cells["N_D"] == 4])) == [4]
 
 
 def test_factors_are_those_of_the_members(read: Results) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from shipid.answer.verdict import (
     ClaimRule,
-    Undecided,
+    UndecidedClaim,
     count_runs,
     difference_with_interval,
     interval_after,
@@ -37,7 +37,7 @@ def test_verdicts() -> None:
 
 def test_a_rule_without_what_it_needs_is_undecided() -> None:
     def lacking(_: object) -> Any:
-        raise Undecided("no model")
+        raise UndecidedClaim("no model")
 
     rules = {"S1": ClaimRule("one", lambda _: ("confirmed", "so", {"x": 1.0})), "S2": ClaimRule("two", lacking)}
     assert [tuple(one.values()) for one in judge_claims(rules, None, "of few")] == [

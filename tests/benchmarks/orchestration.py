@@ -24,11 +24,11 @@ import torch
 
 from shipid.cli.terminal import draw_events
 from shipid.hybrid import ridge
-from shipid.hybrid.method import Fitted, Task
+from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import run as study
 from shipid.study.plan import Plan, Unit, read_plan
-from shipid.study.prepare import Prepared, obtain_runs, prepare
+from shipid.study.prepare import PreparedStudy, obtain_runs, prepare
 from tests.benchmarks.timing import best_of, clock
 
 CELL = 1.0  # s
@@ -71,13 +71,13 @@ def overhead() -> dict[str, Any]:
     }
 
 
-def known_unit(plan: Plan, prepared: Prepared, unit: Unit, device: str, trials: Path | None = None) -> Any:
+def known_unit(plan: Plan, prepared: PreparedStudy, unit: Unit, device: str, trials: Path | None = None) -> Any:
     """As `run_unit`, with cells that take a known time."""
     with patch.object(ridge, "tune_ridge", _known_tune):
         return run_unit(plan, prepared, unit, device, trials)
 
 
-def _known_tune(task: Task, method: PathDrawn) -> dict[str, Fitted]:
+def _known_tune(task: Task, method: PathDrawn) -> dict[str, FitResult]:
     begun = time.thread_time()
     tuned = tune_ridge(task, method.model_copy(update=LIGHT))
     a = np.ones((64, 64))

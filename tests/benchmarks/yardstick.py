@@ -26,7 +26,7 @@ from shipid.hybrid.method import Case, Method, Task
 from shipid.hybrid.path_trained import PathTrained
 from shipid.metrics import position_error, summarise_errors
 from shipid.study.plan import Batch, Plan, read_plan
-from shipid.study.prepare import Prepared, instants_of, obtain_runs, physics_of, prepare
+from shipid.study.prepare import PreparedStudy, instants_of, obtain_runs, physics_of, prepare
 from shipid.study.sessions import machine
 
 KEPT = Path(__file__).with_suffix(".json")
@@ -57,13 +57,13 @@ CELLS = (  # spanning N_D and A; worlds that no method was chosen on
 )
 
 
-def world(number: int) -> tuple[Plan, Prepared]:
+def world(number: int) -> tuple[Plan, PreparedStudy]:
     """The study `simulation` in a world: its plan and all that its cells need."""
     plan = read_plan("simulation", {"seed": number, "method": [{"name": "drawn", "kind": "path-drawn"}]})
     return plan, prepare(plan, obtain_runs(plan))
 
 
-def tune_cell(plan: Plan, prepared: Prepared, cell: Cell, method: Method) -> dict[str, Any]:
+def tune_cell(plan: Plan, prepared: PreparedStudy, cell: Cell, method: Method) -> dict[str, Any]:
     """Tune one cell alone, on one thread: core-seconds, H and H_90 [m], and its trials."""
     batch = Batch(cell.N_D, plan.batches[0].seed)
     mask = np.isin(prepared.pool.run, prepared.runs(batch))

@@ -58,10 +58,10 @@ class Still:
     looks = 0
 
     def look(self) -> list[Any]:
-        from shipid.study.progress import Searching
+        from shipid.study.progress import SearchProgress
 
         self.looks += 1
-        return [Searching("a[b]-N0004-s0", min(self.looks, 2), 50, 0.25), Searching("c-N0004-s0", 1, 50, 1.0)]
+        return [SearchProgress("a[b]-N0004-s0", min(self.looks, 2), 50, 0.25), SearchProgress("c-N0004-s0", 1, 50, 1.0)]
 
 
 def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.data.windows import Instants
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.bands import Bands
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
@@ -192,7 +192,7 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
     seen = replace_planned(instants)
     wind = {name for name in ("u_rw", "v_rw") if rng.random() < 0.5}
     if kind == "alone":
-        return Unchanged({})
+        return UnchangedPath({})
     if kind == "learned-force":
         mass = float(physics.vessel.document["inertia"]["m"])
         block = {"u_scale": 5.0 * slow, "v_scale": slow, "r_scale": 0.1 / slow}

@@ -15,7 +15,7 @@ from shipid.export.band import BAND_CHOICE, band_rows, radii_at
 from shipid.export.c import NumberPrecision
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import build_model
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
@@ -149,7 +149,9 @@ def test_a_band_adapts_as_in_python(tmp_path):
 
 
 def test_no_bands_leave_no_trace():
-    predictor = Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", Unchanged({}), {}, {"no_band": "too few"})
+    predictor = Predictor(
+        Physics(load_vessel("mariner"), 3, 5.0), "alone", UnchangedPath({}), {}, {"no_band": "too few"}
+    )
     files = predictor_files(build_model(predictor), "m", NumberPrecision())
     assert "No band: too few." in files.texts["m.h"]
     assert "m_predict_band" not in files.texts["m.h"]

@@ -24,7 +24,7 @@ from shipid.export.c_vessel import VesselParts, vessel_files
 from shipid.export.equations import Equations
 from shipid.export.known import POSITION_ENTRIES
 from shipid.export.model import build_model
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.features import Memory
 from shipid.hybrid.physics import Physics
 from shipid.observer import AGE_COLUMN, LONGEST_FILTER_STEP, MOST_FILTER_STEPS, Observer, filter_bank, run_observer
@@ -121,7 +121,7 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
 def test_a_position_that_is_missing_matters_where_python_takes_it(vessel, tmp_path):
     """Without physics Python does not look at north and east; C refused such rows."""
     physics = Physics(vessel and load_vessel(vessel), 6, 5.0)
-    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 1.0)})
+    predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (0.0, 1.0)})
     recorder = Recorder(predictor, tmp_path)
     row = np.linspace(0.1, 0.3, len(recorder.model.layout.now))
     row[: len(POSITION_ENTRIES)] = np.nan, -np.inf
@@ -145,7 +145,7 @@ def test_sanitizers_are_silent(kind, tmp_path):
 
 @pytest.mark.slow
 def test_no_address_is_wrong_with_an_observer(tmp_path):
-    predictor = Predictor(Physics(variety()["actuators"], 10, 1.0, "rk4", Observer()), "alone", Unchanged({}), {})
+    predictor = Predictor(Physics(variety()["actuators"], 10, 1.0, "rk4", Observer()), "alone", UnchangedPath({}), {})
     run_example(predictor_files(build_model(predictor), "odd", NumberPrecision()), tmp_path, "-fsanitize=address")
 
 
@@ -273,7 +273,7 @@ def test_a_row_just_after_an_instant_of_the_past_is_not_taken_for_it(tmp_path):
 )
 def test_actuators_go_on_over_what_is_no_pause(t, first, tmp_path):
     vessel = variety()["actuators"]
-    predictor = Predictor(Physics(vessel, 20, 0.25), "alone", Unchanged({}), {"u": (-9.0, 9.0)})
+    predictor = Predictor(Physics(vessel, 20, 0.25), "alone", UnchangedPath({}), {"u": (-9.0, 9.0)})
     log = log_of(vessel, 16, np.random.default_rng(5), 1.0).frame.iloc[: len(t)].assign(t=t.astype(float))
     hidden = {name: values[-1:] for name, values in reached_in(vessel, log.iloc[first:]).items()}
     columns = {name: values[-1:] for name, values in columns_of(log).items()}
@@ -301,7 +301,7 @@ def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_pa
     vessel = variety()["actuators"]
     pause, anew = filter_bank(vessel, ONE_FILTER).pause, 0
     physics = Physics(vessel, 5, step, "rk4", ONE_FILTER)
-    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-99.0, 99.0)}, run_up=3.0)
+    predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (-99.0, 99.0)}, run_up=3.0)
     recorder = Recorder(predictor, tmp_path)
     for seed, every in enumerate((0.3, 1.0, 4.0, 15.0)):
         rng = np.random.default_rng(seed)
@@ -331,7 +331,7 @@ def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(singl
     """A clock in micro- or nanoseconds: else a row would take minutes, or would never end."""
     vessel = variety()["gunnerus-28.9"]
     physics = Physics(vessel, 5, 1.0, "rk4", ONE_FILTER)
-    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (-99.0, 99.0)}, run_up=3.0)
+    predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (-99.0, 99.0)}, run_up=3.0)
     recorder, limit = (
         Recorder(predictor, tmp_path, NumberPrecision(single)),
         MOST_FILTER_STEPS * filter_bank(vessel, ONE_FILTER).longest,
@@ -401,7 +401,7 @@ def test_no_compiler_warns_of_a_conversion(program, single, tmp_path):
 def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
     vessel = variety()["mariner"]
     adrift = vessel.with_values({f"thruster.{name}.off": True for name in vessel.document["thruster"]})
-    predictor = Predictor(Physics(adrift, 3, 1.0, observer=Observer()), "alone", Unchanged({}))
+    predictor = Predictor(Physics(adrift, 3, 1.0, observer=Observer()), "alone", UnchangedPath({}))
     library(predictor_files(build_model(predictor), "odd", NumberPrecision()), tmp_path)
 
 
@@ -464,7 +464,7 @@ def test_names_are_those_of_c():
 
 
 def test_examples_run_and_end_with_the_result_of_a_row_that_is_refused(tmp_path):
-    predictor = Predictor(Physics(load_vessel("mariner"), 6, 5.0), "alone", Unchanged({}), {"u": (0.0, 8.0)})
+    predictor = Predictor(Physics(load_vessel("mariner"), 6, 5.0), "alone", UnchangedPath({}), {"u": (0.0, 8.0)})
     files = predictor_files(build_model(predictor), "m", NumberPrecision())
     assert "30 s: " in run_example(files, tmp_path / "a")
     assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", NumberPrecision()), tmp_path / "b")

@@ -15,7 +15,7 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.export.model import build_model
 from shipid.export.write import export_predictor, export_vessel
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.observer import ESTIMATE_COLUMNS, Observer
 from shipid.predictor import Predictor
@@ -50,7 +50,7 @@ def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
     estimates = {f"observer.{name}": columns.get(name, 0.0) + rng.normal(0, 1e-4, 3) for name in ESTIMATE_COLUMNS}
     estimates["observer.north"] = estimates["observer.north"] + 300.0
     predictor = Predictor(
-        Physics(vessel, 4, 5.0, observer=settings, path=path), "alone", Unchanged({}), {"u": (0.0, 9.0)}
+        Physics(vessel, 4, 5.0, observer=settings, path=path), "alone", UnchangedPath({}), {"u": (0.0, 9.0)}
     )
     instants = Instants(columns, estimates=estimates)
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
@@ -67,7 +67,7 @@ def test_a_path_that_diverged_is_none(step, tmp_path):
     vessel = load_vessel("mariner")
     columns = {name: np.zeros(2) for name in ("psi", "v", "r")} | {"u": np.array([7.0, 0.1])}
     columns |= {"propeller.n": np.array([1.3, 0.0]), "rudder.delta": np.array([0.5, 0.0])}
-    predictor = Predictor(Physics(vessel, 6, step), "alone", Unchanged({}), {"u": (0.0, 9.0)})
+    predictor = Predictor(Physics(vessel, 6, step), "alone", UnchangedPath({}), {"u": (0.0, 9.0)})
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
     given, expected = build_model(predictor).inputs(Instants(columns)), predictor.predict(Instants(columns))
     for i in range(2):
@@ -80,7 +80,7 @@ def test_a_path_that_diverged_is_none(step, tmp_path):
 def test_an_observer_without_wind_and_current_has_derivatives(tmp_path):
     """Before, the Hessian by the orders was no number, for the direction of no wind is none; IPOPT gave up."""
     predictor = Predictor(
-        Physics(load_vessel("gunnerus-28.9"), 5, 1.0, observer=Observer(current=0.0)), "alone", Unchanged({}), {}, {},
+        Physics(load_vessel("gunnerus-28.9"), 5, 1.0, observer=Observer(current=0.0)), "alone", UnchangedPath({}), {}, {},
         "known",
     )  # fmt: skip
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")

@@ -25,7 +25,7 @@ from shipid.export.c import c_name
 from shipid.export.fmu import model_description, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import build_model
 from shipid.export.write import export_vessel
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import check_document, load_vessel
@@ -47,7 +47,7 @@ def ship(tmp_path_factory):
 @pytest.fixture(scope="module")
 def predictor():
     physics = Physics(load_vessel("mariner"), 6, 5.0, "rk4")
-    return Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 8.0)}, {}, "known")
+    return Predictor(physics, "alone", UnchangedPath({}), {"u": (0.0, 8.0)}, {}, "known")
 
 
 @pytest.fixture(scope="module")
@@ -651,7 +651,7 @@ def test_the_band_of_a_predictor_is_that_of_python(tmp_path):
     strange = drawn("alone", 6, vessel="mariner")
     physics = Physics(load_vessel("mariner"), strange.predictor.physics.horizon, 5.0, "rk4")
     bands = replace(strange.predictor.bands, runs=10)
-    predictor = Predictor(physics, "alone", Unchanged({}), {"u": (0.0, 8.0)}, {}, "held", bands=bands)
+    predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (0.0, 8.0)}, {}, "held", bands=bands)
     file = tmp_path / "banded.fmu"
     assert write_fmu(predictor_unit(build_model(predictor), "banded"), file)
     assert pytest.importorskip("fmpy.validation").validate_fmu(str(file)) == []

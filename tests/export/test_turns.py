@@ -9,7 +9,7 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.engine.casadi import memory_along
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.predictor import Predictor
@@ -40,7 +40,7 @@ def played(folder, gear, limits, angles, observer=None, plan=None):
     """Paths (N, T, 2) and alarms (N,) with angles [deg] of both units, a second apart."""
     physics = Physics(gunnerus(gear), 20, 1.0, "rk4", observer)
     known = "held" if plan is None else "known"
-    recorder = Recorder(Predictor(physics, "alone", Unchanged({}), limits, commands=known), folder)
+    recorder = Recorder(Predictor(physics, "alone", UnchangedPath({}), limits, commands=known), folder)
     paths, alarms = [], []
     for i, angle in enumerate(angles):
         values = {"u": 4.0, "north": 4.0 * i, "port.n": 2.5, "starboard.n": 2.5}
@@ -105,10 +105,10 @@ def test_between_stops_a_jump_is_real(low_high, tmp_path):
     }
     reached = memory_along(vessel, columns, t)
     physics = Physics(vessel, 20, 1.0)
-    whole = Predictor(physics, "alone", Unchanged({})).predict(Instants(columns, hidden=reached)).swapaxes(0, 1)
+    whole = Predictor(physics, "alone", UnchangedPath({})).predict(Instants(columns, hidden=reached)).swapaxes(0, 1)
     turns = np.array([0, 1, -1, 1, 0, 2, -1])
     limits = limits_of(*low_high)
-    other = Recorder(Predictor(physics, "alone", Unchanged({}), limits), tmp_path / "odd")
+    other = Recorder(Predictor(physics, "alone", UnchangedPath({}), limits), tmp_path / "odd")
     for i, angle in enumerate(np.array(angles) + 360 * turns):
         values = {name: column[i] for name, column in columns.items()}
         values |= dict.fromkeys(("port.alpha", "starboard.alpha"), np.radians(angle))
@@ -124,7 +124,7 @@ def test_stops_that_are_changed_aboard_count(tmp_path):
 
     def path(angle, *stops):
         physics = Physics(gunnerus(gear), 20, 1.0)
-        recorder = Recorder(Predictor(physics, "alone", Unchanged({}), limits), tmp_path / f"{angle}{len(stops)}")
+        recorder = Recorder(Predictor(physics, "alone", UnchangedPath({}), limits), tmp_path / f"{angle}{len(stops)}")
         names = recorder.model.layout.parameters
         numbers = recorder.kept[: 8 * len(names)].view(float)
         for name, value in zip(("low", "high"), stops, strict=False):
@@ -180,7 +180,7 @@ def test_drawn_ships_take_angles_of_any_turn(seed, tmp_path):
             columns[name] = np.cumsum(rng.uniform(-2.9, 2.9, count)) if free else rng.uniform(*stops[name], count)
             begin = rng.uniform(-2, 2)
             limits[name] = (begin, begin + rng.uniform(0.1, 5.4)) if rng.random() < 0.7 else (-1e6, 1e6)
-    predictor = Predictor(Physics(vessel, horizon, step), "alone", Unchanged({}), limits)
+    predictor = Predictor(Physics(vessel, horizon, step), "alone", UnchangedPath({}), limits)
     reached = memory_along(vessel, {name: columns[name] for name in names.commands}, t)
     with np.errstate(all="ignore"):
         expected = predictor.predict(Instants(columns, hidden=reached))

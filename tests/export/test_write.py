@@ -14,7 +14,7 @@ from shipid.export.fmu import predictor_unit, vessel_unit
 from shipid.export.model import build_model
 from shipid.export.write import EXPORT_TARGETS, export_predictor, export_vessel
 from shipid.files import read_arrays, write_arrays
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
@@ -26,7 +26,7 @@ from tests.export.strange import drawn
 
 @pytest.fixture(scope="module")
 def simple():
-    return Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", Unchanged({}), {})
+    return Predictor(Physics(load_vessel("mariner"), 3, 5.0), "alone", UnchangedPath({}), {})
 
 
 @pytest.mark.parametrize("kind", ["path-drawn", "recurrent"])

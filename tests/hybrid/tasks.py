@@ -9,7 +9,7 @@ import numpy as np
 
 from shipid.data.windows import Instants, Windows
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.method import Case, Fitted, Method, Task
+from shipid.hybrid.method import Case, FitResult, Method, Task
 from shipid.hybrid.physics import Physics
 
 Array = np.ndarray
@@ -47,7 +47,7 @@ def tune(
     method: Method,
     seed: int,
     **options: Any,
-) -> dict[str, Fitted]:
+) -> dict[str, FitResult]:
     """Fit a method to such a task."""
     return method.fit(task_of(columns, commands, targets, folds, seed, **options))
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from shipid.data.windows import Instants
-from shipid.hybrid.alone import Alone, Unchanged
+from shipid.hybrid.alone import Alone, UnchangedPath
 from shipid.hybrid.physics import Physics
 
 
 def test_the_path_of_the_physics_is_the_prediction() -> None:
     paths = np.random.default_rng(0).normal(size=(5, 7, 2))
-    assert Unchanged({}).predict(Physics(None, 5, 1.0), Instants({"u": np.zeros(7)}), paths) is paths
+    assert UnchangedPath({}).predict(Physics(None, 5, 1.0), Instants({"u": np.zeros(7)}), paths) is paths
 
 
 def test_it_learns_nothing_and_needs_physics() -> None:
@@ -19,4 +19,4 @@ def test_it_learns_nothing_and_needs_physics() -> None:
     assert not Alone.meets_none
     assert Alone().varied() == ()
     assert Alone().past == 0.0
-    assert Unchanged.from_arrays(Unchanged({}).header(), {}) == Unchanged({})
+    assert UnchangedPath.from_arrays(UnchangedPath({}).header(), {}) == UnchangedPath({})

@@ -8,26 +8,26 @@ from typing import Any, ClassVar
 import pytest
 
 from shipid.errors import DataError, DocumentError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.contract import fault_of_corrector
-from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS, method_kind, method_of
-from shipid.hybrid.settings import Searched
+from shipid.hybrid.settings import SearchMethod
 
 
 class Bare(Method):
     """A method without a corrector."""
 
-    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+    def fit(self, task: Task) -> dict[str, FitResult]:  # noqa: ARG002
         return {}
 
 
-class Mine(Searched):
+class Mine(SearchMethod):
     """A method with all that is asked."""
 
-    corrector: ClassVar[type[Any]] = Unchanged
+    corrector: ClassVar[type[Any]] = UnchangedPath
 
-    def fit(self, task: Task) -> dict[str, Fitted]:  # noqa: ARG002
+    def fit(self, task: Task) -> dict[str, FitResult]:  # noqa: ARG002
         return {}
 
 
@@ -38,7 +38,7 @@ def of(**parts: Any) -> type[Method]:
 
 def on(**parts: Any) -> type[Method]:
     """The method with other parts of the class of its corrector."""
-    return of(corrector=type("Shift", (Unchanged,), {"__module__": __name__, **parts}))
+    return of(corrector=type("Shift", (UnchangedPath,), {"__module__": __name__, **parts}))
 
 
 def shift(self: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG001
@@ -50,7 +50,7 @@ def shift(self: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG001
     ("kind", "message"),
     [
         (Bare, "Bare in FILE must have `corrector` as a class variable, the class of what `fit` gives"),
-        (of(corrector=Unchanged({})), "Mine in FILE must have `corrector` as a class variable, .*"),
+        (of(corrector=UnchangedPath({})), "Mine in FILE must have `corrector` as a class variable, .*"),
         (of(validation="run"), r"`validation` of Mine in FILE must be .* one of \('share', 'runs'\), not 'run'"),
         (of(SEARCHED=("widht",)), "`SEARCHED` of Mine in FILE must be a tuple of names .*, 'widht' is none"),
         (of(fit=lambda _: {}), r"`fit` of Mine in FILE must take \(self, task\): .*"),
@@ -72,5 +72,5 @@ def test_what_a_class_lacks_is_said_as_a_plan_is_read(
 
 
 def test_what_a_corrector_lacks_is_said() -> None:
-    assert fault_of_corrector(Unchanged({})) == ""
+    assert fault_of_corrector(UnchangedPath({})) == ""
     assert re.fullmatch("Mine in .* lacks `predict`", fault_of_corrector(Mine()))

@@ -10,9 +10,9 @@ import pytest
 
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, ShipidError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.features import Inputs, Memory
-from shipid.hybrid.method import Case, Fitted, Method, Task, Traits, fit_all, input_table_key, shared_tables
+from shipid.hybrid.method import Case, FitResult, Method, Task, Traits, fit_all, input_table_key, shared_tables
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import trial_row
@@ -85,40 +85,40 @@ ROW = trial_row(0, {}, 1.0, 0.0)
         (None, "must return a table, foundation -> Fitted, not NoneType"),
         ({}, "must give a Fitted for 'right', not NoneType"),
         (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a Fitted for 'right', not tuple"),
-        ({"right": Fitted(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*trial_row"),
-        ({"right": Fitted(None, None, 0.0)}, "'NoneType' object is not iterable: make trials by"),  # type: ignore[arg-type]
-        ({"right": Fitted(None, [{**ROW, "params": None}], 0.0)}, "trial 0.params: None: must be a table"),
-        ({"right": Fitted(None, [{**ROW, "value": "low"}], 0.0)}, "trial 0.value: 'low': must be a number"),
-        ({"right": Fitted(None, [{**ROW, "value": np.nan}], 0.0)}, "trial 0: value must be finite, not nan, unless"),
-        ({"right": Fitted(None, [{**ROW, "value": np.inf}], 0.0)}, "trial 0: value must be finite, not inf, unless"),
+        ({"right": FitResult(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*trial_row"),
+        ({"right": FitResult(None, None, 0.0)}, "'NoneType' object is not iterable: make trials by"),  # type: ignore[arg-type]
+        ({"right": FitResult(None, [{**ROW, "params": None}], 0.0)}, "trial 0.params: None: must be a table"),
+        ({"right": FitResult(None, [{**ROW, "value": "low"}], 0.0)}, "trial 0.value: 'low': must be a number"),
+        ({"right": FitResult(None, [{**ROW, "value": np.nan}], 0.0)}, "trial 0: value must be finite, not nan, unless"),
+        ({"right": FitResult(None, [{**ROW, "value": np.inf}], 0.0)}, "trial 0: value must be finite, not inf, unless"),
         (
-            {"right": Fitted(None, [{**ROW, "value": np.nan, "state": "stopped"}], 0.0)},
+            {"right": FitResult(None, [{**ROW, "value": np.nan, "state": "stopped"}], 0.0)},
             "trial 0: value must be finite, not nan, unless",
         ),
-        ({"right": Fitted(Unchanged({}), [], 0.0)}, "a corrector needs a trial that is complete, or give"),
+        ({"right": FitResult(UnchangedPath({}), [], 0.0)}, "a corrector needs a trial that is complete, or give"),
         (
-            {"right": Fitted(Unchanged({}), [trial_row(0, {}, np.nan, 0.0)], 0.0)},
+            {"right": FitResult(UnchangedPath({}), [trial_row(0, {}, np.nan, 0.0)], 0.0)},
             "a corrector needs a trial that is comp",
         ),
-        ({"right": Fitted(None, [{**ROW, "number": "1"}], 0.0)}, "trial 0.number: '1': must be a number"),
+        ({"right": FitResult(None, [{**ROW, "number": "1"}], 0.0)}, "trial 0.number: '1': must be a number"),
         (
-            {"right": Fitted(None, [{**ROW, "state": "done"}], 0.0)},
+            {"right": FitResult(None, [{**ROW, "state": "done"}], 0.0)},
             "trial 0.state: 'done': must be 'complete', 'stopped' or",
         ),
-        ({"right": Fitted(None, [{**ROW, "params": {"seed": 1.0}}], 0.0)}, "trial 0: params: 'seed' is a name that"),
-        ({"right": Fitted(None, [{**ROW, "seen": {1}}], 0.0)}, "trial 0.seen: unknown key: valid: epochs"),
+        ({"right": FitResult(None, [{**ROW, "params": {"seed": 1.0}}], 0.0)}, "trial 0: params: 'seed' is a name that"),
+        ({"right": FitResult(None, [{**ROW, "seen": {1}}], 0.0)}, "trial 0.seen: unknown key: valid: epochs"),
         (
-            {"right": Fitted(None, [{**ROW, "params": {"k": {1}}}], 0.0)},
+            {"right": FitResult(None, [{**ROW, "params": {"k": {1}}}], 0.0)},
             "trial 0.params.k: .*: must be a number",
         ),
-        ({"right": Fitted(None, [ROW], 0.0, np.zeros((2, 4)))}, r"left_out must be \(3, \d+, 2\), not \(2, 4\)"),
+        ({"right": FitResult(None, [ROW], 0.0, np.zeros((2, 4)))}, r"left_out must be \(3, \d+, 2\), not \(2, 4\)"),
     ],
 )
 def test_what_a_method_gives_is_checked(gives: Any, message: str) -> None:
     """A mistake in a method that somebody wrote was a traceback, or errors by runs of other windows."""
 
     class Mine(Method):
-        def fit(self, given: Task) -> dict[str, Fitted]:  # noqa: ARG002
+        def fit(self, given: Task) -> dict[str, FitResult]:  # noqa: ARG002
             return gives  # type: ignore[no-any-return]
 
     with pytest.raises(DataError, match=rf"^Mine\.fit:? {message}") as caught:
@@ -142,12 +142,12 @@ def test_every_error_of_a_users_code_is_one_line(of: str, error: Exception, said
         raise error
 
     class Mine(Method):
-        def fit(self, given: Task) -> dict[str, Fitted]:
+        def fit(self, given: Task) -> dict[str, FitResult]:
             if of == "fit":
                 raised()
             parts = {"hyperparameters": {}, "past": 0.0, of: property(raised)}
-            kind = type("Held", (Unchanged,), {**parts, "__init__": lambda _: None, "__module__": __name__})
-            return dict.fromkeys(given.cases, Fitted(kind(), [ROW], 0.0))  # type: ignore[arg-type]
+            kind = type("Held", (UnchangedPath,), {**parts, "__init__": lambda _: None, "__module__": __name__})
+            return dict.fromkeys(given.cases, FitResult(kind(), [ROW], 0.0))  # type: ignore[arg-type]
 
     with pytest.raises(ShipidError) as caught:
         fit_all(Mine(), task())

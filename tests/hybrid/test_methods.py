@@ -12,7 +12,7 @@ import pytest
 
 from shipid.errors import DataError, DocumentError, ResultError
 from shipid.hybrid.alone import Alone
-from shipid.hybrid.method import Case, Fitted, Method
+from shipid.hybrid.method import Case, FitResult, Method
 from shipid.hybrid.methods import METHODS, method_kind, method_of
 from shipid.hybrid.physics import Physics
 from tests.documented import module
@@ -56,7 +56,7 @@ def here() -> World:
 
 
 @pytest.fixture(scope="module")
-def fitted(here) -> Callable[[str], Fitted]:
+def fitted(here) -> Callable[[str], FitResult]:
     """What a method learns beside the physics: fitted once a kind, not to be changed."""
     return cache(lambda kind: quick(kind).fit(here.task())["physics"])
 

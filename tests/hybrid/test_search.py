@@ -15,8 +15,8 @@ from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS, method_of
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, SearchedAlone, affordable_trials
-from shipid.hybrid.settings import Searched
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.settings import SearchMethod
+from shipid.hybrid.stored import StoredData
 from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, ship, world
 
@@ -35,7 +35,7 @@ QUICK: dict[str, dict[str, Any]] = {
 
 
 DOCUMENTED = "linear"  # the method of docs/extending.md
-SEARCHING = [kind for kind, method in METHODS.items() if issubclass(method, Searched)] + [DOCUMENTED]
+SEARCHING = [kind for kind, method in METHODS.items() if issubclass(method, SearchMethod)] + [DOCUMENTED]
 
 
 @pytest.fixture(autouse=True)
@@ -155,7 +155,7 @@ class CountingProblem(LearningProblem):
 
 
 @dataclass(frozen=True)
-class Moved(Stored):
+class Moved(StoredData):
     hyperparameters: Any
     past: float
     metres: float

@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 
 from shipid.errors import ResultError
 from shipid.hybrid.features import Memory
-from shipid.hybrid.stored import Stored
+from shipid.hybrid.stored import StoredData
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Part(Stored):
+class Part(StoredData):
     names: tuple[str, ...]
     mirror: Array | None
     layers: tuple[tuple[Array, Array], ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Whole(Stored):
+class Whole(StoredData):
     parts: tuple[Part, ...]
     block: Mapping[str, Array]
     memory: Memory

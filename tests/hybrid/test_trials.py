@@ -13,7 +13,7 @@ from shipid.hybrid.search import (
     trial_points,
     trial_row,
 )
-from shipid.hybrid.settings import Scale, Searched
+from shipid.hybrid.settings import Scale, SearchMethod
 from tests.hybrid.tasks import task_of
 
 RUNS = {"u": np.arange(12.0)}
@@ -26,7 +26,7 @@ def task(**options):
     return task_of(RUNS, (), targets, FOLDS, 0, **options)
 
 
-class Counting(Searched):
+class Counting(SearchMethod):
     """Whole numbers, shares, and a number by its logarithm."""
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("neighbours", "share", "width")

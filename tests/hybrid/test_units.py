@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.hybrid.units import SeenInputs, solve_ridges
+from shipid.hybrid.units import VaryingInputs, solve_ridges
 
 POINT = {"motion_scale": 2.0, "command_scale": 3.0, "wind_scale": 4.0, "offset": 1.0}
 MIRROR = {"u": 1, "v": -1, "r": -1, "port.n": 1, "port.alpha": -1}
@@ -24,7 +24,7 @@ def side(table):
 
 def test_even_units_do_not_feel_the_mirror_and_odd_ones_change_sign(table):
     here = side(table)
-    units = SeenInputs.of(here, mirror=True).draw(POINT, 12, 0)
+    units = VaryingInputs.of(here, mirror=True).draw(POINT, 12, 0)
     image = {name: MIRROR[name.replace("starboard", "port")] * values for name, values in here.items()}
     (even, odd), (even_image, odd_image) = units.parts(here), units.parts(image)
     assert even.shape == (50, 13)
@@ -37,7 +37,7 @@ def test_even_units_do_not_feel_the_mirror_and_odd_ones_change_sign(table):
 
 
 def test_weights_and_offsets_are_drawn_apart_with_the_scales_of_their_inputs(table):
-    units = SeenInputs.of(table, mirror=False).draw({**POINT, "offset": 0.7}, 4000, 0)
+    units = VaryingInputs.of(table, mirror=False).draw({**POINT, "offset": 0.7}, 4000, 0)
     scale = [POINT["command_scale" if name.startswith("port") else "motion_scale"] for name in units.normaliser.names]
     drawn = np.vstack([units.weight, units.offset])
     np.testing.assert_allclose(drawn.std(axis=1), [*(1 / np.array(scale)), 0.7], rtol=0.05)
@@ -45,7 +45,7 @@ def test_weights_and_offsets_are_drawn_apart_with_the_scales_of_their_inputs(tab
 
 
 def test_without_a_mirror_there_is_one_kind_of_unit(table):
-    units = SeenInputs.of(side(table), mirror=False).draw(POINT, 12, 0)
+    units = VaryingInputs.of(side(table), mirror=False).draw(POINT, 12, 0)
     even, odd = units.parts(side(table))
     np.testing.assert_array_equal(even, odd)
     assert units.reflection is None

@@ -11,7 +11,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
 from shipid.identification.design import (
-    Informed,
+    InformedCandidate,
     Limits,
     candidate_manoeuvres,
     information_of_candidates,
@@ -41,7 +41,7 @@ CHOICE = candidate_manoeuvres(SHIP, [3.0])
 
 
 @cache
-def informed_choice() -> list[Informed]:
+def informed_choice() -> list[InformedCandidate]:
     """What each candidate tells of the four factors."""
     return information_of_candidates(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
 
@@ -53,7 +53,7 @@ def kind(title: str) -> str:
 def alone(path: str, by: str) -> list[str]:
     """Manoeuvres in order, for one factor that is the only one unknown."""
     j = PATHS.index(path)
-    single = [Informed(one.candidate, one.information[j : j + 1, j : j + 1]) for one in informed_choice()]
+    single = [InformedCandidate(one.candidate, one.information[j : j + 1, j : j + 1]) for one in informed_choice()]
     return list(rank_candidates(single, (path,)).sort_values(by, ascending=False)["manoeuvre"])
 
 
@@ -77,7 +77,7 @@ def test_information_adds() -> None:
     first = informed_choice()[0]
     then = rank_candidates(informed_choice(), PATHS, first.information).set_index("manoeuvre")
     other = informed_choice()[1]
-    both = Informed(other.candidate, first.information + other.information)
+    both = InformedCandidate(other.candidate, first.information + other.information)
     assert rank_candidates([both], PATHS)["gain"][0] == pytest.approx(
         table["gain"][first.candidate.title] + then["gain"][other.candidate.title]
     )

@@ -18,12 +18,12 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.identification import outcome
-from shipid.identification.design import Candidate, Informed, candidate_manoeuvres
+from shipid.identification.design import Candidate, InformedCandidate, candidate_manoeuvres
 from shipid.identification.free_run import ALL, simulate_free_runs
 from shipid.identification.outcome import (
     AFTER,
     BEFORE,
-    Identified,
+    Identification,
     pick_runs,
     read_settings,
     residual_spacing,
@@ -62,7 +62,7 @@ def log() -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def identified(log: Dataset) -> Identified:
+def identified(log: Dataset) -> Identification:
     return run_identification(off(), log, settings(), held_out=["M05"], profiles=FEW[:1], programme=True)
 
 
@@ -99,7 +99,7 @@ def test_a_run_of_a_single_row_is_named_and_left_out(log: Dataset) -> None:
     assert warnings == ("run M03 has a single row: it takes no part in the fit",)
 
 
-def test_it_tells_what_the_parts_tell(identified: Identified, log: Dataset) -> None:
+def test_it_tells_what_the_parts_tell(identified: Identification, log: Dataset) -> None:
     alone = identify(off(), log, ["M01", "M02", "M03", "M04"], settings())
     assert identified.runs == alone.runs
     assert identified.held_out == ("M05",)
@@ -116,7 +116,7 @@ def test_it_tells_what_the_parts_tell(identified: Identified, log: Dataset) -> N
         assert row["unit"] == SHIP.units[row["path"]]
 
 
-def test_the_truth_is_within_and_free_runs_are_better(identified: Identified) -> None:
+def test_the_truth_is_within_and_free_runs_are_better(identified: Identification) -> None:
     for row in identified.estimates.to_dict("records"):  # four standard errors: one in 16,000
         assert abs(row["value"] - SHIP.parameters[row["path"]]) < 4 * row["error"]
     rms = identified.errors[(identified.errors["set"] == "test") & (identified.errors["run"] == ALL)].set_index("model")
@@ -130,7 +130,7 @@ def test_the_truth_is_within_and_free_runs_are_better(identified: Identified) ->
 
 
 def test_measures_before_and_after_are_those_of_the_vessels(
-    identified: Identified, monkeypatch: pytest.MonkeyPatch
+    identified: Identification, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table = identified.manoeuvres
     assert set(table["manoeuvre"]) == {"zigzag 10/10", "zigzag 20/20", "turning 35"}
@@ -153,7 +153,7 @@ def test_a_manoeuvre_that_cannot_be_is_a_note() -> None:
     assert table["note"].str.contains("L_pp").all()
 
 
-def test_a_patch_is_the_identified_vessel_and_says_where_it_is_from(identified: Identified, tmp_path: Path) -> None:
+def test_a_patch_is_the_identified_vessel_and_says_where_it_is_from(identified: Identification, tmp_path: Path) -> None:
     base = tmp_path / "base.toml"
     base.write_text('base = "gunnerus-28.9"\n[set]\n' + "".join(f'"{p}" = {off().parameters[p]!r}\n' for p in FEW))
     mine = replace(identified, vessel=load_vessel(str(base)))
@@ -176,11 +176,11 @@ def test_a_patch_is_the_identified_vessel_and_says_where_it_is_from(identified: 
         write_patch(mine, file)
 
 
-def test_a_patch_on_a_bundled_vessel_names_it(identified: Identified, tmp_path: Path) -> None:
+def test_a_patch_on_a_bundled_vessel_names_it(identified: Identification, tmp_path: Path) -> None:
     assert tomllib.loads(replace(identified, vessel=SHIP).patch(tmp_path / "a.toml"))["base"] == "gunnerus-28.9"
 
 
-def test_a_patch_holds_what_was_changed_after_the_base_was_read(identified: Identified, tmp_path: Path) -> None:
+def test_a_patch_holds_what_was_changed_after_the_base_was_read(identified: Identification, tmp_path: Path) -> None:
     """It was refused where it was read: the base was said to have changed."""
     changed = SHIP.with_values({"inertia.m": 1.1 * SHIP.parameters["inertia.m"], FEW[0]: 1.0})
     again = load_vessel(write_patch(replace(identified, vessel=changed), tmp_path / "patch.toml"))
@@ -191,7 +191,7 @@ def test_a_patch_holds_what_was_changed_after_the_base_was_read(identified: Iden
     assert not (tmp_path / "other.toml").exists()
 
 
-def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: Identified, tmp_path: Path) -> None:
+def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: Identification, tmp_path: Path) -> None:
     """A force of the rudder ahead of midships, a rudder aft: the patch was written, and refused where it was read."""
     tanker, odd = load_vessel("kvlcc2-l7"), "thruster.rudder.x_H"
     found = replace(identified, vessel=tanker, solution=replace(identified.solution, values={odd: 4.4}))
@@ -201,7 +201,7 @@ def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: 
     assert "unusual" not in tomllib.loads(identified.patch(tmp_path / "usual.toml"))
 
 
-def test_the_profile_agrees_with_the_interval(identified: Identified) -> None:
+def test_the_profile_agrees_with_the_interval(identified: Identification) -> None:
     curve = identified.profiles[0]
     row = identified.estimates.set_index("path").loc[curve.path]
     assert curve.path == FEW[0]
@@ -215,7 +215,7 @@ def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
     """Before, one that diverged ended the command without a word of the fit."""
     every, some = outcome.design.informed, candidate_manoeuvres(SHIP, [3.0])[4:9:4]
 
-    def informed(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[Informed]:
+    def informed(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[InformedCandidate]:
         if any(one.title.startswith("turning") for one in choice):
             raise ShipidError("she diverges")
         return every(vessel, choice, *args, **how)
@@ -230,7 +230,7 @@ def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
     assert any(line.startswith("not among the manoeuvres to run next") for line in done.warnings)
 
 
-def test_the_programme_is_ranked(identified: Identified) -> None:
+def test_the_programme_is_ranked(identified: Identification) -> None:
     table = identified.programme
     assert table is not None
     assert table["per_hour"].is_monotonic_decreasing
@@ -377,7 +377,7 @@ def test_a_change_of_settings_that_reaches_nothing_is_one_line() -> None:
 
 
 def test_a_profile_holds_its_factor_whatever_bounds_it_has(
-    identified: Identified, log: Dataset, monkeypatch: pytest.MonkeyPatch
+    identified: Identification, log: Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its own bounds before those of a pattern took the place of the value held: the profile was flat, and open."""
     bounds = {FEW[0]: (0.2, 5.0), "hull.*": (0.1, 10.0)}

@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent
-from shipid.report.content import spoken_model
+from shipid.report.content import model_text
 
 
 def test_every_frame_but_cells_and_models_may_be_absent(full_scale):
@@ -31,7 +31,7 @@ def test_the_model_without_physics_has_one_name(full_scale):
     assert set(again.cells.model) == {*full_scale.cells.model, "no physics + plain"}
     for name in ("models", "horizon", "over_time"):
         pd.testing.assert_frame_equal(getattr(again, name), getattr(full_scale, name))
-    assert [spoken_model(name) for name in ("none", "none-1", "none of these")] == [
+    assert [model_text(name) for name in ("none", "none-1", "none of these")] == [
         "no physics",
         "none-1",
         "none of these",

@@ -19,7 +19,7 @@ from shipid.report.figure import (
     make_line,
     make_plot,
     page_colours,
-    spread_apart,
+    spread_places,
 )
 
 
@@ -43,7 +43,7 @@ def test_ticks_of_a_logarithmic_axis_are_numbers_one_can_read():
 
 @given(st.lists(st.floats(0, 100), max_size=20).map(sorted), st.floats(0.1, 5))
 def test_names_moved_apart_keep_their_order_and_their_distance(places, gap):
-    moved = spread_apart(places, gap, 100.0)
+    moved = spread_places(places, gap, 100.0)
     assert all(b - a >= gap - 1e-9 for a, b in itertools.pairwise(moved))
     assert all(place <= 100.0 + 1e-9 for place in moved)
     if all(b - a >= gap for a, b in itertools.pairwise(places)):

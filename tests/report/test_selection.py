@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from shipid.report.selection import (
     close_up_models,
     errors_over_seeds,
+    figure_sizes,
     middle_models,
     models_by_accuracy,
-    shown_sizes,
     spread_items,
     thin_lines,
 )
@@ -27,10 +27,10 @@ def test_the_largest_families_come_first(simulation):
 
 
 def test_sizes_are_ends_and_middle():
-    assert shown_sizes(pd.Series([0, 30, 10, 100, 50, 10])) in ([10, 30, 100], [10, 50, 100])
-    assert shown_sizes(pd.Series([0, 30, 10, 100])) == [10, 30, 100]
-    assert shown_sizes(pd.Series([15, 15])) == [15]
-    assert shown_sizes(pd.Series([0, 0])) == [0]
+    assert figure_sizes(pd.Series([0, 30, 10, 100, 50, 10])) in ([10, 30, 100], [10, 50, 100])
+    assert figure_sizes(pd.Series([0, 30, 10, 100])) == [10, 30, 100]
+    assert figure_sizes(pd.Series([15, 15])) == [15]
+    assert figure_sizes(pd.Series([0, 0])) == [0]
     assert spread_items(["a", "b"], 3) == ["a", "b"]
 
 

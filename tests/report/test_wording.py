@@ -5,7 +5,7 @@ from shipid.report.wording import (
     difference_text,
     distance_text,
     ends_text,
-    listed_names,
+    join_few_names,
     metres_text,
     number_text,
     scientific_text,
@@ -57,10 +57,10 @@ def test_two_digits_without_an_exponent():
 
 
 def test_lists():
-    assert listed_names([]) == "none"
-    assert listed_names(["a"]) == "a"
-    assert listed_names(["a", "b"]) == "a and b"
-    assert listed_names(list("abcdef")) == "a, b, c and 3 more"
+    assert join_few_names([]) == "none"
+    assert join_few_names(["a"]) == "a"
+    assert join_few_names(["a", "b"]) == "a and b"
+    assert join_few_names(list("abcdef")) == "a, b, c and 3 more"
     assert counted_text(1, "run") == "1 run"
     assert counted_text(2412, "sample") == "2,412 samples"
 

@@ -11,7 +11,7 @@ import pytest
 from shipid.data.dataset import Dataset, read_dataset, stretches_of_runs, write_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.features import Memory
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
@@ -53,7 +53,7 @@ def banded(tmp_path_factory):
     bands = bands_of(rng, physics, instants, names, 1.0)
     bands = replace(bands, runs=10, kinds={"zigzag": 4}, by_kind=2 * bands.whole[None], far=100.0, slopes=np.zeros(5))
     fitted = Predictor(
-        physics, "alone", Unchanged({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known",
+        physics, "alone", UnchangedPath({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known",
         bands=replace(bands, along=50.0 * np.arange(1, 5), across=30.0 * np.arange(1, 5)),
     )  # fmt: skip
     return fitted, fitted.save(tmp_path_factory.mktemp("cell") / "banded.npz")
@@ -63,7 +63,7 @@ def banded(tmp_path_factory):
 def predictor(tmp_path_factory):
     physics = Physics(load_vessel("mariner"), 4, STEP, "rk4")
     file = tmp_path_factory.mktemp("cell") / "cell.npz"
-    return Predictor(physics, "alone", Unchanged({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known").save(file)
+    return Predictor(physics, "alone", UnchangedPath({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known").save(file)
 
 
 def saved(frame, folder):

@@ -23,13 +23,13 @@ from shipid.study.plan import (
     drawn_conditions,
     fitted_families,
     input_files,
-    judged_method,
     model_label,
     past_steps,
     plain_rival,
     plan_text,
     read_plan,
     run_command,
+    verdict_method,
 )
 from shipid.study.prepare import all_windows, obtain_runs
 from shipid.study.schema import Data
@@ -309,7 +309,7 @@ def test_the_judged_method_is_the_first_that_learns_beside_physics(tmp_path: Pat
     still = {"name": "still", "kind": "alone"}
     both = tiny_plan(tmp_path, {"method": [alone, {"name": "drawn", **drawn}]})
     plans = both, tiny_plan(tmp_path, {"method": [alone, still]})
-    assert [judged_method(plan) for plan in plans] == ["drawn", "plain"]
+    assert [verdict_method(plan) for plan in plans] == ["drawn", "plain"]
 
 
 def test_a_digest_says_what_is_in_every_file_that_a_study_reads(tmp_path: Path) -> None:

@@ -16,14 +16,14 @@ import tomlkit
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError
-from shipid.hybrid.alone import Unchanged
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.study import prepare as module
 from shipid.study.envelope import input_envelope
 from shipid.study.plan import Plan, read_plan, whole_unit
 from shipid.study.prepare import (
-    Prepared,
+    PreparedStudy,
     all_windows,
     constant_motion,
     estimates_of,
@@ -45,7 +45,7 @@ ONE_FAMILY = {"name": "right", "base": "gunnerus-28.9"}
 
 
 @pytest.fixture(scope="module")
-def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, Prepared]:
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Dataset, PreparedStudy]:
     plan = tiny_plan(tmp_path_factory.mktemp("plan"), {"grid.seeds": [0, 1], "grid.N_D": [2, 4, 6, 8]})
     dataset = obtain_runs(plan)
     return plan, dataset, prepare(plan, dataset)
@@ -67,7 +67,7 @@ def test_the_order_of_columns_changes_no_digit(tmp_path: Path) -> None:
     assert prepare(plan, turned).commands == tuple(dataset.commands), "the order of the vessel"
 
 
-def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     plan, dataset, prepared = tiny
     test = set(prepared.test.spans)
     assert len(test) == 4
@@ -83,7 +83,7 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
 
 
 @pytest.mark.parametrize("folds", [1, 2, 3])
-def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> None:
+def test_folds_are_by_run(tiny: tuple[Plan, Dataset, PreparedStudy], folds: int) -> None:
     plan, _, prepared = tiny
     split = plan.study.split.model_copy(update={"folds": folds})
     prepared = replace(prepared, study=plan.study.model_copy(update={"split": split}))
@@ -102,7 +102,7 @@ def test_folds_are_by_run(tiny: tuple[Plan, Dataset, Prepared], folds: int) -> N
             assert sorted(validated) == sorted(prepared.runs(batch))
 
 
-def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     """Midpoint rule with 2,000 steps a second; r = 0 included."""
     windows = tiny[2].test.select(slice(0, 12))
     windows.columns["r"][0] = 0.0
@@ -234,7 +234,7 @@ def test_perturbed_lags_have_separate_hidden_states(
     for model in prepared.foundations[:-1]:
         vessel = model.vessel
         assert vessel is not None
-        predictor = Predictor(Physics(vessel, 5, 1.0), "alone", Unchanged({}))
+        predictor = Predictor(Physics(vessel, 5, 1.0), "alone", UnchangedPath({}))
         paths = predictor.predict(instants_of(plan.study, vessel, dataset, prepared.test))
         np.testing.assert_allclose(paths, prepared.test_paths[model.name], atol=1e-9)
 
@@ -313,7 +313,7 @@ def test_files_are_looked_for_beside_the_study(
     assert obtain_runs(plan).runs == dataset.runs
 
 
-def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_the_envelope_is_of_the_instants_of_prediction(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     """Per D_4, D_6 and test, from the windows that each sees."""
     plan, _, prepared = tiny
     rows = {
@@ -379,7 +379,7 @@ def test_a_ship_at_rest_is_no_copy(recorded: Callable[..., tuple[Plan, Dataset]]
     assert not [words for words in prepare(plan, dataset).notes if "copies" in words]
 
 
-def test_a_note_counts_the_windows_over_a_time_without_rows(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_a_note_counts_the_windows_over_a_time_without_rows(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     """Without max_gap the import leaves a pause of the recorder whole: the study says which windows hold it."""
     plan, dataset, prepared = tiny
     assert not prepared.notes
@@ -392,7 +392,7 @@ def test_a_note_counts_the_windows_over_a_time_without_rows(tiny: tuple[Plan, Da
     assert prepare(plan, holed).notes == (note,)
 
 
-def test_a_note_says_that_rows_are_farther_apart_than_the_step(tiny: tuple[Plan, Dataset, Prepared]) -> None:
+def test_a_note_says_that_rows_are_farther_apart_than_the_step(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     plan, dataset, _ = tiny
     rare = replace(dataset, frame=dataset.frame[dataset.frame["t"] % 5 == 0].reset_index(drop=True))
     assert prepare(plan, rare).notes == (

@@ -11,7 +11,7 @@ from shipid.files import write_json
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.settings import SearchSpan
 from shipid.study import seals
-from shipid.study.progress import Searching, Watch
+from shipid.study.progress import SearchProgress, Watch
 from shipid.study.store import JOURNALS, TRIALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
@@ -31,14 +31,14 @@ def test_a_search_is_followed_trial_by_trial(tmp_path: Path) -> None:
     one, other = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
     journal = Journal(file)
     journal.add({one: [row(0, 0.25)]}, SPACE)
-    assert watch.look() == [Searching(one, 1, 5, 0.25)]
+    assert watch.look() == [SearchProgress(one, 1, 5, 0.25)]
     journal.add({one: [row(1, float("nan"))], other: [row(0, float("nan"))]}, SPACE)
     running = {search.cell: search for search in watch.look()}
-    assert running == {one: Searching(one, 2, 5, 0.25), other: Searching(other, 1, 5, inf)}
+    assert running == {one: SearchProgress(one, 2, 5, 0.25), other: SearchProgress(other, 1, 5, inf)}
     assert running[one].words == f"{one}: trial 2/5, best so far 0.5 m rms"
     assert running[other].words == f"{other}: trial 1/5"
     journal.add({other: [row(1, 0.04)]}, SPACE)
-    assert watch.look()[0] == Searching(other, 2, 5, 0.04), "the one that moved last comes first"
+    assert watch.look()[0] == SearchProgress(other, 2, 5, 0.04), "the one that moved last comes first"
     journal.add({other: [row(number, 0.09) for number in (2, 3, 4)]}, SPACE)
     assert [search.cell for search in watch.look()] == [one], "all its trials have ended"
     write_json(rows_file(tmp_path, "unit"), [])
@@ -52,7 +52,7 @@ def test_a_budget_says_its_number_when_it_knows_it(tmp_path: Path) -> None:
     watch, journal, cell = Watch(plan, tmp_path), Journal(tmp_path / JOURNALS / "unit.log"), "right+drawn-N0004-s0"
     journal.decide([cell], 12)
     journal.add({cell: [row(0, 0.01)]}, SPACE)
-    assert watch.look() == [Searching(cell, 1, 12, 0.01)]
+    assert watch.look() == [SearchProgress(cell, 1, 12, 0.01)]
 
 
 def test_half_a_line_and_foreign_lines_do_no_harm(tmp_path: Path) -> None:
@@ -64,7 +64,7 @@ def test_half_a_line_and_foreign_lines_do_no_harm(tmp_path: Path) -> None:
     for cut in (len(whole) - 5, len(whole)):
         file.write_bytes(whole[:cut])
         running = watch.look()
-    assert running == [Searching(cell, 1, 5, 0.01)]
+    assert running == [SearchProgress(cell, 1, 5, 0.01)]
     with file.open("a") as stream:
         stream.write('no json\n[1]\n{"op_code": 4}\n{"op_code": 2, "study_id": 9, "user_attr": {"trials": 3}}\n')
     assert watch.look() == running

@@ -23,7 +23,7 @@ from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_json
-from shipid.hybrid.method import Fitted, Method, Task
+from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.search import trial_row
@@ -265,8 +265,8 @@ def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.Mo
     """One model without a compensator: its row says so, the others keep their results, the report's frames stand."""
     fit = PathDrawn.fit
 
-    def failing(method: PathDrawn, task: Task) -> dict[str, Fitted]:
-        return fit(method, task) | {"wrong-1": Fitted(None, [], 0.0)}
+    def failing(method: PathDrawn, task: Task) -> dict[str, FitResult]:
+        return fit(method, task) | {"wrong-1": FitResult(None, [], 0.0)}
 
     monkeypatch.setattr(PathDrawn, "fit", failing)
     run_here(tiny_plan(tmp_path), tmp_path / "run")
@@ -479,12 +479,12 @@ class Faulty(Method):
 
     corrector: ClassVar[type[Any]] = Moved
 
-    def fit(self, task: Task) -> dict[str, Fitted]:
+    def fit(self, task: Task) -> dict[str, FitResult]:
         if MISTAKE == "few runs":
             raise DataError("too few runs:\nmake more")
         given = SimpleNamespace(**vars(Moved({})), predict=None) if MISTAKE == "lacks" else Moved({})
         rows = {"no trial": [], "NaN": [trial_row(0, {}, 1.0, 0.0) | {"value": np.nan}]}
-        return dict.fromkeys(task.cases, Fitted(given, rows.get(MISTAKE, [trial_row(0, {}, 1.0, 0.0)]), 0.0))
+        return dict.fromkeys(task.cases, FitResult(given, rows.get(MISTAKE, [trial_row(0, {}, 1.0, 0.0)]), 0.0))
 
 
 def faulty_plan(folder: Path, monkeypatch: pytest.MonkeyPatch, mistake: str) -> Plan:

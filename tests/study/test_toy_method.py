@@ -12,14 +12,14 @@ import pytest
 from shipid.answer.frames import provenance_words
 from shipid.answer.pages import report_content
 from shipid.data.dataset import read_dataset
-from shipid.hybrid.alone import Unchanged
-from shipid.hybrid.method import Fitted, Method, Task, Traits
+from shipid.hybrid.alone import UnchangedPath
+from shipid.hybrid.method import FitResult, Method, Task, Traits
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.search import trial_row
 from shipid.predictor import Predictor
 from shipid.study import store
 from shipid.study.apply import predict_log
-from shipid.study.plan import judged_method, model_label, plain_rival
+from shipid.study.plan import model_label, plain_rival, verdict_method
 from shipid.study.prepare import prepare
 from shipid.study.progress import Watch
 from shipid.study.results import read_results
@@ -44,7 +44,7 @@ def test_a_new_method_goes_through_a_whole_study(
     plan = tiny_plan(tmp_path, changes)
     # four foundations with `drawn`, two with `toy`, three with `bare`: `alone` does not meet `none`
     assert plan.cells == 4 + 2 + 3
-    assert judged_method(plan) == "toy"
+    assert verdict_method(plan) == "toy"
     assert model_label(plan, "right", "toy") == "right"
     folder = tmp_path / "run"
     run_here(plan, folder)
@@ -75,14 +75,14 @@ def test_a_new_method_goes_through_a_whole_study(
 class Otherwise(Method):
     """A method of a user whose settings have names of those of other methods, and another meaning."""
 
-    corrector: ClassVar[type[Any]] = Unchanged
+    corrector: ClassVar[type[Any]] = UnchangedPath
     trials: str = "sea trials of 2022"
     mirror: float = 0.0
     memory: str = "of the crew"
     terms: int = 2
 
-    def fit(self, given: Task) -> dict[str, Fitted]:
-        return {name: Fitted(Unchanged({}), [trial_row(0, {}, 1.0, 0.0)], 0.0) for name in given.cases}
+    def fit(self, given: Task) -> dict[str, FitResult]:
+        return {name: FitResult(UnchangedPath({}), [trial_row(0, {}, 1.0, 0.0)], 0.0) for name in given.cases}
 
 
 def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -175,7 +175,9 @@ def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict
     return {}, None
 
 
-def clock_once(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array, Rows]:
+def clock_without_repeats(
+    table: pd.DataFrame, columns: dict[str, Array], file: Path
+) -> tuple[dict[str, Any], Array, Rows]:
     """Return the clock, its times, and which rows it takes: all but a few that repeat the row before."""
     again = rows_repeated(table)
     if 0 < again.sum() <= REPEATED * len(table):

@@ -29,12 +29,12 @@ from shipid.logs.guess.defects import (
     take_spikes,
     take_zeros,
 )
-from shipid.logs.guess.lapses import find_lapses
+from shipid.logs.guess.lapses import report_command_faults
 from shipid.logs.guess.motion import check_clock, choose_velocities, choose_yaw_rate
 from shipid.logs.guess.outputs import reserve_outputs, suggest_outputs
 from shipid.logs.guess.pose import Frame, choose_pose
 from shipid.logs.guess.scales import take_scales
-from shipid.logs.guess.sniff import Sniffed
+from shipid.logs.guess.sniff import LogTable
 from shipid.logs.guess.sources import GuessFiles, read_source
 from shipid.logs.guess.stuck import find_stuck
 from shipid.logs.guess.unused import unused_reasons
@@ -69,7 +69,7 @@ class Guess:
         return self.source.path
 
     @property
-    def sniffed(self) -> Sniffed:
+    def sniffed(self) -> LogTable:
         """The log as numbers; of several files all rows."""
         return self.source.sniffed
 
@@ -152,7 +152,7 @@ def guess(
     choose_wind(state)
     defects_of_rows(state, sniffed)
     find_stuck(state)
-    find_lapses(state, sniffed)
+    report_command_faults(state, sniffed)
     defects_of_spikes(state)
     ask_for_changes(state)
     defects_of_motion(state)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shipid.data.dataset import Array
-from shipid.logs.frames import begins_again
+from shipid.logs.frames import may_wrap
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import SEEN, State, unit_in_name
 from shipid.logs.guess.twins import choose_twins, twin_columns
@@ -207,7 +207,7 @@ def _centre_angle(state: State, name: str, signal: str) -> bool:
     size = to_si(likely_unit(state, name, signal), f"x.{signal}")
     turn = 2 * np.pi / size
     jumps = np.abs(np.diff(values)) > 0.8 * turn
-    if not jumps.any() or not begins_again(size * values, f"x.{signal}"):
+    if not jumps.any() or not may_wrap(size * values, f"x.{signal}"):
         return False
     state.columns[name] = np.asarray((values + turn / 2) % turn - turn / 2)
     return True

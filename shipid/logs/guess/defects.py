@@ -15,7 +15,7 @@ from shipid.logs.dates import LAST_DATE, format_date, rollover_words
 from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import State, unit_in_name
 from shipid.logs.guess.evidence import Complex
-from shipid.logs.guess.sniff import Sniffed
+from shipid.logs.guess.sniff import LogTable
 from shipid.logs.mapping import to_si
 from shipid.physics.signals import is_shaft
 
@@ -72,7 +72,7 @@ def _held_positions(state: State) -> None:
         state.find("held positions", tuple(places), 0.9, sentence)
 
 
-def defects_of_rows(state: State, sniffed: Sniffed) -> None:
+def defects_of_rows(state: State, sniffed: LogTable) -> None:
     """Report repeated rows, values that stop at a limit, holes, missing values, and a log that was interpolated."""
     sources = [column.source for column in state.suggestions if column.name in ("north", "east", "latitude", "u", "r")]
     moving = [name for name in sources if np.ptp(state.columns[name]) > 0]

@@ -12,7 +12,7 @@ from shipid.data.lapses import CommandFault, RowMask, find_command_faults
 from shipid.logs.guess.clues import State, Suggestion
 from shipid.logs.guess.defects import FEW, clock_text
 from shipid.logs.guess.evidence import GAP
-from shipid.logs.guess.sniff import Sniffed
+from shipid.logs.guess.sniff import LogTable
 from shipid.logs.mapping import to_si
 from shipid.logs.repairs import FLAGS, Despike, remove_spikes
 from shipid.physics.signals import is_command, is_shaft, is_steering, read_unit
@@ -23,7 +23,7 @@ SAME = 0.05  # of that size: a row that is changed by less stays as it is
 SURE, UNSURE = 0.9, 0.6  # that it is no order: of what is unsure the repair is drafted switched off
 
 
-def find_lapses(state: State, sniffed: Sniffed) -> None:
+def report_command_faults(state: State, sniffed: LogTable) -> None:
     """Report zeros, spikes and still stretches of commands, as they are in the log."""
     if state.psi is None:
         return
@@ -63,7 +63,7 @@ def _report_brief(
             far = f"{min(lapse.size for lapse in some) * factor:.3g} {unit}{' or more' * (len(some) > 1)}"
             how = "is 0" if kind == "zero" else f"leaves its course by {far} and comes back"
             beside = f" between values of {far}" * (kind == "zero")
-            said.append(f"{how} {_lapse_places(state, some, t)}{beside}")
+            said.append(f"{how} {_fault_places(state, some, t)}{beside}")
     what = "shaft" if is_shaft(one.name) else "rudder" if is_steering(one.name) else "gear"
     sentence = f"{one.source!r} {', and '.join(said).rstrip(',')}: faster than the {what} moves elsewhere"
     if repair is None and state.joined:
@@ -74,7 +74,7 @@ def _report_brief(
 
 
 def _report_pauses(state: State, one: Suggestion, found: list[CommandFault], t: Array) -> None:
-    sentence = f"{one.source!r} is 0 {_lapse_places(state, found, t)} with the same order before and after"
+    sentence = f"{one.source!r} is 0 {_fault_places(state, found, t)} with the same order before and after"
     _report_unsure(state, one, "lapses of a command", found, t, f"{sentence}. Was that ordered?")
 
 
@@ -87,7 +87,7 @@ def _report_unsure(
     state.find(kind, (one.source,), UNSURE, sentence, None if state.joined else _break_repair(state, found, t))
 
 
-def _lapse_places(state: State, some: list[CommandFault], t: Array) -> str:
+def _fault_places(state: State, some: list[CommandFault], t: Array) -> str:
     """Where lapses are, in words: how many rows, how many places, and the first times."""
     count = sum(lapse.end - lapse.first for lapse in some)
     words = f"in {count} row{'s' * (count > 1)} at {len(some)} place{'s' * (len(some) > 1)}"

@@ -108,7 +108,7 @@ def _in_radians(state: State, north: str, east: str) -> bool:
     size = np.abs(state.columns[north]).max(), np.abs(state.columns[east]).max()
     if size[0] > np.pi / 2 or size[1] > np.pi:
         return False
-    told = _told_by_speed(state, north, east, [1.0, 1.0 / DEGREE])
+    told = _position_unit_by_speed(state, north, east, [1.0, 1.0 / DEGREE])
     if told is None:
         words = f"are {north!r} and {east!r} degrees, off West Africa, or radians?"
         state.ask(("latitude", "longitude"), f"{words} deg is a guess")
@@ -125,7 +125,7 @@ def _angle_fraction(state: State, north: str, east: str) -> float:
     if len(parts) == 1:
         return parts[0]
     names = f"{north!r} and {east!r}"
-    told = _told_by_speed(state, north, east, parts)
+    told = _position_unit_by_speed(state, north, east, parts)
     if told is not None:
         name, best, other, off = told
         if off > DOUBTED:
@@ -138,7 +138,9 @@ def _angle_fraction(state: State, north: str, east: str) -> float:
     return parts[0]
 
 
-def _told_by_speed(state: State, north: str, east: str, parts: list[float]) -> tuple[str, float, float, float] | None:
+def _position_unit_by_speed(
+    state: State, north: str, east: str, parts: list[float]
+) -> tuple[str, float, float, float] | None:
     """Of the sizes [deg] that the unit of a position may have, those nearest to a speed; None where there is no speed.
 
     Returned are the column of the speed, the best and the next one, and how far off the best is, in parts of the next.

@@ -20,8 +20,8 @@ from shipid.logs.formats import LOOKED_AT, SheetFormat, TableFormat, TextFormat
 from shipid.logs.guess.clock import (
     Rows,
     are_whole,
-    clock_once,
     clock_restarts,
+    clock_without_repeats,
     column_called,
     doubts_on,
     is_clock,
@@ -85,7 +85,7 @@ ROWS_EACH, MOST_NUMBERS = 5, 20  # rows of each ship, on average, at least; ship
 
 
 @dataclass(frozen=True)
-class Sniffed:
+class LogTable:
     """An unknown log as numbers: how it is written, its clock and all other columns, NaN where a value is missing.
 
     `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
@@ -115,7 +115,7 @@ class Sniffed:
         return READERS[self.form.get("kind", "text")].scattered
 
 
-def recognise_log(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
+def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     """Recognise the format of a log and read it; `names` are the columns of a text log without a header.
 
     Raises
@@ -183,7 +183,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     words = [name for name in words if name not in columns]
     runs, since = clock_restarts(table, columns)
     try:
-        clock, t, once = clock_once(table, columns if since is None else columns | since, file)
+        clock, t, once = clock_without_repeats(table, columns if since is None else columns | since, file)
     except DataError:
         lost = next(filter(is_clock, other), None)
         if lost is not None and not any(map(is_clock, columns)):
@@ -221,7 +221,7 @@ def recognise_log(file: Path, names: tuple[str, ...] = ()) -> Sniffed:
     doubts += tuple(zone_questions(above, table, clock))
     doubts += tuple(_minus_ones(columns))
     doubts += () if runs else tuple(other_clocks(table.loc[once], columns, clock, t))
-    return Sniffed(
+    return LogTable(
         form,
         clock,
         t,
@@ -475,7 +475,7 @@ def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list
             if value in never:
                 known = max(-low, high) > never[value]
             elif value not in SENTINELS:  # of no recorder that is known
-                known = not _stands_out(values, value) or _is_elsewhere(table, name, hit)
+                known = not _is_filler(values, value) or _other_column_has(table, name, hit)
             else:
                 known = low - max(high - low, -low) <= value <= high + max(high - low, high)
                 known |= low == high == 0.0 and 0.0 < value < 1000.0
@@ -488,7 +488,7 @@ def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list
     return list(texts)
 
 
-def _stands_out(values: Array, value: float) -> bool:
+def _is_filler(values: Array, value: float) -> bool:
     """Whether a column (N,) takes a value again and again that is far beyond all others.
 
     A few others are not mostly near 0: a thruster that is switched on has no value but 0 else.
@@ -502,7 +502,7 @@ def _stands_out(values: Array, value: float) -> bool:
     return bool(abs(value) > (BEYOND if many else BEYOND_LEVELS) * usual.max() and not on_and_off)
 
 
-def _is_elsewhere(table: pd.DataFrame, name: str, hit: Rows) -> bool:
+def _other_column_has(table: pd.DataFrame, name: str, hit: Rows) -> bool:
     """Whether another column of a table holds a text that one of this name has in some rows (N,)."""
     texts = column_called(table, name)[hit].astype(str).str.strip().unique()
     others = (table.iloc[:, index] for index, one in enumerate(map(str, table.columns)) if one != name)

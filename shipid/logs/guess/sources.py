@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from shipid.errors import DataError, ShipidError
-from shipid.logs.guess.sniff import SAMPLE, Sniffed, recognise_log
+from shipid.logs.guess.sniff import SAMPLE, LogTable, recognise_log
 from shipid.logs.guess.words import is_run
 from shipid.logs.importing import run_name
 from shipid.logs.kinds import kind_in_name
@@ -40,7 +40,7 @@ class GuessFiles:
     manoeuvres: dict[str, str]
     parts: dict[str, Any]
     held: int
-    sniffed: Sniffed
+    sniffed: LogTable
 
 
 def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
@@ -53,9 +53,9 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
     folder, patterns = _file_patterns(path)
     if not patterns:
         log = recognise_log(path, names)
-        parts, held = _run_parts({path: log}, by_pause=False)
+        parts, held = _parts_of_runs({path: log}, by_pause=False)
         return GuessFiles(path, None, {path.stem: path}, {}, {}, parts, held, log)
-    sniffed: dict[Path, Sniffed] = {}
+    sniffed: dict[Path, LogTable] = {}
     skipped: dict[str, str] = {}
     for pattern in patterns:  # a folder of one log and a readme has two endings: that of the log is taken
         for file in sorted(file for file in folder.glob(pattern) if file.is_file()):
@@ -77,11 +77,11 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
     kept = _files_alike(sniffed, folder, skipped)
     runs = {run_name(file, folder, pattern): file for file in kept}
     kinds = {run: kind for run, file in runs.items() if (kind := kind_in_name(file.stem))}
-    parts, held = _run_parts(kept, by_pause=True)
+    parts, held = _parts_of_runs(kept, by_pause=True)
     return GuessFiles(folder, pattern, runs, skipped, kinds, parts, held, _join_files(list(kept.values())))
 
 
-def _run_parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, Any], int]:
+def _parts_of_runs(logs: dict[Path, LogTable], *, by_pause: bool) -> tuple[dict[str, Any], int]:
     """Return the keys of [parts] for files of several runs, and the number of runs; nothing, 0 where each holds one.
 
     A column that says the run is taken if its values are held; pauses of the clock that are long beside all other
@@ -107,7 +107,7 @@ def _run_parts(logs: dict[Path, Sniffed], *, by_pause: bool) -> tuple[dict[str, 
     return keys, sum(_count_runs(log, column, keys.get("pause", np.inf)) for log in logs.values())
 
 
-def _is_held(name: str, log: Sniffed) -> bool:
+def _is_held(name: str, log: LogTable) -> bool:
     """Whether a column has whole values, each in a long stretch of rows."""
     values = log.columns.get(name)
     if values is None or not np.isfinite(values).all() or np.any(values % 1):
@@ -116,7 +116,7 @@ def _is_held(name: str, log: Sniffed) -> bool:
     return bool(np.median(stretches) >= HELD)
 
 
-def _count_runs(log: Sniffed, column: str | None, pause: float) -> int:
+def _count_runs(log: LogTable, column: str | None, pause: float) -> int:
     new = np.diff(log.t) > pause
     return 1 + int(np.sum(new | (np.diff(log.columns[column]) != 0) if column is not None else new))
 
@@ -141,10 +141,10 @@ def _file_patterns(path: Path) -> tuple[Path, list[str]]:
     return path, [f"{deep[ending]}*{ending}" for ending in sorted(files, key=lambda ending: size[ending], reverse=True)]
 
 
-def _files_alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, str]) -> dict[Path, Sniffed]:
+def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str, str]) -> dict[Path, LogTable]:
     """Return the files of the commonest columns and format; the others are skipped with a reason."""
 
-    def written(log: Sniffed) -> tuple[object, ...]:
+    def written(log: LogTable) -> tuple[object, ...]:
         form = {key: value for key, value in log.form.items() if key not in ("ragged", "missing", "thousands")}
         unit = (str(log.clock["from"]), log.clock["unit"])
         return (*sorted((key, str(value)) for key, value in form.items()), unit)
@@ -168,7 +168,7 @@ def _files_alike(sniffed: dict[Path, Sniffed], folder: Path, skipped: dict[str, 
     return kept
 
 
-def _join_files(logs: list[Sniffed]) -> Sniffed:
+def _join_files(logs: list[LogTable]) -> LogTable:
     """Return the rows of several files one after another, `PAUSE` s apart; those of one file by its clock."""
     first = logs[0]
     if len(logs) == 1:

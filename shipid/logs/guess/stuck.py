@@ -50,13 +50,13 @@ def _stuck_stretches(state: State, name: str, values: Array) -> Iterator[tuple[f
         last = first + count - 1
         if count < max(LEAST_ROWS, LONG * typical) or t[last] - t[first] < LEAST:
             continue
-        turn = _turn_elsewhere(state, name, int(first), int(last))
+        turn = _turn_by_others(state, name, int(first), int(last))
         if abs(turn) > TURNED:
             end = min(last + 2, len(t) - 1)  # a jump that follows may be taken for one across 360
             yield float(t[first]), float(t[end]), turn
 
 
-def _turn_elsewhere(state: State, name: str, first: int, last: int) -> float:
+def _turn_by_others(state: State, name: str, first: int, last: int) -> float:
     """By how much [rad] the rest of the log says that the ship turned, beyond what the column itself says."""
     assert state.psi is not None
     if name == "psi":
