@@ -217,8 +217,11 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "integrator": (lambda: exported(integrator="rk5"), "integrator 'rk5' is not known: did you mean 'rk4'?"),
     "name in C": (lambda: exported(name=3), "name must be a str, such as"),
-    "estimates": (lambda: shipid.figures.estimates(ANY), "source must be an Identified, as of `run_identification`"),
-    "track": (lambda: shipid.figures.track(ANY), "source must be a Measured, as of `measure_standard`"),
+    "estimates": (
+        lambda: shipid.figures.estimates(ANY),
+        "source must be an Identification, as of `run_identification`",
+    ),
+    "track": (lambda: shipid.figures.track(ANY), "source must be a MeasuredManoeuvre, as of `measure_standard`"),
     "no cells": (lambda: shipid.figures.error_map({}), "there is nothing to draw"),
     "no gain": (lambda: shipid.figures.gain({}), "there is nothing to draw"),
 }

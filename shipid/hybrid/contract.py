@@ -49,7 +49,7 @@ def fault_of_method(kind: type[BaseModel]) -> str:
         return f"`corrector` of {name_of_class(kind)} must be a class, not {corrector!r}"
     lacking = next((name for name in CORRECTOR_STORAGE if not callable(getattr(corrector, name, None))), None)
     if lacking is not None:
-        return f"{name_of_class(corrector)} lacks `{lacking}`: a class of `Stored`, shipid.hybrid.stored, has it"
+        return f"{name_of_class(corrector)} lacks `{lacking}`: a class of `StoredData`, shipid.hybrid.stored, has it"
     return _fault_of_signature(corrector, "predict", PREDICT)
 
 

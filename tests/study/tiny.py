@@ -77,7 +77,9 @@ def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
 def without_figures() -> Iterator[None]:
     """Pages of studies are texts alone, where figures are not the point: these take most of the time of a page."""
     drawn = page.draw_sections
-    with patch.object(page, "drawn", lambda sections, *rest: [] if sections is SECTIONS else drawn(sections, *rest)):
+    with patch.object(
+        page, "draw_sections", lambda sections, *rest: [] if sections is SECTIONS else drawn(sections, *rest)
+    ):
         yield
 
 
