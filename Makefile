@@ -24,11 +24,12 @@ test: $(STAMP)           ## all tests but the slow ones
 slow: $(STAMP)           ## the slow tests
 	$(PYTEST) -m slow
 
-check: $(STAMP)          ## format, lint, types, layers
+check: $(STAMP)          ## format, lint, types, layers, names
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m tests.names
 
 # The site: warnings are errors, links are checked, nothing is fetched. What builds it is a stamp beside that of the rest.
 DOCS := $(VENV)/.installed-docs

@@ -291,14 +291,6 @@ def arrays_with_prefix(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[st
     return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
 
 
-def header_entries(header: Mapping[str, Any], name: str) -> list[Any]:
-    """A list in the header of a saved method; ResultError where it is none or empty."""
-    entries = header[name]
-    if not isinstance(entries, list) or not entries:
-        raise ResultError("must be a list with one entry or more", path=name)
-    return entries
-
-
 def _json_values(value: Any) -> Any:
     """Content of JSON: mappings, lists and scalars of Python."""
     if isinstance(value, Mapping):

@@ -97,7 +97,7 @@ def tally_errors(error: Array) -> NDArray[np.uint32]:
 
 
 def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
-    """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally_errors`; accurate to a bin, 0.2 %."""
+    """Return the quantile [m] for a share (0 to 1) from counts (..., BINS) of `tally_errors`, to 0.2 %."""
     octaves = counts.reshape(*counts.shape[:-1], BINS // BINS_AN_OCTAVE, BINS_AN_OCTAVE)
     place = share * (counts.sum(axis=-1, keepdims=True, dtype=float) - 1)
     octave, running, here = _first_beyond(octaves.sum(axis=-1), place)

@@ -12,6 +12,8 @@ from pathlib import Path
 PROTOCOL: dict[str, str] = {}
 """Name that may stand in several modules -> why: each of them is one member of a family that is called by this name."""
 MOST_PROTOCOLS = 20
+MOST_SHARED_CONSTANTS = 157
+"""Constants that stand in two modules of `shipid`: this number may only fall."""
 DIALECT = frozenset(
     "told found said felt lapse lapses borne stands stood sailed judged asked shown listed spoken deepest beside "
     "meant seen wanted her she he".split()
@@ -48,36 +50,50 @@ def word_fault(name: str) -> str:
     return ""
 
 
+Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+
+
 def definitions(root: Path) -> Iterator[tuple[str, str]]:
-    """Name, and place as `file:line`, of every function and class at the top of a module under the root."""
+    """Name, and place as `file:line`, of every function, class and constant at the top of a module under the root."""
     for file in sorted(root.rglob("*.py")):
         for node in ast.parse(file.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) and not node.name.startswith(
-                "__"
-            ):
-                yield node.name, f"{file.relative_to(root.parent)}:{node.lineno}"
+            for name in [node.name] if isinstance(node, Definition) else constants(node):
+                if not name.startswith("__"):
+                    yield name, f"{file.relative_to(root.parent)}:{node.lineno}"
 
 
-def name_faults(root: Path) -> list[str]:
-    """Return a line for every name under the root that stands in two modules or has a wrong word."""
+def constants(statement: ast.stmt) -> list[str]:
+    """Names in upper case that a statement assigns."""
+    given = statement.targets if isinstance(statement, ast.Assign) else []
+    given = [statement.target] if isinstance(statement, ast.AnnAssign) else given
+    names = (node.id for target in given for node in ast.walk(target) if isinstance(node, ast.Name))
+    return [name for name in names if name.isupper()]
+
+
+def name_faults(root: Path, most_shared: int = 0) -> list[str]:
+    """Return a line for every name under the root that stands in two modules or has a wrong word.
+
+    most_shared : how many constants may stand in two modules; where there are more, each is a fault.
+    """
     places: dict[str, list[str]] = defaultdict(list)
     for name, place in definitions(root):
         places[name].append(place)
-    faults = []
+    faults, shared = [], []
     for name, where in places.items():
         files = dict.fromkeys(place.partition(":")[0] for place in where)
         if len(files) > 1 and name not in PROTOCOL:
-            faults.append(f"{where[0]}: {name} stands in {len(files)} modules, too in {', '.join(where[1:])}")
-        if fault := word_fault(name):
+            line = f"{where[0]}: {name} stands in {len(files)} modules, too in {', '.join(where[1:])}"
+            (shared if name.isupper() else faults).append(line)
+        if not name.isupper() and (fault := word_fault(name)):
             faults.append(f"{where[0]}: {name}: {fault}")
-    return faults
+    return faults + (shared if len(shared) > most_shared else [])
 
 
 def main() -> int:
-    """Print the faults of a package, by default `shipid`, and return how many there are, at most 1."""
-    faults = name_faults(Path(*sys.argv[1:2] or ["shipid"]))
+    """Print the faults of a package, by default `shipid`; return 1 where there are any."""
+    faults = name_faults(Path(*sys.argv[1:2] or ["shipid"]), MOST_SHARED_CONSTANTS)
     sys.stdout.writelines(f"{fault}\n" for fault in faults)
-    return min(len(faults), 1)
+    return int(bool(faults))
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ def test_ctrl_c_before_the_first_line_of_the_command_ends_quietly(stage: str) ->
         "    return real(name, *rest)\n"
         "builtins.__import__ = stop\n"
         f"if {stage!r} != 'shipid.cli': unittest.mock.patch({stage!r}, side_effect=KeyboardInterrupt).start()\n"
-        "m.run()"
+        "m.run_command_line()"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
     assert (result.returncode, result.stderr) == (130, "interrupted\n")
@@ -61,7 +61,7 @@ def test_closed_streams_lead_nowhere_and_no_file_takes_their_place() -> None:
     into, out = os.pipe()
     code = (
         "import os, sys, shipid.__main__ as m; sys.argv = ['shipid', 'study', 'list', '--json']\n"
-        "try: m.run()\n"
+        "try: m.run_command_line()\n"
         f"finally: os.write({out}, str(os.dup({out})).encode())"
     )
     closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", sys.executable, "-c", code]

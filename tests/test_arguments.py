@@ -217,7 +217,10 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "integrator": (lambda: exported(integrator="rk5"), "integrator 'rk5' is not known: did you mean 'rk4'?"),
     "name in C": (lambda: exported(name=3), "name must be a str, such as"),
-    "estimates": (lambda: shipid.figures.estimates(ANY), "source must be an Identified, as of `run_identification`"),
+    "estimates": (
+        lambda: shipid.figures.estimates(ANY),
+        "source must be an Identification, as of `run_identification`",
+    ),
     "track": (lambda: shipid.figures.track(ANY), "source must be a MeasuredManoeuvre, as of `measure_standard`"),
     "no cells": (lambda: shipid.figures.error_map({}), "source must be a Results"),
 }

@@ -105,7 +105,7 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
 
         return maybe
 
-    for place, name in ((Path, "write_text"), (Path, "unlink"), (os, "replace"), (files, "sync")):
+    for place, name in ((Path, "write_text"), (Path, "unlink"), (os, "replace"), (files, "sync_to_disk")):
         monkeypatch.setattr(place, name, killed(getattr(place, name)))
     try:
         files.write_set(new, former)

@@ -18,7 +18,7 @@ FORBIDDEN = {
     "optuna": ("identification", "import optuna"),
     "dask": ("study", "from dask.distributed import Client"),
     "plotly and jinja2": ("hybrid", "import plotly.graph_objects"),
-    "rich and typer": ("study", "from rich.console import Console"),
+    "typer": ("study", "import typer"),
     "readers of foreign formats": ("data", "import pymap3d"),
     "floors: physics imports the vessel": ("physics", "import shipid.vessel.load"),
     "floors: data import logs": ("data", "from shipid.logs.importing import import_log"),

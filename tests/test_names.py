@@ -28,6 +28,13 @@ def test_a_name_in_two_modules_is_named_with_both(tmp_path: Path) -> None:
     assert "ship/b.py:2" in fault
 
 
+def test_a_constant_in_two_modules_is_named_unless_so_many_may_be(tmp_path: Path) -> None:
+    root = package(tmp_path, a="NEAR, FAR = 1, 2\n", b="FAR: float = 3.0\nlog = 1\n", c="log = 1\n")
+    (fault,) = name_faults(root)
+    assert fault == "ship/a.py:1: FAR stands in 2 modules, too in ship/b.py:1"
+    assert name_faults(root, most_shared=1) == []
+
+
 def test_what_is_inside_a_class_or_defined_twice_in_one_module_is_free(tmp_path: Path) -> None:
     inside = "class A:\n    def judged(self): ...\n"
     root = package(tmp_path, a=inside, b="if True:\n    def one(): ...\ndef two(): ...\ndef two(): ...\n")

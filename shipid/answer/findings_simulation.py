@@ -15,7 +15,7 @@ S4 : at the largest N_D at least one high member is better than no physics and a
     seeds, each another nested order of runs, H of those that are worse varies more than that of the moderate members.
     Never decided with fewer than five seeds.
 S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 turns none of S1-S4 round; refuted if it is
-    below 0.8 or H_90 confirms what H refutes, or the other way round. Undecided with too few manoeuvres, as all are.
+    below 0.8 or H_90 confirms what H refutes, or the other way round. UndecidedClaim with too few manoeuvres.
 S6 : a moderate member with a small N_D (at most half of the largest) is better than no physics with the next
     larger one, and one is better than physics alone that is more accurate than its physics.
 S7 : at the smallest N_D the roughness of paths without physics is more than 1.5 times that of the true paths, and that
@@ -100,7 +100,7 @@ class ErrorGrid:
         return (*self.moderate, *self.high)
 
     def members(self, family: str) -> tuple[str, ...]:
-        """Members of a family with a result in every cell, of both for `physics`; Undecided without one."""
+        """Members of a family with a result in every cell, of both for `physics`; UndecidedClaim without one."""
         names: tuple[str, ...] = getattr(self, family)
         if not names:
             raise UndecidedClaim(f"no {family} model has a result in every cell")
@@ -119,7 +119,7 @@ def simulation_findings(results: Results) -> list[ClaimVerdict]:
 
 
 def read_grid(results: Results) -> ErrorGrid:
-    """The errors of a finished study; Undecided, with the reason, where there are none."""
+    """The errors of a finished study; UndecidedClaim, with the reason, where there are none."""
     claims, cells = results.plan.study.claims, results.judged_cells
     assert claims is not None
     if not results.complete:
@@ -187,7 +187,7 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
 
 
 def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[ErrorTerm]]]:
-    """A of models [m], and at each amount of data the terms of the rise of H for twice the A; Undecided without."""
+    """A of models [m], and at each amount of data the terms of the rise of H for twice the A."""
     if len(models) < FEWEST_MODELS:
         raise UndecidedClaim(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])

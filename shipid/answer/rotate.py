@@ -116,7 +116,7 @@ def turns_table(frame: pd.DataFrame) -> pd.DataFrame:
 def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[ClaimVerdict]:
     """Verdicts on R1-R4 over the turns, each a test manoeuvre; R4 by the mean over the horizon.
 
-    Turns share training runs and so are not independent: intervals are too narrow rather than too wide. Undecided where
+    Turns share training runs and so are not independent: intervals are too narrow. UndecidedClaim where
     the numbers of either model were set from runs that test. Nothing without `accurate` and `inaccurate`, or where
     fewer than two turns have what they need.
     """

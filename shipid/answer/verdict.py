@@ -38,7 +38,7 @@ class UndecidedClaim(Exception):
 
 @dataclass(frozen=True)
 class ClaimRule(Generic[Judged]):
-    """A claim and how it is judged: `judge` takes what the claim is about, and raises Undecided where that lacks."""
+    """A claim and how it is judged: `judge` takes what the claim is about, or raises UndecidedClaim."""
 
     claim: str
     judge: Callable[[Judged], Judgement]

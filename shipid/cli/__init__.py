@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import errno
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 import typer
 
-from shipid.cli import data, export, identify, predict, replay, schema, simulation, study, vessel
+from shipid.cli import data, export, identify, predict, replay, simulation, study, vessel
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError, is_utf_8
 
 OPTIONS: dict[str, Any] = {
     "no_args_is_help": True,
+    "add_completion": False,
     "pretty_exceptions_enable": False,
     "rich_markup_mode": None,  # half of the time of `shipid --help` went into its frames
     "context_settings": {"max_content_width": 120},
@@ -27,7 +28,6 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "replay": replay.replay_command,
     "identify": identify.identify_command,
     "predict": predict.predict_command,
-    "schema": schema.schema_command,
     "export": export.export_command,
     "aboard": export.aboard_command,
 }
@@ -43,7 +43,7 @@ def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
         _check_encoding(sys.argv[1:])
-        _app_of_arguments(sys.argv[1:])()
+        app()
     except BrokenPipeError:
         sys.exit(141)
     except KeyboardInterrupt:
@@ -100,27 +100,17 @@ def _configure_output(
         raise typer.Exit
 
 
-def _build_app(names: Collection[str], *, hollow: bool = False) -> typer.Typer:
-    """Build the command line of some commands and groups; hollow groups only say what they are for."""
+def _build_app() -> typer.Typer:
+    """Build the command line of all commands and groups."""
     app = typer.Typer(**OPTIONS)
     app.callback(invoke_without_command=True)(_configure_output)
     for name, command in COMMANDS.items():
-        if name in names:
-            app.command(name, cls=GuardedCommand)(command)
+        app.command(name, cls=GuardedCommand)(command)
     for name, group in GROUPS.items():
         for registered in group.registered_commands:
             registered.cls = GuardedCommand
-        if name in names:
-            app.add_typer(typer.Typer(help=group.info.help) if hollow else group, name=name)
+        app.add_typer(group, name=name)
     return app
 
 
-def _app_of_arguments(arguments: Sequence[str]) -> typer.Typer:
-    """Take what the first argument names, alone: every command of an app is made before one runs, which takes time."""
-    first = arguments[0] if arguments else ""
-    if first in COMMANDS or first in GROUPS:
-        return _build_app([first])
-    return _build_app([*COMMANDS, *GROUPS], hollow=True) if first == "--help" else app
-
-
-app = _build_app([*COMMANDS, *GROUPS])
+app = _build_app()

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from shipid.cli.answer import Answer, Json, open_answer
-from shipid.cli.completion import names_beginning_with, offer_documents, offer_files
 from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import criterion_table, measure_table, show_steps, text_table
@@ -23,15 +22,9 @@ if TYPE_CHECKING:
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
 
 
-def _offer_public_logs(incomplete: str) -> list[str]:
-    from shipid.document import bundled_documents
-
-    return names_beginning_with(incomplete, bundled_documents("studies/mappings"))
-
-
 @app.command("fetch")
 def data_fetch(
-    name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022", autocompletion=_offer_public_logs)],
+    name: Annotated[str, typer.Argument(help="a public log, such as gunnerus-2022")],
 ) -> None:
     """Get a public log by URL and checksum, or take it from the folder SHIPID_DATA."""
     from shipid.logs.catalogue import fetch_log
@@ -54,9 +47,7 @@ def data_import(
     names: Annotated[str, typer.Option(help="with --guess: names of the columns, a,b,c, of a log without any")] = "",
     vessel: Annotated[
         str | None,
-        typer.Option(
-            help="with --guess: vessel whose names the commands take", autocompletion=offer_documents("models")
-        ),
+        typer.Option(help="with --guess: vessel whose names the commands take"),
     ] = None,
     frame: Annotated[
         Literal["ned", "enu", "zup", "ros"] | None,
@@ -116,7 +107,6 @@ def _draft_mapping(
     from shipid.files import check_new, write_new
     from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import NOT_YET, draft_mapping
-    from shipid.schemas import add_schema_line
     from shipid.vessel.load import load_vessel
 
     if out is not None:
@@ -126,7 +116,7 @@ def _draft_mapping(
     check_new(file, "mapping")
     check_output(file, [], "--out")
     text = draft_mapping(guessed)
-    write_new(add_schema_line(text, file, "mapping"), file)
+    write_new(text, file)
     columns = [
         {"column": c.name, "from": c.source, "unit": c.unit, "sure": c.confidence, "why": c.evidence}
         for c in guessed.columns
@@ -181,9 +171,7 @@ def data_segment(
 
 @app.command("join")
 def data_join(
-    datasets: Annotated[
-        list[Path], typer.Argument(help="datasets of one vessel, two or more", autocompletion=offer_files(".parquet"))
-    ],
+    datasets: Annotated[list[Path], typer.Argument(help="datasets of one vessel, two or more")],
     out: Annotated[Path, typer.Option(help="dataset (Parquet) to write")],
     as_json: Json = False,
 ) -> None:
@@ -205,20 +193,11 @@ def data_join(
 
 @app.command("check")
 def data_check(
-    dataset: Annotated[
-        Path, typer.Argument(help="dataset written by `shipid data import`", autocompletion=offer_files(".parquet"))
-    ],
-    vessel: Annotated[
-        str | None,
-        typer.Option(
-            help="vessel whose thrust, torque and rudder force are compared with the measured ones",
-            autocompletion=offer_documents("models"),
-        ),
-    ] = None,
+    dataset: Annotated[Path, typer.Argument(help="dataset written by `shipid data import`")],
     html: Annotated[Path | None, typer.Option(help="page to write, with plots of what the checks compare")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position, thrust of a vessel."""
+    """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position."""
     from shipid.data.checks import check_dataset
     from shipid.data.dataset import read_dataset
     from shipid.data.held import warn_of_constant_commands
@@ -226,13 +205,6 @@ def data_check(
     check_ending(html, ".html")
     log = read_dataset(dataset)
     checks = check_dataset(log)
-    if vessel is not None:
-        import pandas as pd
-
-        from shipid.data.outputs import check_outputs
-        from shipid.vessel.load import load_vessel
-
-        checks = pd.concat([checks, check_outputs(load_vessel(vessel), log)], ignore_index=True)
     ok = checks["ok"].astype(bool)
     with open_answer(as_json) as answer:
         if html is not None:
@@ -258,7 +230,7 @@ def data_check(
 
 @app.command("measures")
 def data_measures(
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)", autocompletion=offer_files(".parquet"))],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet)")],
     manoeuvre: Annotated[
         str | None, typer.Option(help="what every run is, such as zigzag or spiral; default: what is recognised")
     ] = None,

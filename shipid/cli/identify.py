@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shipid.cli.answer import Answer, Json, open_answer
-from shipid.cli.completion import offer_files
 from shipid.cli.options import VesselName, command_line, document_stem, parse_assignments, parse_changes
 from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import end_on_interrupt, four_digits, motion_errors, show_steps, text_table
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 def identify_command(
     vessel: VesselName,
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=offer_files(".parquet"))],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
     parameters: Annotated[
         list[str] | None,
         typer.Option(

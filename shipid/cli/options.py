@@ -10,25 +10,16 @@ from typing import Annotated, Any
 
 import typer
 
-from shipid.cli.completion import offer_documents, offer_files
 from shipid.errors import DocumentError, ShipidError
 
 HIGHEST = 0.99  # level of the bands of a predictor; `shipid.hybrid.bands.LEVELS` ends there
 VesselName = Annotated[
     str,
-    typer.Argument(
-        help="bundled name, or path of a vessel or patch document", autocompletion=offer_documents("models")
-    ),
+    typer.Argument(help="bundled name, or path of a vessel or patch document"),
 ]
-StudyName = Annotated[
-    str, typer.Argument(help="bundled study or path of one", autocompletion=offer_documents("studies"))
-]
-MappingName = Annotated[
-    str, typer.Argument(help="bundled mapping or path of one", autocompletion=offer_documents("studies/mappings"))
-]
-Folder = Annotated[
-    Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d", autocompletion=offer_files())
-]
+StudyName = Annotated[str, typer.Argument(help="bundled study or path of one")]
+MappingName = Annotated[str, typer.Argument(help="bundled mapping or path of one")]
+Folder = Annotated[Path, typer.Argument(help="folder of a run, such as results/quick-1a2b3c4d")]
 Changes = Annotated[list[str] | None, typer.Option("--set", help="path=value: change the study, such as grid.N_D=[10]")]
 Workers = Annotated[int | None, typer.Option(min=1, help="processes; default one per core")]
 Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler to use instead")]

@@ -14,32 +14,16 @@ import typer.core
 from shipid.errors import ShipidError
 from shipid.interrupts import raise_interrupts
 
-OUTPUTS = ("out", "csv", "html", "log", "save")
+OUTPUTS = ("out", "csv", "html", "log")
 """Names of options that say what to write."""
 ENDINGS = {".parquet": "a dataset is a Parquet file", ".html": "a page is an HTML file"}
 """Ending -> what is written to such a file."""
 RESULTS = ("study.toml", "provenance.json")
 """Files that a folder of results has."""
-NO_NUMBER = {
-    "float_parsing": "is no number: write it with a point and without a unit, such as 3.5",
-    "int_parsing": "is no whole number",
-    "int_from_float": "is no whole number",
-}
-"""What Pydantic calls a mistake -> what would be right."""
 
 
 class GuardedCommand(typer.core.TyperCommand):
     """A command that refuses numbers that are not finite, and a file named to be read and written, or written twice."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take the arguments as Typer does; the error for what is no number shows its value, too."""
-        try:
-            return super().parse_args(ctx, args)
-        except typer.BadParameter as error:
-            faults: list[Any] = getattr(error.__cause__, "errors", list)()
-            if faults and (words := NO_NUMBER.get(faults[0]["type"])):
-                error.message = f"{faults[0]['input']!r} {words}"
-            raise
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; ShipidError for a number that is not finite, or for a file that must not be written.

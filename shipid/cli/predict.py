@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from shipid.cli.completion import offer_cells
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
 from shipid.cli.outputs import check_output
 from shipid.errors import ShipidError
@@ -17,9 +16,7 @@ from shipid.units import percent_text
 def predict_command(
     folder: Folder,
     log: Annotated[Path, typer.Argument(help="dataset (Parquet), or a raw log with --mapping")],
-    cell: Annotated[
-        str, typer.Option(help="cell whose predictor to use; see results.parquet", autocompletion=offer_cells)
-    ],
+    cell: Annotated[str, typer.Option(help="cell whose predictor to use; see results.parquet")],
     mapping: Annotated[str | None, typer.Option(help="mapping of a raw log")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write: .parquet or .csv; default: <cell>.parquet")] = None,
     level: Annotated[

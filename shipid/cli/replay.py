@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 import typer
 
 from shipid.cli.answer import Json, open_answer
-from shipid.cli.completion import offer_files
 from shipid.cli.options import VesselName, command_line, document_stem
 from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import motion_errors, text_table
@@ -17,7 +16,7 @@ from shipid.errors import ShipidError
 
 def replay_command(
     vessel: VesselName,
-    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs", autocompletion=offer_files(".parquet"))],
+    dataset: Annotated[Path, typer.Argument(help="dataset (Parquet) of runs")],
     runs: Annotated[
         list[str] | None, typer.Option("--run", help="runs, * for any part of a name; default: all")
     ] = None,

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from shipid.cli.answer import Json, open_answer
-from shipid.cli.completion import offer_documents
 from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_ending, check_output
 from shipid.cli.terminal import criterion_table, measure_table, text_table
@@ -22,7 +21,6 @@ def simulate_command(
         typer.Argument(
             metavar="STUDY|VESSEL",
             help="bundled name or path of a study with a [truth]; with --manoeuvres of a vessel",
-            autocompletion=offer_documents("studies"),
         ),
     ],
     out: Annotated[
@@ -112,11 +110,11 @@ def _extremes_text(row: Any) -> str:
 
 def manoeuvre_command(
     vessel: VesselName,
-    name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral, reverse-spiral or stop")],
+    name: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral or stop")],
     angles: Annotated[
         list[float] | None,
         typer.Argument(
-            help="helm in deg, of a zigzag also the execute heading; of a reverse-spiral the greatest rate in deg/s",
+            help="helm in deg, of a zigzag also the execute heading",
             metavar="ANGLES",
         ),
     ] = None,

@@ -11,20 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from shipid.cli.answer import Answer, Json, open_answer
-from shipid.cli.completion import offer_documents, offer_files
 from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, document_stem, parse_changes
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import (
     count_blocks,
-    draw_events,
     end_on_interrupt,
     four_digits,
-    print_reasons,
     shorten_text,
     show_steps,
     text_table,
 )
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.units import digit_decimals, length_decimals, length_text, level_text, percent_text, plural_word
 
 if TYPE_CHECKING:
@@ -56,9 +53,7 @@ def study_list(as_json: Json = False) -> None:
 def study_new(
     vessel: Annotated[
         list[str],
-        typer.Option(
-            help="bundled name, or path of a vessel or patch; may be repeated", autocompletion=offer_documents("models")
-        ),
+        typer.Option(help="bundled name, or path of a vessel or patch; may be repeated"),
     ],
     data: Annotated[
         Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
@@ -70,21 +65,18 @@ def study_new(
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
     from shipid.files import check_new, quote_argument, write_new
-    from shipid.schemas import add_schema_line
     from shipid.study.new import draft_study
 
     file = out or Path(f"{document_stem(data or vessel[0])}-study.toml")
     check_new(file, "study")
     check_output(file, [], "--out")
     draft = draft_study(vessel, data, file)
-    write_new(add_schema_line(draft.text, file, "study"), file, "study")
+    write_new(draft.text, file, "study")
     with open_answer(as_json) as answer:
         choices = [
             {"path": choice.path, "value": _toml_text(choice.value), "why": choice.why} for choice in draft.choices
         ]
-        answer.say(choices=choices)
-        if not as_json:
-            print_reasons(choices)
+        answer.records("choices", choices, {"path": "choice", "value": "value", "why": "because"})
         for warning in draft.warnings:
             typer.echo(f"warning: {warning}", err=True)
         for look in draft.looks.values():
@@ -108,64 +100,6 @@ def _toml_text(value: Any) -> str:
         return str(item(one).as_string())
 
     return value if isinstance(value, str) else inline(value)
-
-
-@app.command("variants")
-def study_variants(
-    study: StudyName,
-    save: Annotated[Path | None, typer.Option(help="folder for one patch document per variant")] = None,
-    accuracy: Annotated[bool, typer.Option(help="also simulate or import the data, and show A")] = True,
-    changes: Changes = None,
-    as_json: Json = False,
-) -> None:
-    """Show the foundations of a study with their factors and accuracy A; save patches that rebuild them exactly."""
-    from shipid.files import check_empty
-    from shipid.study.plan import read_plan
-    from shipid.study.prepare import obtain_runs, prepare
-
-    if save is not None:
-        check_empty(save)
-    plan = read_plan(study, parse_changes(changes))
-    models, scores = plan.foundations, {}
-    if accuracy or save is not None:  # what diverges on training windows is redrawn, so a patch needs the data
-        prepared = prepare(plan, obtain_runs(plan))
-        models = prepared.foundations
-        known = [model.name for model in models if model.vessel and not model.fitted]
-        scores = {name: prepared.accuracy(name)["mean"] for name in known}
-    foundations = [
-        {
-            "foundation": model.name,
-            "A": scores.get(model.name),
-            "identified": model.identify is not None,
-            "observer_chosen": model.fitted and model.identify is None,
-            "factors": model.variant.factors if model.variant and model.identify is None else {},
-            "from_zero": model.variant.from_zero if model.variant and model.identify is None else {},
-        }
-        for model in models
-    ]
-    with open_answer(as_json) as answer:
-        heads = ["foundation", "A [m]", "changed", "factors"]
-        answer.rows("foundations", foundations, text_table(heads, map(_factor_words, foundations)))
-        if save is not None:
-            from shipid.study.store import write_patches
-
-            answer.say(f"{write_patches(save, models)} patches -> {save}", patches=save)
-
-
-def _factor_words(row: dict[str, Any]) -> list[str]:
-    """A foundation as words: its accuracy, how many numbers are changed, and by which factors."""
-    if row["identified"]:
-        return [row["foundation"], "-", "-", "identified from the runs of each cell, so A differs by cell"]
-    from shipid.document import short_names
-
-    words = [f"x{factor:.2f}" if abs(factor) >= 0.01 else f"x{factor:.2g}" for factor in row["factors"].values()]
-    words = [word if factor else "removed" for word, factor in zip(words, row["factors"].values(), strict=True)]
-    words += [f"{value:g} in place of 0" for value in row["from_zero"].values()]
-    names = short_names([*row["factors"], *row["from_zero"]])
-    shown = ", ".join(f"{name} {word}" for name, word in zip(names, words, strict=True))
-    accuracy = "-" if row["A"] is None else length_text(row["A"])
-    note = "observer chosen from the runs of each cell, so A differs by cell" if row["observer_chosen"] else ""
-    return [row["foundation"], accuracy, str(len(names)), ", ".join(filter(None, (shown, note)))]
 
 
 @app.command("screen")
@@ -376,7 +310,7 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
 def study_compare(
     folders: Annotated[
         list[Path],
-        typer.Argument(help="two or more folders of runs; the first is what others meet", autocompletion=offer_files()),
+        typer.Argument(help="two or more folders of runs; the first is what others meet"),
     ],
     pair: Annotated[
         list[str] | None,
@@ -548,6 +482,7 @@ def _run_to_report(
     shard: tuple[int, int] | None = None,
 ) -> None:
     from shipid.answer.pages import ANSWER, write_pages
+    from shipid.answer.start import event_line
     from shipid.files import quote_argument
     from shipid.study import run, store
     from shipid.study.plan import program_of
@@ -556,8 +491,12 @@ def _run_to_report(
     resume = f"{program_of(plan)} study resume {quote_argument(folder)}"
     with end_on_interrupt(f"interrupted; what is finished is kept. Continue with: {resume}"):
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, shard=shard)
-        with closing(events):  # where a line cannot be printed, the lock is given back before the process ends
-            draw_events(events, Watch(plan, folder))
+        watch = Watch(plan, folder)
+        # closing: where a line cannot be printed, the lock is given back before the process ends
+        with closing(events), show_steps(look=lambda: next((one.words for one in watch.look()), "")):
+            for event in events:
+                if line := event_line(event):
+                    typer.echo(escape_unprintable(line))
     if shard is not None:
         typer.echo(f"shard {shard[0]} of {shard[1]} is finished. When all are: {resume}")
         return

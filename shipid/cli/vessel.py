@@ -32,14 +32,13 @@ def vessel_show(
     as_json: Json = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
-    from shipid.vessel.load import load_vessel, term_sources
+    from shipid.vessel.load import load_vessel
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
     ship = load_vessel(vessel)
     document = ship.document
-    origin = term_sources(ship)
     terms: list[dict[str, Any]] = [
-        {"term": path, "kind": key.split(".")[1], "off": off, "source": origin[path]}
+        {"term": path, "kind": key.split(".")[1], "off": off}
         for off in (False, True)
         for path, key, _ in term_blocks(document, off)
     ]
@@ -49,8 +48,8 @@ def vessel_show(
         answer.say("\n".join(filter(None, words)), name=ship.name, file=ship.file, digest=ship.digest)
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
         answer.say(f"particulars: {sentence}", particulars=known)
-        rows = ((t["term"], t["kind"] + ", off" * t["off"], t["source"]) for t in terms)
-        answer.rows("terms", terms, text_table(["term", "kind", "source"], rows))
+        rows = ((t["term"], t["kind"] + ", off" * t["off"]) for t in terms)
+        answer.rows("terms", terms, text_table(["term", "kind"], rows))
         for path, _, block in term_blocks(document):
             if "table" in block:
                 omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
@@ -96,7 +95,6 @@ def vessel_new(
         raise ShipidError("exists already: choose another name", file=out)
     from shipid.document import check_values
     from shipid.files import write_text
-    from shipid.schemas import add_schema_line
     from shipid.simulation.measured import measure_trials
     from shipid.vessel.template import Particulars, first_guess
 
@@ -106,7 +104,7 @@ def vessel_new(
         tunnel_thruster, scale,
     )  # fmt: skip
     guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
-    write_text(out, add_schema_line(guessed.text, out, "vessel"))
+    write_text(out, guessed.text)
     with open_answer(as_json) as answer:
         count = len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)

@@ -46,8 +46,8 @@ class Dataset:
     ----------
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
         (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w`, outputs
-        (`propeller.thrust` [N]) and the rest of `optional_columns()`. SI units, radians; time increases within a run; no NaN.
-        u and v are horizontal, along and across the heading, and r = d(psi)/dt, also where the ship heels.
+        (`propeller.thrust` [N]) and the rest of `optional_columns()`. SI units, radians; time increases within a run;
+        no NaN. u and v are horizontal, along and across the heading, and r = d(psi)/dt, also where the ship heels.
     metadata : plain data (JSON). `flags` names the bits of the column `flags`; `clock` is `"run"` where every run
         has a separate clock (simulation) and `"shared"` where all runs are parts of one recording (the default).
     """
@@ -211,8 +211,8 @@ def clock_slack(t: Array) -> float:
 def after_pauses(t: Array, longest: float) -> NDArray[np.bool_]:
     """Whether each row at t (N,) [s] of one stretch comes after a pause, by it and the rows before it alone.
 
-    A pause is longer than `longest` [s] and than `PAUSE_STEPS` times the shortest interval of late, which grows by the factor
-    `SHORTEST_STEP_GROWTH` with each row. The recorder of exported C has the same rule.
+    A pause is longer than `longest` [s] and than `PAUSE_STEPS` times the shortest interval so far, which grows by the
+    factor `SHORTEST_STEP_GROWTH` with each row. The recorder of exported C has the same rule.
     """
     found, least = np.zeros(len(t), dtype=bool), 0.0
     for i, apart in enumerate(np.diff(t).tolist(), start=1):

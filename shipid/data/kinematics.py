@@ -25,7 +25,7 @@ START_SECONDS = 10.0  # s, over which the first guess of u, v and r is taken
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of one sample, by name of `FILTER_STATES`, and of the change of u, v and of r in one second."""
+    """Standard deviations of one sample, by name of `FILTER_STATES`, and of the change of u, v and r in a second."""
 
     sample: dict[str, float]
     acceleration: float

@@ -10,12 +10,9 @@ import pandas as pd
 from shipid.data.checks import root_mean_square
 from shipid.data.dataset import Dataset, stretches_of_runs, unit_of_column
 from shipid.engine.casadi import evaluate_outputs, memory_along
-from shipid.errors import DataError
 from shipid.simulation.log import body_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-
-LARGEST_SCATTER = 0.15  # of the prediction: a larger scale error or scatter is reported
 
 
 def outputs_in_common(vessel: Vessel, dataset: Dataset) -> list[str]:
@@ -75,32 +72,3 @@ def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
             }
             table.append({**row, "scale": scale, "error": root_mean_square(y - f)})
     return pd.DataFrame(table, columns=["output", "run", "unit", "measured", "predicted", "scale", "error"])
-
-
-def check_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
-    """Rows as those of `check_dataset`: whether measured outputs are within 15 % of what the vessel predicts.
-
-    DataError if no output that the vessel predicts was measured.
-    """
-    if not outputs_in_common(vessel, dataset):
-        measured = ", ".join(dataset.outputs) or "none"
-        predicted = ", ".join(vessel_dynamics(vessel).outputs) or "none"
-        raise DataError(
-            f"{vessel.name} predicts {predicted}; the data have {measured}: nothing to compare", path="--vessel"
-        )
-    table = compare_outputs(vessel, dataset)
-    scatter = table["error"] / table["predicted"].clip(lower=1e-300)
-    ok = scatter <= LARGEST_SCATTER
-    words = np.where(table["scale"] < 0, "; wrong sign?", "; right unit, right size of the component?")
-    said = [
-        f"{row.output} is {row.scale:.3g} times what {vessel.name} predicts (difference {100 * off:.2g} %)"
-        for row, off in zip(table.itertuples(), scatter, strict=True)
-    ]
-    rows = {
-        "check": "output " + table["output"],
-        "run": table["run"],
-        "value": scatter,
-        "unit": "1",
-        "limit": LARGEST_SCATTER,
-    }
-    return pd.DataFrame({**rows, "ok": ok, "sentence": np.array(said, dtype=object) + np.where(ok, "", words)})

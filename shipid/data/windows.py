@@ -330,7 +330,7 @@ def true_path_at(
     """True positions (T, ..., 2) [m] at instants (T, ...) [s] of one unbroken stretch, in the frame (11) of the first.
 
     values : what `sample_columns` gives at the instants. origin : index of another instant to take the frame of.
-    longest : time [s]; logged positions are joined by straight lines, or, between rows farther apart, as in `_bent_positions`.
+    longest : time [s]; logged positions are joined by straight lines; rows farther apart as in `_bent_positions`.
     """
     north, east = (
         travelled_position(rows, instants) if path == "velocity" else _bent_positions(rows, instants, values, longest)
@@ -433,7 +433,7 @@ def longest_gap_in_words(spans: Mapping[str, Iterable[tuple[float, float]]]) -> 
 
 
 def gaps_in_words(dataset: Dataset, least: float) -> str:
-    """How many times without rows the runs have, and the longest; empty where they have none. least : as of `gaps_of_runs`."""
+    """How many times without rows the runs have, and the longest; empty without one. least : as of `gaps_of_runs`."""
     spans = gaps_of_runs(dataset, least)
     count = sum(map(len, spans.values()))
     return f"{count} {plural_word(count, 'time')} without rows, {longest_gap_in_words(spans)}" if count else ""
@@ -448,7 +448,7 @@ def coarse_in_words(dataset: Dataset, step: float) -> str:
 
 
 def is_without_rows(t: Array, instants: Array, least: float) -> NDArray[np.bool_]:
-    """Whether instants [s], any shape, lie in a time without rows of one stretch at t (N,). least : as of `gaps_of_runs`."""
+    """Whether instants [s], any shape, lie in a gap of a stretch with rows at t (N,). least : as of `gaps_of_runs`."""
     steps, slack = np.diff(t), clock_slack(t)
     if not len(steps):
         return np.zeros(np.shape(instants), dtype=bool)
@@ -520,7 +520,7 @@ def part_folds(windows: Windows) -> list[tuple[NDArray[np.int64], NDArray[np.int
     (run,) = windows.spans
     length, span = (windows.num_past + windows.horizon) * windows.step, float(windows.end.max() - windows.begin.min())
     raise DataError(
-        f"the {len(windows)} {plural_word(len(windows), 'window')} of run {run!r} {plural_word(len(windows), 'spans', 'span')} "
+        f"the {len(windows)} {plural_word(len(windows), 'window spans', 'windows span')} in run {run!r} "
         f"{span:g} s, too short to train and validate with windows of "
         f"{length:g} s, which takes more than {3 * length:g} s: shorten the horizon, or raise prediction.samples if set"
     )

@@ -87,7 +87,7 @@ def build_library(command: Sequence[str], source: str, library: Path, limit: flo
 
 
 def load_library(library: Path) -> Any:
-    """The function `run` of a library that `build_library` made; FileNotFoundError if there is none, NoLibrary if not loadable.
+    """Function `run` of a library that `build_library` made; FileNotFoundError without one, NoLibrary if unloadable.
 
     The file is read and compared with its seal before the system maps it: one that is truncated would end the process.
     """

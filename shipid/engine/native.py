@@ -133,7 +133,7 @@ def engine_description() -> str:
 
 
 def noted_engine() -> str | None:
-    """What computes rollouts in this process by now, as `engine_description`: no longer the native one where a model was refused.
+    """What computes rollouts in this process, as `engine_description`: not the native one once a model was refused.
 
     None where nothing has asked for a compiler yet; to look for one takes a moment.
     """

@@ -51,7 +51,7 @@ void run(long next, long end, long threads, const long *sizes, void *const *arra
 def run_tasks(run: Any, sizes: Iterable[int], arrays: Iterable[np.ndarray | None], num_tasks: int, work: float) -> None:
     """Do all tasks of a C function of `threaded_source`, on as many threads as cores, some in one call.
 
-    After an interrupt no further call is made. sizes, arrays : in the order of `threaded_source`; None is a null pointer.
+    After an interrupt no further call is made. sizes, arrays : as of `threaded_source`; None is a null pointer.
     work : of one task, in units of a tenth of a microsecond or so.
     """
     held, threads = list(arrays), count_threads()

@@ -31,7 +31,7 @@ def fault_of_method(kind: type[BaseModel]) -> str:
         return f"{name} must have `corrector` as a class variable, the class of what `fit` gives"
     lacking = next((part for part in CORRECTOR_STORAGE if not callable(getattr(corrector, part, None))), None)
     if lacking is not None:
-        return f"{name_of_class(corrector)} lacks `{lacking}`: a class of `Stored`, shipid.hybrid.stored, has it"
+        return f"{name_of_class(corrector)} lacks `{lacking}`: a class of `StoredData`, shipid.hybrid.stored, has it"
     return _fault_of_signature(corrector, "predict", PREDICT)
 
 

@@ -268,11 +268,11 @@ def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
     with locate_errors(f"{name}.fit", type(method)):
         given = method.fit(task)
     if not isinstance(given, Mapping):
-        raise DataError(f"{name}.fit must return a table, foundation -> Fitted, not {type(given).__name__}")
+        raise DataError(f"{name}.fit must return a table, foundation -> FitResult, not {type(given).__name__}")
     for case in task.cases:
         one = given.get(case)
         if not isinstance(one, FitResult):
-            raise DataError(f"{name}.fit must give a Fitted for {case!r}, not {type(one).__name__}")
+            raise DataError(f"{name}.fit must give a FitResult for {case!r}, not {type(one).__name__}")
         _check_fitted(f"{name}.fit", one, shape, method.compensates)
     return dict(given)
 
@@ -290,7 +290,7 @@ def _check_fitted(where: str, one: FitResult, shape: tuple[int, ...], learns: bo
     if one.corrector is None:
         return
     if learns and not any(row.state == "complete" for row in rows):
-        raise DataError(f"{where}: a corrector needs a trial that is complete, or give Fitted(None, ...)")
+        raise DataError(f"{where}: a corrector needs a trial that is complete, or give FitResult(None, ...)")
     with locate_errors(where, type(one.corrector)):
         if fault := fault_of_corrector(one.corrector):
             raise ShipidError(f"{where}: {fault}")

@@ -119,7 +119,7 @@ def recognise_kinds(record: Record) -> tuple[tuple[str, ...], str]:
         for _, b in find_plateaus(record.t, record.helm, SPIRAL_LEVEL_DISTANCE / 4)
     }
     if len(levels) >= SPIRAL_LEVELS:
-        return (), f"the helm is held at {len(levels)} levels: say whether it is a spiral or a reverse-spiral"
+        return (), f"the helm is held at {len(levels)} levels: say whether it is a spiral"
     if not straight:
         return (), "the ship turns already where the helm is first put over"
     row = row_of_release(record, over)

@@ -1,4 +1,4 @@
-"""Direct (Dieudonne) and reverse (Bech) spiral: yaw rate over helm, and the loop of an unstable ship."""
+"""Direct (Dieudonne) spiral: yaw rate over helm, and the loop of an unstable ship."""
 
 from __future__ import annotations
 
@@ -7,15 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from shipid.measures.record import NAN, Array, Measures, Record, find_plateaus, mean_between, settled_mean
+from shipid.measures.record import NAN, Array, Measures, Record, find_plateaus, settled_mean
 from shipid.measures.turning import MIDSHIPS
 from shipid.units import DEGREE
 
 LEVEL_HELM, LEVEL_SHARE = 0.5 * DEGREE, 0.02  # closer helm angles are one level, and such a share of the greatest one
 QUIET_SHARE, HELM_SCATTER = 0.9, 3.0  # of the changes from row to row, and how far such changes scatter about a level
-LEVEL_RATE = 0.05  # of the largest rate: rates closer than this are one level
-READ_SHARE = 0.25  # of a level of rate: it is read in its last quarter
-END_SHARE = 0.05  # of a level of rate: at its end the helm is over for the next level already
 NARROWEST_LOOP = 0.01  # of the distance of levels: a narrower loop is what is left of turns that were not quite steady
 ONE_SIDE = "the ship turns to one side at every helm angle"
 
@@ -49,18 +46,6 @@ def _one_level(helm: Array) -> float:
     """How far helm angles of one level may be apart [rad]: the less, the finer the levels of a quiet helm are."""
     scatter = HELM_SCATTER * float(np.quantile(np.abs(np.diff(helm)), QUIET_SHARE))
     return min(max(scatter, LEVEL_SHARE * float(np.abs(helm).max())), LEVEL_HELM)
-
-
-def rate_levels(record: Record) -> SpiralLevels:
-    """Yaw rate levels of a reverse spiral with the mean helm over the last quarter of each, but for its end.
-
-    At the end of a level the helm is over for the next one, and the rate has hardly changed yet.
-    """
-    t, most = record.t, float(np.abs(record.r).max())
-    stretches = [(float(t[a]), float(t[b])) for a, b in find_plateaus(t, record.r, LEVEL_RATE * most)] if most else []
-    read = [(b - READ_SHARE * (b - a), b - END_SHARE * (b - a)) for a, b in stretches]
-    means = [[mean_between(t, values, *some) for some in read] for values in (record.helm, record.r)]
-    return SpiralLevels(np.array(means[0]), np.array(means[1]), 0)
 
 
 def spiral_measures(record: Record) -> Measures:
@@ -124,26 +109,3 @@ def _around_zero(x: Array, y: Array) -> float:
         return NAN
     others = y[[j for j in (i - (x[i] == 0), i + 1) if 0 <= j < len(y)]]
     return float(np.abs(others - y[i]).max()) if len(others) else NAN
-
-
-def reverse_spiral_measures(record: Record) -> Measures:
-    """Measures of a reverse spiral, whose helm over rate falls between the folds of an unstable ship.
-
-    Returns
-    -------
-    Measures : `neutral_helm` [rad] at rate 0; `loop_width` [rad], the largest decrease of the helm with rising rate, 0
-        for a stable ship; `levels_apart` [rad/s], the largest distance of rates: a fold between them is cut off, and a
-        loop of lower rates is not seen; `helm_levels`, their count.
-    """
-    measures, points = Measures(), rate_levels(record)
-    order = np.argsort(points.rate)
-    helm, rate = points.helm[order], points.rate[order]
-    both = len(rate) >= 3 and rate[0] < 0 < rate[-1]
-    why = "there are no three steady rates to both sides"
-    neutral = width = apart = NAN
-    if both:
-        neutral, apart = float(np.interp(0.0, rate, helm)), float(np.diff(rate).max())
-        width = float((np.maximum.accumulate(helm) - helm).max())
-    measures.add(why, neutral_helm=(neutral, "rad"), loop_width=(width, "rad"), levels_apart=(apart, "rad/s"))
-    measures.add("", levels=(len(rate), "-"))
-    return measures

@@ -68,28 +68,6 @@ def zigzag_helmsman(commands: tuple[str, ...]) -> Helmsman:
 
 
 @lru_cache
-def yaw_rate_helmsman(commands: tuple[str, ...]) -> Helmsman:
-    """PI control of the yaw rate: the share of the largest helm is s = I + gain (rate - r), limited to -1..1.
-
-    dI/dt = gain / reset (rate - r), I limited to -1..1. Inputs: each command with the largest helm to starboard; `rate`
-    [rad/s]; `gain` [s]; `reset` [s].
-    """
-
-    def share(signals: Named, inputs: Named, memory: Named) -> SX:
-        return _limit_share(memory["integral"] + inputs["gain"] * (inputs["rate"] - signals["r"]))
-
-    def orders(signals: Named, inputs: Named, memory: Named) -> Named:
-        return _steer_commands(commands, inputs, share(signals, inputs, memory))
-
-    def advance(signals: Named, inputs: Named, memory: Named, dt: Any) -> Named:
-        gained = inputs["gain"] / inputs["reset"] * (inputs["rate"] - signals["r"]) * dt
-        return {"integral": _limit_share(memory["integral"] + gained)}
-
-    inputs = {**signal_units(commands), "rate": "rad/s", "gain": "s", "reset": "s"}
-    return Helmsman("yaw rate", inputs, {"integral": 0.0}, orders=orders, advance=advance)
-
-
-@lru_cache
 def course_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """PID control of the heading: share of the largest helm s = I + (omega^2 e - 2 omega r) / effect, e the error.
 

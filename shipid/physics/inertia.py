@@ -52,7 +52,7 @@ def mass_matrix(entries: Entries) -> SX:
 
 
 def total_mass(inertia: Mapping[str, Any], added: Mapping[str, Any]) -> list[list[Any]]:
-    """Rows of M_RB + M_A [6 x 6] of numbers: the named arguments of `rigid_body_entries`, and those of `added_mass_entries`."""
+    """Rows of M_RB + M_A [6 x 6] from the arguments of `rigid_body_entries` and of `added_mass_entries`."""
     M_RB, M_A = rigid_body_entries(**inertia), added_mass_entries(**added)
     return [[M_RB.get((i, j), 0.0) + M_A.get((i, j), 0.0) for j in range(6)] for i in range(6)]
 

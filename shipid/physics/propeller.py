@@ -130,14 +130,14 @@ def propeller_wrench(
 ) -> SX:
     """Wrench (6) of a propeller behind a hull: X = (1 - t_P) rho n^2 D_p^4 K_T(J) (MMG eqs. 12-17).
 
-    n [rev/s]; wake w_P0 on a straight course, C_1, C_2, tau, C_P its change with drift (see `propeller_inflow`). For n < 0
-    X = -(1 - t_P) k_astern rho n^2 D_p^4 K(J), J = u_P / (n D_p), with K = K_T_astern, by default the polynomial of
+    n [rev/s]; wake w_P0 on a straight course, C_1, C_2, tau, C_P its change with drift, see `propeller_inflow`. For n <
+    0 X = -(1 - t_P) k_astern rho n^2 D_p^4 K(J), J = u_P / (n D_p), with K = K_T_astern, by default the polynomial of
     ahead. Yasukawa and Yoshimura (2015).
 
-    Beyond J_min..J_max K_T stays, and the water drags the screw by k_drag rho D_p^2 `flow_beyond_polynomial`: a stopped screw by
-    k_drag rho D_p^2 u_P|u_P|. A screw astern gives the side force Y = rho n^2 D_p^4 Y_astern(J) and the moment about
-    the origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, which moves the stern to port,
-    Y_astern < 0 < N_astern.
+    Beyond J_min..J_max K_T stays, and the water drags the screw by k_drag rho D_p^2 `flow_beyond_polynomial`: a stopped
+    screw by k_drag rho D_p^2 u_P|u_P|. A screw astern gives the side force Y = rho n^2 D_p^4 Y_astern(J) and the moment
+    about the origin N = rho n^2 D_p^5 N_astern(J); for a right-handed screw, which moves the stern to port, Y_astern <
+    0 < N_astern.
     """
     u_P = propeller_inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     thrust = polynomial_thrust(u_P, n, D_p, K_T, K_T_astern, ca.SX(J_min), ca.SX(J_max), k_astern, k_drag, rho)
@@ -261,9 +261,9 @@ def controllable_pitch(
 
     n [rev/s]; pitch p [-], the ratio P/D at 0.7 of the radius, negative to drive astern. That is K_T = k_P p - k_J J:
     no thrust at p = 0 in still water, zero thrust at J = k_P p / k_J, and drag of a rotating propeller of zero pitch.
-    The inflow u_P is that behind a hull (see `propeller_inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n| V_a of
-    Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T curves of
-    the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
+    The inflow u_P is that behind a hull (see `propeller_inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n|
+    V_a of Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T
+    curves of the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
     """
     u_P = propeller_inflow(
         nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P
@@ -298,8 +298,8 @@ def controllable_wash(
 ) -> SX:
     """Slipstream of a controllable-pitch propeller, (3): inflow [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream_speed`. So the flow at a rudder
-    has no step where the pitch goes through zero.
+    By momentum theory its signed square is u_P|u_P| + 8 T / (pi rho D_p^2); see `slipstream_speed`. So the flow at a
+    rudder has no step where the pitch goes through zero.
     """
     u_P = propeller_inflow(
         nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P
@@ -386,7 +386,7 @@ def quadratic_wash(
     """Slipstream of a screw with a quadratic law of thrust, (3): inflow [m/s], slipstream speed [m/s], D_p [m].
 
     Its signed square is c_uu u_P|u_P| + c_un n u_P + c_nn n|n| (van Berlekom and Goddard 1972), and with a diameter
-    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream_speed`. With none of these numbers there
+    u_P|u_P| + 8 T / (pi rho D_p^2) more, as momentum theory has it; see `slipstream_speed`. Without these numbers there
     is no slipstream, and a rudder is in the inflow.
     """
     u_P = (1 - w_P0) * nu_r[0]

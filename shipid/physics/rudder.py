@@ -146,10 +146,11 @@ def rudder_polynomial(
 ) -> SX:
     """Wrench (6) of a rudder whose flow across is a polynomial (Son and Nomoto 1982).
 
-    wash : (u_P, u_race, D_p) as of `rudder_wrench`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed. Across:
-    v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, with the sign of `rudder_wrench` (-gamma_R is the
-    value of "v"). U is at least |r| L_pp / TIGHTEST: beyond any turn in which such a polynomial was measured a cubic of
-    r' would grow without limit on a ship that turns on the spot. F_N and the forces of it are those of `rudder_wrench`.
+    wash : (u_P, u_race, D_p) as of `rudder_wrench`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed.
+    Across: v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, signed as in `rudder_wrench`
+    (-gamma_R is the value of "v"). U is at least |r| L_pp / TIGHTEST: beyond any turn in which such a polynomial was
+    measured a cubic of r' would grow without limit on a ship that turns on the spot. F_N and the forces of it are those
+    of `rudder_wrench`.
     """
     F_N = polynomial_normal_force(
         nu_r, delta, wash, A_R=A_R, f_alpha=f_alpha, epsilon=epsilon, k_x=k_x, v_R=v_R, L_pp=L_pp, rho=rho

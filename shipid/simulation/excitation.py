@@ -39,8 +39,8 @@ def multisine_series(
     used: a crest factor of 1.4 for 10 to 40 harmonics of a wide band, 1.7 to 1.9 for narrow (17..21) and sparse bands,
     where Schroeder's are 1.9 for successive harmonics and up to 3 for sparse ones.
 
-    Several commands at once get disjoint harmonics (`deal_harmonics`), which makes them orthogonal over a period, and are shifted
-    in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
+    Several commands at once get disjoint harmonics (`deal_harmonics`), which makes them orthogonal over a period, and
+    are shifted in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
 
     Raises
     ------

@@ -23,17 +23,11 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Gusts(CheckedModel, BaseModel):
-    """A `gusts` block: spectrum, height [m] and frequency band [Hz].
-
-    `npd` depends only on wind speed and height. `kaimal` needs a turbulence intensity (sigma / mean speed) and takes
-    the length scale of IEC 61400-1 unless one is given.
-    """
+    """A `gusts` block: spectrum, which depends on wind speed and height only, and frequency band [Hz]."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    kind: Literal["npd", "kaimal"]
+    kind: Literal["npd"]
     height: Annotated[Positive, Field(description="m above the sea")] = 10.0
-    turbulence_intensity: Annotated[FiniteFloat, Field(gt=0, le=1, description="kaimal: sigma / mean")] | None = None
-    length_scale: Annotated[Positive, Field(description="m, kaimal: 5.67 min(height, 60) if absent")] | None = None
     frequencies: Annotated[
         tuple[Positive, Positive], Field(description="Hz, lowest and highest frequency of the gusts")
     ] = (1 / 600, 0.5)
@@ -44,10 +38,6 @@ class Gusts(CheckedModel, BaseModel):
         low, high = self.frequencies
         if low >= high:
             raise ValueError(f"frequencies must be [low, high], not [{low:g}, {high:g}] Hz")
-        if self.kind == "kaimal" and self.turbulence_intensity is None:
-            raise ValueError("kaimal needs turbulence_intensity, such as 0.1")
-        if self.kind == "npd" and (self.turbulence_intensity, self.length_scale) != (None, None):
-            raise ValueError("npd has neither turbulence_intensity nor length_scale: remove them or take kaimal")
         return self
 
 
@@ -57,7 +47,6 @@ def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tup
     x(t) = sum_k a_k cos(2 pi f_k t + phi_k). The band is divided into bins of equal width in ln f. f_k is uniform in
     ln f within its bin, so that the series does not repeat. a_k^2 / 2 is the integral of the spectrum over the bin, so
     that the variance is that of the band for every draw. A gust that would reverse the wind is cut to total speed 0.
-    That is 1 / intensity standard deviations from the mean: relevant for intensities above 0.3, never for `npd`.
 
     Parameters
     ----------
@@ -78,38 +67,20 @@ def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tup
     return np.maximum(result, -mean_speed)
 
 
-def gust_variance(gusts: Gusts, mean_speed: Array) -> Array:
-    """Variance (S,) [m^2/s^2] of the gusts for mean speeds (S,) [m/s]: the spectrum's integral over the band."""
-    return np.asarray(_bin_variances(gusts, mean_speed).sum(axis=1))
-
-
 def gust_spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:
     """One-sided spectral density [m^2/s^2/Hz] at frequencies [Hz], for mean speeds [m/s] (shapes that broadcast).
 
-    `npd`: S = 320 (U/10)^2 (z/10)^0.45 (1 + x^n)^(-5/(3n)), x = 172 f (z/10)^(2/3) (U/10)^(-3/4), n = 0.468, with the
+    S = 320 (U/10)^2 (z/10)^0.45 (1 + x^n)^(-5/(3n)), x = 172 f (z/10)^(2/3) (U/10)^(-3/4), n = 0.468, with the
     hourly mean U at 10 m; ISO 19901-1, DNV-RP-C205 (Froya model), Fossen (2021) ch. 10. Measured in strong wind over
     open sea in neutral stability; light wind is an extrapolation.
-
-    `kaimal`: S = 4 sigma^2 (L/U) (1 + 6 f L/U)^(-5/3), with the mean U at the height z, sigma = intensity U and
-    L = 8.1 * 0.7 min(z, 60 m); IEC 61400-1 (ed. 3) annex B, longitudinal component. Its integral over all f is sigma^2.
     """
     speed = np.asarray(mean_speed, dtype=np.float64)
     blows = speed > 0
     U = np.where(blows, speed, 1.0)
-    density = _npd_spectrum(gusts, U, frequency) if gusts.kind == "npd" else _kaimal_spectrum(gusts, U, frequency)
-    return np.asarray(np.where(blows, density, 0.0))
-
-
-def _npd_spectrum(gusts: Gusts, U: Array, frequency: Array) -> Array:
     n, z = 0.468, gusts.height / 10
     x = 172 * frequency * z ** (2 / 3) * (U / 10) ** -0.75
-    return np.asarray(320 * (U / 10) ** 2 * z**0.45 * (1 + x**n) ** (-5 / (3 * n)))
-
-
-def _kaimal_spectrum(gusts: Gusts, U: Array, frequency: Array) -> Array:
-    assert gusts.turbulence_intensity is not None
-    passing = (gusts.length_scale or 8.1 * 0.7 * min(gusts.height, 60.0)) / U  # s: an eddy passes by
-    return np.asarray(4 * (gusts.turbulence_intensity * U) ** 2 * passing * (1 + 6 * frequency * passing) ** (-5 / 3))
+    density = 320 * (U / 10) ** 2 * z**0.45 * (1 + x**n) ** (-5 / (3 * n))
+    return np.asarray(np.where(blows, density, 0.0))
 
 
 def _band_edges(gusts: Gusts) -> Array:

@@ -6,7 +6,7 @@ Sign convention: helm > 0 turns the ship to starboard, whatever sign the command
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -17,14 +17,14 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 from shipid.checked import CheckedModel
 from shipid.errors import DocumentError, suggest_name
 from shipid.measures.record import Measures, Record
-from shipid.measures.spiral import SpiralLevels, helm_levels, rate_levels, reverse_spiral_measures, spiral_measures
+from shipid.measures.spiral import SpiralLevels, helm_levels, spiral_measures
 from shipid.measures.stopping import stopping_measures
 from shipid.measures.turning import pull_out_measures, turning_measures
 from shipid.measures.zigzag import zigzag_measures
 from shipid.physics import helm
 from shipid.physics.helm import Helmsman
 from shipid.physics.signals import SIGNALS, signal_of
-from shipid.simulation.approach import Controls, helm_effect
+from shipid.simulation.approach import Controls
 from shipid.simulation.excitation import aprbs_series, deal_harmonics, limit_rate, multisine_series
 from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import DEGREE, RPM
@@ -39,9 +39,7 @@ Helm = Annotated[FiniteFloat, Field(ge=-MOST_HELM, le=MOST_HELM)]
 
 HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
 SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
-RATES = (3, 2, 1, 0.5, 0, -0.5, -1, -2, -3)
 ZIGZAG, TURN, LEVEL, STOP = 30.0, 60.0, 40.0, 80.0  # ship lengths of standard manoeuvres
-SETTLES = 40.0  # rad: omega x hold of the reverse spiral's helmsman
 
 
 def _check_rising(limits: tuple[float, float]) -> tuple[float, float]:
@@ -425,7 +423,9 @@ class Spiral(Trial):
 
     def helm(self, t: Array) -> Array:
         """Helm angle [rad] at times (T,)."""
-        return _level_series(self.angles_deg, self.hold, self.execute_at, t) * DEGREE
+        number = np.floor((t - self.execute_at) / self.hold + 1e-9).astype(int)
+        levels = np.array(self.angles_deg, dtype=float)
+        return np.where(number < 0, 0.0, levels[np.clip(number, 0, len(levels) - 1)]) * DEGREE
 
     @classmethod
     def scaled(cls, request: Request) -> Self:
@@ -437,58 +437,6 @@ class Spiral(Trial):
     def title(self, words: str) -> str:
         """Title with the greatest helm."""
         return f"{words}, {max(self.angles_deg):g} deg of helm to either side"
-
-
-class ReverseSpiral(Trial):
-    """Reverse (Bech) spiral: one yaw rate after another, each held by the helm until that is steady."""
-
-    measures = staticmethod(reverse_spiral_measures)
-    levels = staticmethod(rate_levels)
-    angles: ClassVar[tuple[str, ...]] = ("greatest rate",)
-    first: ClassVar[tuple[str, ...]] = ("neutral helm", "loop width")
-    rates_deg: Annotated[
-        tuple[FiniteFloat, ...], Field(min_length=1, description="deg/s, > 0 to starboard, in order")
-    ] = RATES
-    hold: Annotated[Positive, Field(description="s that each is held")]
-    angle_deg: Annotated[Positive, Field(le=MOST_HELM, description="deg: greatest helm")] = 35.0
-
-    @property
-    def greatest_orders(self) -> tuple[float, float]:
-        """Limit of the helm [deg], and shaft speed [rpm]."""
-        return self.angle_deg, abs(self.n_rpm)
-
-    @property
-    def length(self) -> float:
-        """Length of the log [s]."""
-        return self.execute_at + len(self.rates_deg) * self.hold
-
-    def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:  # noqa: ARG002
-        """The inputs as they are: its helmsman holds the course from t = 0 on."""
-        return inputs
-
-    def helmsman(self, controls: Controls) -> Helmsman:
-        """The yaw-rate helmsman: a PI controller of the yaw rate by the helm."""
-        return helm.yaw_rate_helmsman(controls.commands)
-
-    def inputs(self, controls: Controls, t: Array, speed: float) -> dict[str, Array]:
-        """Name -> (T,): largest helm angle, shaft speeds, ordered yaw rate, gain and reset time of the PI law.
-
-        The PI law places both poles of r' = b s (s in -1..1, share of the largest helm) at omega = 40 / hold [rad/s].
-        """
-        greatest, omega = self.angle_deg * DEGREE, SETTLES / self.hold
-        effect = greatest * helm_effect(controls, self.n_rpm * RPM, speed)
-        if effect <= 0:
-            raise DocumentError(f"at {self.n_rpm:g} rpm the helm does not turn the ship", path="manoeuvre.n_rpm")
-        law = {"gain": np.full(len(t), 2 * omega / effect), "reset": np.full(len(t), 2 / omega)}
-        rate = _level_series(self.rates_deg, self.hold, self.execute_at, t) * DEGREE
-        return controls.orders(self.shaft(t), np.full(len(t), greatest)) | {"rate": rate, **law}
-
-    @classmethod
-    def scaled(cls, request: Request) -> Self:
-        """Nine levels of 40 ship lengths, up to r L / U = 0.25."""
-        most = request.sense * request.angle(float(np.rad2deg(0.25 / request.passing)))
-        rates = tuple(most * rate / RATES[0] for rate in RATES)
-        return cls(rates_deg=rates, hold=request.level(LEVEL), **request.keys)
 
 
 class CrashStop(TimedManoeuvre, Trial):
@@ -595,7 +543,6 @@ KINDS: dict[str, type[Manoeuvre]] = {
     "pull_out": PullOut,
     "zigzag": Zigzag,
     "spiral": Spiral,
-    "reverse_spiral": ReverseSpiral,
     "crash_stop": CrashStop,
     "excitation": Excitation,
 }
@@ -623,9 +570,3 @@ def order_keys(command: str) -> tuple[str, str]:
 def _is_after(moment: float, t: Array) -> NDArray[np.bool_]:
     """Mask (T,): whether t >= moment [s], with a tolerance for rounding."""
     return np.asarray(t >= moment - 1e-9 * max(1.0, moment))
-
-
-def _level_series(levels: Sequence[float], hold: float, execute: float, t: Array) -> Array:
-    """Series (T,): 0 until `execute` [s], then each level for `hold` [s], and the last to the end."""
-    number = np.floor((t - execute) / hold + 1e-9).astype(int)
-    return np.where(number < 0, 0.0, np.array(levels, dtype=float)[np.clip(number, 0, len(levels) - 1)])

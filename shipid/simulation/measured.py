@@ -64,7 +64,7 @@ def measure_standard(
     approach: str | None = None,
     engine: str = "auto",
 ) -> MeasuredManoeuvre:
-    """Simulate a standard manoeuvre in calm deep water and compute its measures; for the arguments see `define_standard`.
+    """Simulate a standard manoeuvre in calm deep water and compute its measures; arguments as of `define_standard`.
 
     engine : of the rollout; `repeated` where many vessels of one structure follow.
     approach : None: with the helm amidships; where the ship then does not go straight, a helmsman holds the course.

@@ -1,9 +1,8 @@
-"""Runs of a vessel by a document of manoeuvres: drawn as a `[truth]` says, or `[[manoeuvre]]` after `[[manoeuvre]]`."""
+"""Runs of a vessel by a document of manoeuvres, `[[manoeuvre]]` after `[[manoeuvre]]`."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 import pandas as pd
@@ -16,7 +15,7 @@ from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.truth import LONGEST, Truth, simulate_truth
+from shipid.simulation.truth import LONGEST
 from shipid.units import plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -39,24 +38,15 @@ def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
 
     Parameters
     ----------
-    name : bundled study, or path of a TOML document. Its `[truth]` draws the manoeuvres, weather and sensor noise; the
-        vessel and its changes that it names are left out. Without one, its `[[manoeuvre]]` blocks are performed in
-        calm water.
+    name : path of a TOML document. Its `[[manoeuvre]]` blocks are performed in calm water.
 
     Raises DocumentError with file, path and remedy for what this vessel cannot perform.
     """
     file = documents.find_document(name, "studies")
     document = documents.read_document(file)
-    documents.check_values(document, file)
-    truth = document.get("truth")
     try:
-        if isinstance(truth, Mapping):
-            drawn = {key: value for key, value in truth.items() if key != "set"} | {"vessel": vessel.key}
-            declared: Truth = documents.parse_model(Truth, drawn, file, "truth")
-            _check_run_size(vessel, declared.manoeuvres, declared.length, declared.step, "truth.duration")
-            return simulate_truth(declared, vessel)
-        if "manoeuvre" not in document:
-            raise DocumentError("holds no manoeuvres: give a [truth], or [[manoeuvre]] blocks")
+        if "truth" in document:
+            raise DocumentError("is a study: simulate it by its name, with --set truth.vessel=...")
         script = documents.parse_model(Script, document, file)
         manoeuvres = _script_manoeuvres(script, vessel)
         _check_run_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step, "manoeuvre")

@@ -67,8 +67,7 @@ def define_standard(
     Parameters
     ----------
     name : a key of `standard_manoeuvres()`, such as `zigzag`, `turning` or `pull-out`.
-    angles : one or several [deg], of helm and, of a zigzag, the execute heading; of a reverse spiral the greatest rate
-        [deg/s].
+    angles : one or several [deg], of helm and, of a zigzag, the execute heading.
     speed : approach speed [m/s]; default: the document's U_0, else Froude number 0.2.
     side : first turn, `starboard` or `port`.
     duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
@@ -143,7 +142,7 @@ def _check_angles(name: str, angles: Sequence[float], wanted: Sequence[str]) -> 
     if any(angle <= 0 for angle in angles):
         raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
     for place, angle in enumerate(angles):
-        greatest = MOST_HEADING if place else MOST_HELM  # as much of a reverse spiral, in deg/s
+        greatest = MOST_HEADING if place else MOST_HELM
         if not angle <= greatest:
             raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
 

@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +33,6 @@ from shipid.files import (
 )
 from shipid.predictor import Predictor
 from shipid.study import seals
-from shipid.study.declared import Foundation
 from shipid.study.lock import sole_writer
 from shipid.study.plan import Plan, Unit, build_plan, own_code, plan_text, program_of
 from shipid.version import __version__
@@ -257,18 +255,6 @@ def check_part(folder: Path, name: str, plan: Plan) -> Path:
     if (place / STUDY).exists() and provenance(place)["digest"] != plan.digest:
         raise ResultError(f"is not part {name} of this study: move it away, and resume", file=place)
     return place
-
-
-def write_patches(folder: Path, foundations: Iterable[Foundation]) -> int:
-    """Write a patch document for every variant and return how many; it loads from anywhere and rebuilds it exactly."""
-    count = 0
-    for one in foundations:
-        if one.base is not None and one.variant is not None and one.identify is None:
-            named = documents.bundled_documents("models").get(one.variant.base) == Path(one.base.file)
-            base = one.variant.base if named else str(Path(one.base.file).absolute())
-            write_text(folder / f"{one.name}.toml", replace(one.variant, base=base).document())
-            count += 1
-    return count
 
 
 def rows_file(folder: Path, key: str) -> Path:

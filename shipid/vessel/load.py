@@ -198,38 +198,6 @@ def _with_base(document: Document, file: Path, above: tuple[Path, ...]) -> Docum
     )
 
 
-def term_sources(vessel: Vessel) -> dict[str, str]:
-    """Dotted path of every term, acting or off -> source of its numbers; empty where its document names none.
-
-    It is the source of the block, else that of the document that wrote the block; of several documents that extend one
-    another, the first that says one.
-    """
-    lineage, file = [], Path(vessel.file)
-    while True:
-        document = documents.read_document(file)
-        if "base" in document:  # a patch changes numbers of blocks that others wrote
-            file = documents.find_document(document["base"], "models", file.parent)
-            continue
-        lineage.append(document)
-        if "extends" not in document:
-            break
-        file = documents.find_document(document["extends"], "models", file.parent)
-    return {
-        path: next(filter(None, (_block_source(document, path) for document in lineage)), "")
-        for off in (False, True)
-        for path, _, _ in term_blocks(vessel.document, off)
-    }
-
-
-def _block_source(document: Document, path: str) -> str:
-    """The source that a document gives for a block; empty if the document does not contain the block."""
-    try:
-        block = documents.value_at_path(document, path)
-    except KeyError:
-        return ""
-    return str(block.get("source") or document.get("source", ""))
-
-
 def _with_tables(document: Document, file: Path) -> Document:
     """The document with the CSV files of tables replaced by their columns, so that its digest covers their content."""
     tables = {}

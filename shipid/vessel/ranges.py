@@ -20,7 +20,6 @@ LEAST_BLOCK = 0.05
 # Judgement, far from ships: SOLAS asks 65 deg of helm in 28 s, which is 0.18 rad in sqrt(L / g) of a ship of 200 m.
 FASTEST, SLOWEST = 4.0, 100.0  # rad in sqrt(L / g); lag over sqrt(L / g)
 NEAR = 0.05  # ship lengths by which positions of rudder and screw may disagree: those of publications do
-ALONG = 10.0  # deg from the bow: a wind from there is a head wind
 TURN = 6.2832  # rad: a table of angles in degrees goes further
 _OF_RUDDER = {
     "x_H": "its force on the hull acts on the same side",
@@ -122,7 +121,7 @@ def first_contradiction(document: Mapping[str, Any], values: Mapping[str, float]
     A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
     or forward, and so does the flow across it; steering gear of this size is not so fast or slow; a ship is longer
     than broad, and broader than deep; a block coefficient is one; shares are below 1; a unit is on the side of its
-    name; wind drives a ship where it goes; a ship at rest stays upright, and displaces her mass.
+    name.
     """
     first = next(iter(find_contradictions(document, values).items()), None)
     return None if first is None else (first[0], f"{first[1]}; {_unusual_remedy(first[0])}")
@@ -154,8 +153,6 @@ def _all_contradictions(document: Mapping[str, Any], values: Mapping[str, float]
     for name, unit in document.get("thruster", {}).items():
         if isinstance(unit, Mapping) and isinstance(unit.get("behind"), str):
             yield from _rudder_contradictions(name, unit["behind"], values, NEAR * length)
-    yield from _wind_contradictions(values)
-    yield from _hydrostatic_contradictions(document, values)
 
 
 def _thruster_contradictions(path: str, value: float, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
@@ -173,43 +170,6 @@ def _thruster_contradictions(path: str, value: float, values: Mapping[str, float
         yield path, f"{value:g}: expected {_SHARES[key]} below 1; is it in per cent?"
     if key == "J_max" and value <= (least := values.get(f"{block}.J_min", -1.0)):
         yield path, f"{value:g}: expected more than J_min, {least:g}"
-
-
-def _wind_contradictions(values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Coefficients of the wind in the signs of another convention, or over other angles."""
-    for end in ("bow", "stern"):
-        if values.get(path := f"wind.C_Dl_{end}", 0.0) < 0:
-            yield path, f"{values[path]:g}: expected a drag, above 0"
-    gamma = [(value, path.rpartition(".")[2]) for path, value in values.items() if path.startswith("wind.gamma_deg.")]
-    if not gamma:
-        return
-    least, most = min(gamma)[0], max(gamma)[0]
-    if abs(least) > ALONG or abs(most - 180) > ALONG:
-        words = f"from {least:g} to {most:g} deg: expected from 0, a head wind, to 180, one from astern"
-        yield "wind.gamma_deg", f"{words}; beyond its ends a table is constant, and the other side is its mirror image"
-    (first, head), (_, beam) = (min(gamma, key=lambda one: abs(one[0] - of)) for of in (0.0, 90.0))
-    if abs(first) < ALONG and values[f"wind.C_X.{head}"] > 0:
-        words = f"{values[f'wind.C_X.{head}']:g} at {first:g} deg: a head wind drives her astern, C_X < 0"
-        yield f"wind.C_X.{head}", f"{words}; angles count from the bow"
-    if values[f"wind.C_Y.{beam}"] < 0:
-        words = f"{values[f'wind.C_Y.{beam}']:g}: expected C_Y > 0, the angles are those of wind from port"
-        yield f"wind.C_Y.{beam}", f"{words}, which drives her to starboard"
-
-
-def _hydrostatic_contradictions(document: Mapping[str, Any], values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
-    """Restoring that lets a ship at rest trim over, and a volume that is not that of her mass."""
-    for path in ("restoring.hydrostatic.nabla", "hull.bis_derivatives.nabla"):
-        rho = values.get("constants.rho", WATER)
-        if path in values and not 0.5 <= values[path] * rho / values["inertia.m"] <= 2:
-            volume = values["inertia.m"] / rho
-            yield path, f"{values[path]:g} m^3: expected about m / rho, {volume:.3g} m^3, half to twice that"
-    names = (f"restoring.hydrostatic.{name}" for name in ("A_wp", "x_F", "nabla", "GM_L"))
-    A_wp, x_F, nabla, GM_L = (values.get(name, 0.0) for name in names)
-    if document.get("dof") == 6 and nabla and A_wp * x_F**2 >= nabla * GM_L:
-        words = (
-            f"{GM_L:g} m: she trims over at rest, expected more than A_wp x_F^2 / nabla, {A_wp * x_F**2 / nabla:.3g} m"
-        )
-        yield "restoring.hydrostatic.GM_L", words
 
 
 def _rudder_contradictions(

@@ -30,7 +30,7 @@ def yaw_growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> flo
 
 
 def yaw_growths(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> tuple[float, float]:
-    """As `yaw_growth`, of a small yaw to starboard and to port: they differ where the wake or the rudder's inflow does."""
+    """As `yaw_growth`, of a small yaw to starboard and to port: different where the wake or the rudder's inflow is."""
     from scipy.linalg import eig  # a study is read without it
 
     model = vessel_dynamics(vessel)

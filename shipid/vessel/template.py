@@ -77,7 +77,7 @@ class Particulars:
 
     length, beam, draught : [m], length between perpendiculars. block : block coefficient [-].
     speed : service speed [m/s]. rpm : shaft speed of the screw at that speed [rpm].
-    propulsor : `propeller-rudder`, `azimuth_values` or `differential`, two screws without a rudder.
+    propulsor : `propeller-rudder`, `azimuth` or `differential`, two screws without a rudder.
     shafts : 1 or 2 of them; default 1 with a rudder, else 2.
     propeller_diameter : [m]. rudder_area : of each rudder [m^2].
     tunnel_thruster : whether a tunnel thruster is at the bow.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -22,7 +23,7 @@ from unittest.mock import patch
 import numpy as np
 import torch
 
-from shipid.cli.terminal import draw_events
+from shipid.answer.start import event_line
 from shipid.hybrid import ridge
 from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.path_drawn import PathDrawn
@@ -87,7 +88,7 @@ def _known_tune(task: Task, method: PathDrawn) -> dict[str, FitResult]:
 
 
 def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
-    """Wall time [s] of `run_study` with its progress drawn as on a terminal, and the moments of its events."""
+    """Wall time [s] of `run_study` with its lines, and the moments of its events."""
     moments: dict[str, list[float]] = {}
 
     def noted(events: Iterator[study.Event]) -> Iterator[study.Event]:
@@ -95,10 +96,10 @@ def _study(plan: Plan, workers: int) -> tuple[float, dict[str, list[float]]]:
             moments.setdefault(event.kind, []).append(time.perf_counter() - begun)
             yield event
 
-    terminal = patch.dict(os.environ, {"FORCE_COLOR": "1"})
-    with tempfile.TemporaryDirectory() as folder, terminal, redirect_stdout(io.StringIO()):
+    with tempfile.TemporaryDirectory() as folder, redirect_stdout(io.StringIO()):
         begun = time.perf_counter()
-        draw_events(noted(study.run_study(plan, Path(folder) / "run", workers=workers)))
+        for event in noted(study.run_study(plan, Path(folder) / "run", workers=workers)):
+            sys.stdout.write(f"{event_line(event)}\n")
         return time.perf_counter() - begun, moments
 
 

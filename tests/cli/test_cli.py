@@ -56,11 +56,11 @@ def test_help_version_and_vessels_are_light() -> None:
 def test_an_error_of_the_system_that_names_no_file_says_what_helps(
     raised: Exception, line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def command(_: Any) -> Any:
+    def command() -> Any:
         raise raised
 
     monkeypatch.setattr(sys, "argv", ["shipid", "study"])
-    monkeypatch.setattr(cli, "_app_of_arguments", command)
+    monkeypatch.setattr(cli, "app", command)
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     assert re.fullmatch(line + "\n", capsys.readouterr().err)
@@ -75,17 +75,17 @@ def test_a_compiled_package_that_cannot_be_loaded_is_one_line(
     """As under a limit of memory; a name that is missing in Python code is a fault of that code, with its traceback."""
 
     def refused(error: ImportError) -> Callable[..., Any]:
-        def command(_: Any) -> Any:
+        def command() -> Any:
             raise error
 
         return command
 
     monkeypatch.setattr(sys, "argv", ["shipid", "study"])
-    monkeypatch.setattr(cli, "_app_of_arguments", refused(ImportError("failed to map", path="/lib/_C.so")))
+    monkeypatch.setattr(cli, "app", refused(ImportError("failed to map", path="/lib/_C.so")))
     with pytest.raises(SystemExit, match="1"):
         cli.main()
     assert capsys.readouterr().err.startswith("error: /lib/_C.so: cannot be loaded (failed to map): ")
-    monkeypatch.setattr(cli, "_app_of_arguments", refused(ImportError("cannot import name", path="/lib/mine.py")))
+    monkeypatch.setattr(cli, "app", refused(ImportError("cannot import name", path="/lib/mine.py")))
     with pytest.raises(ImportError, match="cannot import name"):
         cli.main()
 
@@ -95,7 +95,7 @@ def test_help_names_every_command() -> None:
         ([], ("vessel", "data", "study", "predict", "simulate", "manoeuvre", "identify")),
         (["vessel"], ("list", "show", "new")),
         (["data"], ("import", "check", "fetch", "segment", "measures")),
-        (["study"], ("list", "variants", "screen", "run", "resume", "report")),
+        (["study"], ("list", "screen", "run", "resume", "report")),
     ):
         text = output_of(*group, "--help")
         assert all(re.search(rf"\b{name}\b", text) for name in commands), group
@@ -137,10 +137,7 @@ def test_a_mistake_is_one_line(mistake: str, capfd: pytest.CaptureFixture[str]) 
 
 def test_mistakes_with_folders(tiny_run: Path) -> None:
     """No traceback, no warning, exit 1: another study's folder, a file where a folder should be."""
-    for arguments, remedy in (
-        (["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),
-        (["study", "variants", TINY, "--no-accuracy", "--save", TINY], "plain.toml: --save: is named twice"),
-    ):
+    for arguments, remedy in ((["study", "run", TINY, "--out", tiny_run, "--set", "truth.seed=8"], "another study"),):
         status, _, err = ended(*arguments)
         assert status == 1
         assert re.fullmatch(r"error: [^\n]*\n", err), err

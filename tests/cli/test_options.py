@@ -81,7 +81,7 @@ class Reached(Exception):
 LOG = SimpleNamespace(runs=["A1", "A2", "B1"], digest="none")
 SHIP = "gunnerus-28.9"
 MAPPING, STUDY = (shlex.quote(str(file)) for file in (BAD / "logs" / "plain.toml", TINY))
-AFTER = {"out", "as_json", "html", "csv", "log", "save"}
+AFTER = {"out", "as_json", "html", "csv", "log"}
 """Options of what is done with results: other tests read what they make."""
 BAND = "--level 0.8 --kind zigzag --adaptive 0.03"
 THE_BAND = {"level": 0.8, "kind": "zigzag", "rate": 0.03}
@@ -126,7 +126,7 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         {"folder": Path("folder"), "cell": "right", "log": Path("log.csv"), "mapping": "of.toml", **THE_BAND},
     ),
     "aboard": (
-        "shipid.study.aboard:play",
+        "shipid.study.aboard:play_aboard",
         f"aboard log.csv --predictor a.npz --mapping of.toml --every 7 {BAND}",
         {"file": Path("a.npz"), "log": Path("log.csv"), "mapping": "of.toml", "every": 7.0, **THE_BAND},
     ),
@@ -141,7 +141,7 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         {"predictor": Path("a.npz"), "to": "onnx", "out": Path("x.onnx"), "single": True, "name": "other"},
     ),
     "replay": (
-        "shipid.identification.free_run:free_runs",
+        "shipid.identification.free_run:simulate_free_runs",
         f"replay {SHIP} log.parquet --run A* --ahead 9 --step 0.3 --commands between",
         {
             "runs": ("A1", "A2"),
@@ -168,12 +168,12 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         | {"step": 0.2, "approach": "rest"},
     ),
     "simulate": (
-        "shipid.simulation.scripted:simulated",
+        "shipid.simulation.scripted:simulate_script",
         f"simulate {SHIP} --manoeuvres runs.toml",
         {"vessel": is_ship, "name": "runs.toml"},
     ),
     "simulate a study": (
-        "shipid.study.prepare:obtain",
+        "shipid.study.prepare:obtain_runs",
         f"simulate {STUDY} --set grid.N_D=[5]",
         {"plan": is_changed},
     ),
@@ -198,20 +198,11 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         "data measures log.parquet --manoeuvre zigzag --length 28.9",
         {"dataset": LOG, "kind": "zigzag", "length": 28.9},
     ),
-    "data check": (
-        "shipid.data.outputs:check_outputs",
-        f"data check log.parquet --vessel {SHIP}",
-        {"vessel": is_ship, "dataset": LOG},
-    ),
+    "data check": ("shipid.data.checks:check_dataset", "data check log.parquet", {"dataset": LOG}),
     "study new": (
         "shipid.study.new:draft_study",
         f"study new --vessel {SHIP} --vessel mariner --data log.parquet --out s.toml",
         {"vessels": [SHIP, "mariner"], "data": Path("log.parquet"), "out": Path("s.toml")},
-    ),
-    "study variants": (
-        "shipid.study.prepare:obtain",
-        f"study variants {STUDY} --accuracy --set grid.N_D=[5]",
-        {"plan": is_changed},
     ),
     "study screen": (
         "shipid.study.screen:screen",
@@ -220,19 +211,19 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         | {"device": "gpu", "engine": "single"},
     ),
     "study rotate": (
-        "shipid.answer.rotate:rotate",
+        "shipid.answer.rotate:rotate_test_runs",
         f"study rotate {STUDY} --tests A* --tests B1 --set grid.N_D=[5] --device gpu",
         {"plan": is_changed, "tests": ["A*", "B1"], "device": "gpu"},
     ),
     "study run": (
         "shipid.study.run:run_study",
-        f"study run {STUDY} --workers 3 --scheduler tcp://here --set grid.N_D=[5] --leave --device gpu",
-        {"plan": is_changed, "workers": 3, "scheduler": "tcp://here", "device": "gpu", "leave": True},
+        f"study run {STUDY} --workers 3 --scheduler tcp://here --set grid.N_D=[5] --shard 3/20 --device gpu",
+        {"plan": is_changed, "workers": 3, "scheduler": "tcp://here", "device": "gpu", "shard": (3, 20)},
     ),
     "study resume": (
         "shipid.study.run:run_study",
-        "study resume folder --workers 3 --scheduler tcp://here --leave --device gpu",
-        {"folder": Path("folder"), "workers": 3, "scheduler": "tcp://here", "device": "gpu", "leave": True},
+        "study resume folder --workers 3 --scheduler tcp://here --device gpu",
+        {"folder": Path("folder"), "workers": 3, "scheduler": "tcp://here", "device": "gpu"},
     ),
     "study compare": (
         "shipid.answer.compare:compare",
@@ -255,15 +246,15 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.study.store:read_predictor": lambda file: file,
         "shipid.data.dataset:read_dataset": lambda *_: LOG,
         "shipid.data.checks:check_dataset": lambda *_: None,
-        "shipid.identification.outcome:check": lambda *_, **__: None,
-        "shipid.study.structures:comparable": lambda *_, **__: None,
+        "shipid.identification.outcome:check_identification": lambda *_, **__: None,
+        "shipid.study.structures:check_comparison": lambda *_, **__: None,
         "shipid.identification.segments:too_short": lambda *_: [],
-        "shipid.cli.identify:_look": lambda *_: None,
+        "shipid.cli.identify:_look_first": lambda *_: None,
         "shipid.engine.engines:check_device": lambda *_: None,
-        "shipid.engine.engines:named": lambda *_: None,
-        "shipid.study.prepare:obtain": lambda *_: LOG,
+        "shipid.engine.engines:engine_by_name": lambda *_: None,
+        "shipid.study.prepare:obtain_runs": lambda *_: LOG,
         "shipid.study.prepare:partition": lambda *_: (),
-        "shipid.study.screen:notes": lambda *_: [],
+        "shipid.study.screen:notes_on_windows": lambda *_: [],
         "shipid.answer.rotate:choose_turns": lambda *given: given[2],
         "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(program="shipid", parts={}),
     }

@@ -46,7 +46,7 @@ def there(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "data measures log.parquet --csv ../there/log.parquet",
         "data measures link.parquet --csv log.parquet",
         "replay ./ship.toml log.parquet --csv log.parquet",
-        "data check log.parquet --vessel ./ship.toml --html log.parquet",
+        "data check log.parquet --html log.parquet",
     ],
 )
 def test_what_is_read_is_not_written(words: str, there: Path) -> None:
@@ -118,24 +118,6 @@ def test_numbers_are_finite(words: str, value: str) -> None:
     assert (status, error) == (1, f"error: ANGLES: {value}: must be a finite number\n")
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            "manoeuvre otter turning --speed 1,5",
-            "'--speed': '1,5' is no",
-        ),
-        ("manoeuvre otter zigzag 20/20", "'ANGLES': '20/20' is no"),
-        ("study run quick --workers two", "'--workers': 'two' is no"),
-    ],
-)
-def test_what_is_no_number_is_named(words: str, said: str) -> None:
-    """The message of Typer had no value: of several angles none was named."""
-    code, _, error = ended(*words.split())
-    assert code == 2
-    assert said in error
-
-
 def test_every_command_is_guarded() -> None:
     """Also one that is added later, if its output has one of the names."""
 
@@ -151,9 +133,7 @@ def test_every_command_is_guarded() -> None:
 
 STAGES = (  # what a command calls one after the other, before its own work
     "shipid.cli._check_encoding",
-    "shipid.cli._app_of_arguments",
     "shipid.cli.log_to_stderr",
-    "shipid.cli.outputs.GuardedCommand.parse_args",
     "shipid.cli.outputs.isfinite",
     "shipid.cli.outputs.check_output",
     "shipid.cli.outputs.raise_interrupts",

@@ -16,39 +16,15 @@ from shipid.cli import app
 from shipid.document import bundled_documents
 from shipid.engine import engines
 from shipid.errors import ShipidError
+from shipid.study import run
 from shipid.study.store import DATASET, read_rows
-from shipid.vessel.load import load_vessel
 from tests.cli.running import ended, output_of
 from tests.study.tiny import TINY, without_figures, without_workers
 
 
-def test_studies_and_variants(study: Path) -> None:
+def test_studies() -> None:
     text = output_of("study", "list")
     assert all(f" {name} " in text for name in bundled_documents("studies"))
-    text = output_of("study", "variants", study, "--save", "patches")
-    accuracy = re.findall(r"^ *(right|wrong-1|wrong-2|none) +(\S+)", text, re.MULTILINE)
-    assert [name for name, _ in accuracy] == ["right", "wrong-1", "wrong-2", "none"]
-    assert [value == "-" for _, value in accuracy] == [False, False, False, True]
-    assert "3 patches -> patches" in text
-    assert load_vessel("./patches/wrong-2.toml").name == "wrong-2"
-    text = output_of("study", "variants", study, "--no-accuracy", "--set", "family.1.members=3")
-    assert re.search(r"^ *wrong-3 +- ", text, re.MULTILINE)
-    moved = [
-        "--set",
-        'family.0.perturb=[{set={"inertia.x_G"=2.5}},{parameters=["wind.A_FW","inertia.m"],factor=0.9},{parameters=["wind.A_FW"],factor=0.01}]',
-    ]
-    text = output_of("study", "variants", study, "--no-accuracy", "--set", 'unusual=["*"]', *moved)
-    assert re.search(r"^ *right +- +3 +inertia.m x0.90, A_FW x0.009, x_G 2.5 in place of 0", text, re.MULTILINE), text
-
-
-def test_patches_replace_no_vessel(study: Path) -> None:
-    """Foundations and vessels may have one name; patches of an earlier family with more members would stay, too."""
-    Path("wrong-1.toml").write_text("mine")
-    for folder in (".", "wrong-1.toml"):
-        status, _, error = ended("study", "variants", study, "--save", folder)
-        assert status == 1
-        assert "name a new one" in error
-    assert Path("wrong-1.toml").read_text() == "mine"
 
 
 @pytest.mark.parametrize("command", ["screen", "rotate"])
@@ -63,14 +39,6 @@ def test_a_table_replaces_nothing_that_the_study_reads(study: Path, command: str
     assert status == 1
     assert "data.parquet: --out: is named twice" in error
     assert Path("data.parquet").read_bytes() == before
-
-
-def test_variants_of_a_chosen_observer_have_no_accuracy_yet(study: Path) -> None:
-    family = '[[family]]\nname = "seen"\nextends = "wrong"\n[family.observer]\nchoose = true\n'
-    study.write_text(f"{study.read_text()}\n{family}")
-    words = " ".join(output_of("study", "variants", study).split())
-    assert re.search(r" seen-1 - \d+ ", words)
-    assert words.count("observer chosen from the runs of each cell, so A differs by cell") == 2
 
 
 def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -172,7 +140,7 @@ def test_check_ends_with_1_where_a_file_is_wrong(tmp_path: Path, tiny_run: Path)
     next((folder / "cells").iterdir()).unlink()
     result = CliRunner().invoke(app, ["study", "check", str(folder)])
     assert result.exit_code == 1
-    assert "missing: `shipid study resume` computes it again" in result.output
+    assert "missing or damaged: continue with `shipid study resume`" in result.output
 
 
 def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
@@ -181,12 +149,12 @@ def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
     """Standard output on a full disk: the events end before the process does."""
     taken: list[Any] = []
 
-    def full(events: Any, _: object) -> None:
-        taken.append(events)
-        next(events)
+    def full(_: Any) -> str:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("shipid.cli.study.draw_events", full)
+    made = run.run_study
+    monkeypatch.setattr(run, "run_study", lambda *given, **how: taken.append(made(*given, **how)) or taken[0])
+    monkeypatch.setattr("shipid.answer.start.event_line", full)
     code, _, error = ended("study", "run", TINY, "--out", tmp_path / "run", "--workers", "1")
     assert (code, error) == (1, "error: system: No space left on device\n")
     assert taken[0].gi_frame is None, "the generator is closed"

@@ -40,19 +40,6 @@ def test_a_later_fix_changes_no_earlier_row(seed: int) -> None:
     assert not np.array_equal(one, other)
 
 
-@pytest.mark.parametrize("begin", [0, 1_700_000_000])
-def test_a_clock_that_counts_from_1970_gives_no_later_fix_away(begin: int) -> None:
-    """Ten rows a second: rounded to some 1e-7 s, such times bend every line a little, and no such bend is a fix."""
-    rng = np.random.default_rng(1)
-    fixes = np.cumsum(rng.uniform(0.7, 2.6, 200))
-    t = (0.1 * np.arange(3000)).round(1)
-    t = t[(t > fixes[0]) & (t < fixes[-1])]
-    known = last_known_rows(begin + t, np.interp(t, fixes, rng.normal(size=200).cumsum()))
-    late = fixes[np.searchsorted(fixes, t[known])] > t  # the first fix after the row that is used has not come
-    assert not late[known > 0].any()
-    assert np.median(t - t[known]) < 2.0
-
-
 @pytest.mark.parametrize("even", [True, False])
 @pytest.mark.parametrize("seed", range(3))
 def test_fixes_between_rows_reach_no_row_before_them(seed: int, even: bool) -> None:

@@ -29,20 +29,6 @@ def test_clean_log_passes() -> None:
     assert table.loc[table["check"] == "path", "value"].max() < 0.05
 
 
-@pytest.mark.parametrize("step", [0.01, 0.5, 60.0, 2.6e6])
-def test_work_grows_with_the_rows_and_not_with_the_clock(step: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A clock in months: windows of a few seconds between two rows say nothing, and there were a thousand million."""
-    sizes = []
-
-    def counted(_: np.ndarray, __: np.ndarray, instants: np.ndarray) -> np.ndarray:
-        sizes.append(len(instants))
-        return np.zeros(len(instants), dtype=complex)
-
-    monkeypatch.setattr(checks, "_complex_at", counted)
-    check_dataset(as_dataset(turning(T).assign(t=step * np.arange(len(T)))))
-    assert max(sizes, default=0) <= len(T)
-
-
 @pytest.mark.parametrize(
     ("defect", "caught"),
     [

@@ -157,15 +157,3 @@ def test_a_straight_way_begins_with_its_velocities() -> None:
     logged = {"north": 5.0 + ways[0] * t, "east": -2.0 + ways[1] * t, "psi": np.full_like(t, psi)}
     first, _ = _start_of_filter(t, logged, noise(0.01, 1e-4, 0.02, 1e-3))
     np.testing.assert_allclose(first, [5.0, -2.0, psi, u, v, 0.0], atol=1e-9)
-
-
-def test_covariances_of_a_long_log_are_symmetric_and_positive() -> None:
-    """Samples are used one by one; their errors differ by seven powers of ten here."""
-    t = np.arange(0.0, 300.0, 0.1)
-    motion = turning(t)
-    logged = {name: motion[name].to_numpy() for name in ("north", "east", "psi")}
-    found = smooth_motion(t, logged, Noise({"north": 100.0, "east": 100.0, "psi": 1e-5}, 1e-3, 1e-2)).covariances
-    sizes = np.sqrt(np.einsum("nii->ni", found))
-    scaled = found / (sizes[:, :, None] * sizes[:, None, :])
-    np.testing.assert_allclose(scaled, scaled.transpose(0, 2, 1), atol=1e-6)
-    assert np.linalg.eigvalsh(scaled).min() > 0

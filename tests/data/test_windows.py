@@ -1,6 +1,6 @@
 """Windows against motion known in closed form, and splits against the law that no moment is seen twice."""
 
-from itertools import combinations, pairwise, permutations
+from itertools import combinations, pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipid.data.dataset import Dataset
 from shipid.data.windows import (
     Windows,
     coarse_in_words,
@@ -175,43 +174,12 @@ def test_instants_commands_and_columns() -> None:
     assert windows.future.shape == (15, 11, 2)
 
 
-@pytest.mark.parametrize("rate", [2.0, 10.0])
-def test_commands_at_unix_time_are_those_in_force(rate: float) -> None:
-    """Counted in rows from the start: the last row at or before, exactly, and as many windows as at time 0."""
-    ticks = np.arange(601)
-    frame = turning(1.7e9 + ticks / rate).assign(**{"port.n": ticks.astype(float)})
-    windows = cut_windows(as_dataset(frame), horizon=15, step=0.6, interval=0.7)
-    instants = np.floor(rate * 0.7 * np.arange(len(windows)) + 1e-6)  # rows since the start
-    np.testing.assert_array_equal(windows.columns["port.n"], instants)
-    edges = instants / rate + 0.6 * np.arange(16)[:, None]
-    fine = np.floor(rate * (edges[:-1] + 0.6 * (np.arange(600)[:, None, None] + 0.5) / 600) + 1e-6)
-    np.testing.assert_allclose(windows.planned["port.n"], fine.mean(axis=0), rtol=0, atol=0.01)
-    assert len(windows) == int((600 / rate - 9.0) / 0.7 + 1e-6) + 1
-
-
 def test_no_future_leaves_its_run_or_crosses_a_break() -> None:
     broken = turning(T).assign(flags=np.where(T == 25.0, 1, 0))
     windows = cut_windows(as_dataset(broken, turning(T[:41])), horizon=10)
     starts = [float(t) for t in windows.t[windows.run == "a"]]
     assert starts == [float(t) for t in (*range(15), *range(25, 51))]
     assert windows.t[windows.run == "b"].max() == 10.0
-
-
-def test_the_order_of_the_runs_in_the_table_changes_no_window() -> None:
-    """Whatever is drawn or added up over windows would else depend on it; rows of two runs may alternate, too."""
-    names = ["turn 2", "turn 10", "a"]
-    frames = [turning(np.arange(0.0, 30.0 + 5 * k, 0.5)).assign(u=4.0 + k, flags=0) for k in range(3)]
-    runs = {name: frame.assign(run=name) for name, frame in zip(names, frames, strict=True)}
-    metadata = {"clock": "run", "flags": []}
-    tables = [pd.concat([runs[name] for name in order]) for order in permutations(names)]
-    tables.append(tables[0].sort_values("t", kind="stable"))
-    known, *others = (cut_windows(Dataset(t.reset_index(drop=True), metadata), horizon=10, past=3) for t in tables)
-    assert list(dict.fromkeys(known.run)) == sorted(names)
-    for one in others:
-        assert (one.run == known.run).all()
-        for key, values in (("t", one.t), ("future", one.future), ("u", one.columns["u"]), ("past", one.past["u"])):
-            there = {"t": known.t, "future": known.future, "u": known.columns["u"], "past": known.past["u"]}
-            np.testing.assert_array_equal(values, there[key])
 
 
 def test_select_and_concatenate_are_inverse() -> None:

@@ -82,9 +82,9 @@ ROW = trial_row(0, {}, 1.0, 0.0)
 @pytest.mark.parametrize(
     ("gives", "message"),
     [
-        (None, "must return a table, foundation -> Fitted, not NoneType"),
-        ({}, "must give a Fitted for 'right', not NoneType"),
-        (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a Fitted for 'right', not tuple"),
+        (None, "must return a table, foundation -> FitResult, not NoneType"),
+        ({}, "must give a FitResult for 'right', not NoneType"),
+        (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a FitResult for 'right', not tuple"),
         ({"right": FitResult(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*trial_row"),
         ({"right": FitResult(None, None, 0.0)}, "'NoneType' object is not iterable: make trials by"),  # type: ignore[arg-type]
         ({"right": FitResult(None, [{**ROW, "params": None}], 0.0)}, "trial 0.params: None: must be a table"),

@@ -118,26 +118,6 @@ def stable_spiral() -> Record:
 RATES = [3, 2, 1, 0.5, 0, -0.5, -1, -2, -3]
 
 
-def unstable_helm(r: Array) -> Array:
-    """Helm r^3 - 3 r (deg, deg/s) that holds a rate: it falls from 2 deg at r = -1 to -2 deg at r = 1."""
-    degrees = r / DEGREE
-    return (degrees**3 - 3 * degrees) * DEGREE
-
-
-def reverse() -> Record:
-    """Rates approached exponentially; the helm is that of the steady rate."""
-    t = clock(START + HOLD * len(RATES))
-    r = np.zeros_like(t)
-    before = 0.0
-    for i, level in enumerate(RATES):
-        since = t - START - i * HOLD
-        r = np.where(since >= 0, level + (before - level) * np.exp(-np.maximum(since, 0) / 4), r)
-        before = level
-    r = r * DEGREE
-    psi = np.append(0.0, np.cumsum((r[1:] + r[:-1]) / 2 * FINE))
-    return made_record(t, psi, r, unstable_helm(r), SPEED - DRAG * r**2, SWAY * r)
-
-
 def stopped() -> Record:
     """Constant deceleration along a slowly veering heading."""
     t = clock(200.0)
@@ -152,7 +132,6 @@ RECORDS: dict[str, Callable[[], Record]] = {
     "turning": circle,
     "pull-out": released,
     "spiral": stable_spiral,
-    "reverse-spiral": reverse,
     "stop": stopped,
 }
 

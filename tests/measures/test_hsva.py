@@ -37,18 +37,6 @@ def test_overshoots_are_those_of_the_readme(hsva: Dataset, name: str) -> None:
         assert measures[f"overshoot_{number}"].value / DEGREE == pytest.approx(angle, abs=0.1)
 
 
-@pytest.mark.parametrize("name", READ_OFF)
-def test_a_run_at_1_hz_says_the_same(hsva: Dataset, name: str) -> None:
-    """20 Hz to 1 Hz, at full scale a row every 7 s: overshoots to 0.1 deg, their times to 0.1 s."""
-    columns = columns_of(hsva, name)
-    fine = zigzag_measures(record_of(columns), course=0.0)
-    for offset in (0, 7, 13):
-        coarse = zigzag_measures(record_of({key: values[offset::20] for key, values in columns.items()}), course=0.0)
-        for number in range(1, len(READ_OFF[name]) + 1):
-            for measure, tolerance in ((f"overshoot_{number}", 0.1 * DEGREE), (f"time_to_check_{number}", 0.1)):
-                assert coarse[measure].value == pytest.approx(fine[measure].value, abs=tolerance)
-
-
 @pytest.mark.parametrize(("name", "heading"), [("05_01", 1), ("10_05", 5), ("15_01", 1), ("20_05", 5), ("35_05", 5)])
 def test_every_zigzag_is_recognised_with_its_execute_heading(hsva: Dataset, name: str, heading: int) -> None:
     record = record_of(columns_of(hsva, name))

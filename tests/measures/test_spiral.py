@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.spiral import _at_zero, helm_levels, reverse_spiral_measures, spiral_measures
+from shipid.measures.spiral import _at_zero, helm_levels, spiral_measures
 from shipid.units import DEGREE
-from tests.measures.made_records import GAIN, HOLD, LEVELS, RATES, START, every, reverse, stable_spiral, unstable_helm
+from tests.measures.made_records import GAIN, HOLD, LEVELS, START, every, stable_spiral
 
 
 def test_a_stable_ship_has_no_loop() -> None:
@@ -80,25 +80,6 @@ def test_a_ship_that_no_helm_turns_back_has_no_height_of_a_loop() -> None:
     for name in ("neutral_helm", "loop_width", "loop_height", "levels_apart"):
         assert np.isnan(measures[name].value)
         assert measures[name].why
-
-
-def test_reverse_spiral_finds_the_folds() -> None:
-    """The helm r^3 - 3 r falls from 2 to -2 deg as the rate rises from -1 to 1 deg/s: 4 deg wide."""
-    measures = reverse_spiral_measures(every(reverse(), 0.5))
-    assert measures["levels"].value == len(RATES)
-    apart = np.diff(np.sort(RATES)).max() * DEGREE  # a fold between two rates is cut off
-    assert measures["levels_apart"].value == pytest.approx(apart, rel=1e-2)
-    assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=0.02 * DEGREE)
-    assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
-
-
-def test_the_helm_for_the_next_rate_has_no_part_in_a_level() -> None:
-    """The helm is over for the next rate before the ship turns at another one: levels were up to 0.7 deg off."""
-    record = reverse()
-    led = unstable_helm(record.r) + 20.0 * np.gradient(record.r, record.t)
-    measures = reverse_spiral_measures(every(replace(record, helm=led), 0.5))
-    assert measures["loop_width"].value == pytest.approx(4 * DEGREE, abs=1e-3 * DEGREE)
-    assert measures["neutral_helm"].value == pytest.approx(0.0, abs=1e-3 * DEGREE)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.helm import course_helmsman, yaw_rate_helmsman, zigzag_helmsman
+from shipid.physics.helm import course_helmsman, zigzag_helmsman
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
 
@@ -32,19 +32,6 @@ def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side:
     assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
     assert helmsman.advance is not None
     assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after, "original": 1.0, "executed": 1.0}
-
-
-def test_yaw_rate_law() -> None:
-    inputs = {"port.n": 2.0, "port.alpha": -0.5, "rudder.delta": 0.6, "rate": 0.03, "gain": 10.0, "reset": 4.0}
-    helmsman = yaw_rate_helmsman(COMMANDS)
-    assert helmsman.advance is not None
-    ordered = numbers(helmsman.orders({"r": 0.01}, inputs, {"integral": 0.1}))
-    assert ordered == pytest.approx({"port.n": 2.0, "port.alpha": -0.5 * 0.3, "rudder.delta": 0.6 * 0.3})
-    after = numbers(helmsman.advance({"r": 0.01}, inputs, {"integral": 0.1}, 0.2))
-    assert after["integral"] == pytest.approx(0.1 + 10 / 4 * 0.02 * 0.2)
-    hard_over = numbers(helmsman.orders({"r": 1.0}, inputs, {"integral": 0.9}))
-    assert hard_over["port.alpha"] == 0.5
-    assert numbers(helmsman.advance({"r": 9.0}, inputs, {"integral": 0.9}, 9.0)) == {"integral": -1.0}
 
 
 def test_course_keeping_is_the_pid_law_of_its_frequency() -> None:

@@ -11,9 +11,8 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
 from shipid.simulation.draw import ManoeuvreDraw
-from shipid.simulation.manoeuvre import KINDS, Spiral, StepManoeuvre, TimedManoeuvre, Zigzag
+from shipid.simulation.manoeuvre import KINDS, Spiral, StepManoeuvre, Zigzag
 from shipid.simulation.truth import Truth, check_truth, draw_manoeuvres, simulate_truth
-from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 from tests.conftest import LAG
 
@@ -27,7 +26,6 @@ BLOCKS: dict[str, dict[str, Any]] = {
     "pull_out": {**SHAFT, "turn": [5.0, 10.0]},
     "zigzag": {**SHAFT, "angle_deg": [10.0, 30.0], "side": ["starboard", "port"], "approach": "rest"},
     "spiral": {**SHAFT, "hold": 4.0, "angles_deg": [20.0, -20.0, 5.0]},
-    "reverse_spiral": {**SHAFT, "hold": 8.0, "rates_deg": [1.0, -1.0]},
     "crash_stop": {**SHAFT, "astern_rpm": [50.0, 100.0], "execute_at": [0.0, 5.0]},
     "excitation": {**SHAFT, "signal": "aprbs", "angle_deg": 15.0, "hold": [2.0, 6.0]},
 }
@@ -80,27 +78,6 @@ def test_a_first_order_after_the_end_of_the_run_is_refused(kind: str) -> None:
         with pytest.raises(DocumentError, match="the run ends at 20 s, before the first order: give less") as caught:
             check_truth(truth({**block, "execute_at": late}), SHIP)
         assert caught.value.path == "truth.manoeuvre.0.execute_at"
-
-
-def test_a_kind_is_one_edit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A class and its name: no other place knows the kinds."""
-
-    class Weave(TimedManoeuvre):
-        """The helm swings like a sine."""
-
-        angle_deg: float = 10.0
-
-        def helm(self, t: np.ndarray) -> np.ndarray:
-            """Helm angle [rad]."""
-            return self.angle_deg * DEGREE * np.sin(t)
-
-    with pytest.raises(DocumentError, match="'weave' is no kind of manoeuvre"):
-        truth({"kind": "weave"})
-    monkeypatch.setitem(KINDS, "weave", Weave)
-    log = simulate_truth(truth({"kind": "weave", "n_rpm": 120.0, "angle_deg": [5.0, 15.0]}), SHIP)
-    greatest = log.groupby("run")["port.alpha"].max() / DEGREE
-    assert greatest.between(4.5, 15).all()
-    assert greatest.nunique() == 3
 
 
 def test_shares_are_met_and_no_run_depends_on_their_number() -> None:

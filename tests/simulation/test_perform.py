@@ -12,7 +12,6 @@ from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
 from shipid.simulation.manoeuvre import (
     Manoeuvre,
-    ReverseSpiral,
     TurningCircle,
     Zigzag,
 )
@@ -83,7 +82,6 @@ def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
     chosen = [
         Zigzag(**short, angle_deg=35, execute_heading_deg=2, duration=15, side="port"),
         Zigzag(**short, angle_deg=20, execute_heading_deg=1, duration=15),
-        ReverseSpiral(**short, rates_deg=(1, -2), hold=6),
     ]
     each, batch = (perform_manoeuvres(vessel, chosen, step=0.25, engine=engine) for engine in ("casadi", "torch"))
     assert (each.groupby("run")["port.alpha"].nunique() > 1).all()

@@ -1,4 +1,4 @@
-"""Runs of any vessel by a document of manoeuvres, drawn or given."""
+"""Runs of any vessel by a document of manoeuvres, given."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from shipid.errors import DocumentError
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.scripted import simulate_script
-from shipid.simulation.truth import Truth, simulate_truth
 from shipid.vessel.load import load_vessel
 
 SHIP = load_vessel("mariner")
@@ -56,32 +55,10 @@ def test_a_vessel_that_cannot_perform_a_manoeuvre_is_not_a_key_of_the_document(t
     assert caught.value.path == "manoeuvre.0"
 
 
-DRAWN = """
-[truth]
-vessel = "gunnerus-28.9"
-set = {"hull.derivatives.N_r" = 1.0}
-manoeuvres = 2
-duration = 20.0
-step = 0.5
-[[truth.manoeuvre]]
-n_rpm = [60.0, 80.0]
-delta_deg = [-20.0, 20.0]
-start_speed = [4.0, 6.0]
-"""
-
-
-def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
-    """The vessel that it names, and what it sets of it, are left out."""
-    frame = simulate_script(SHIP, written(tmp_path, DRAWN))
-    block = {"n_rpm": [60.0, 80.0], "delta_deg": [-20.0, 20.0], "start_speed": [4.0, 6.0]}
-    truth = Truth(vessel="mariner", manoeuvres=2, duration=20.0, step=0.5, manoeuvre=[block])  # type: ignore[list-item]
-    pd.testing.assert_frame_equal(frame, simulate_truth(truth, SHIP))
-
-
 @pytest.mark.parametrize(
     ("text", "path", "message"),
     [
-        ("question = 'none'", None, "holds no manoeuvres"),
+        ("question = 'none'", "question", "unknown key"),
         (GIVEN.replace('"zigzag"', '"zigzak"', 1), "manoeuvre.0.kind", "did you mean 'zigzag'"),
         (GIVEN.replace("angle_deg = 20", "angel_deg = 20"), "manoeuvre.1.angel_deg", "unknown key"),
         (GIVEN + 'n_rmp = 7\n', "manoeuvre.1.n_rmp", "unknown key"),
@@ -90,7 +67,7 @@ def test_a_truth_draws_the_manoeuvres_of_another_vessel(tmp_path: Path) -> None:
         (GIVEN.replace("step = 0.5", "step = -1"), "step", "must be above 0"),
         (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
         (GIVEN.replace("duration = 40", "duration = 4e7"), "manoeuvre", "a run of 4e\\+07 s: at most 1e\\+06 s"),
-        (DRAWN.replace("duration = 20.0", "duration = 4e7"), "truth.duration", "a run of 4e\\+07 s: at most"),
+        ("[truth]\nmanoeuvres = 2", None, "is a study"),
         (GIVEN.replace("step = 0.5", "step = 1e-12"), "step", "1e-12 s: 2 runs of 60 s take .* GiB of memory"),
     ],
 )  # fmt: skip

@@ -83,7 +83,7 @@ def test_all_is_measured_and_sides_mirror(name: str, angles: tuple[float, ...]) 
         ("turning", (-35,), {}, "ANGLES: angles are positive"),
         ("turning", (), {"side": "left"}, "--side: 'left' is no side"),
         ("spiral", (), {"side": "left"}, "--side: 'left' is no side"),
-        ("reverse-spiral", (), {"side": None}, "--side: None is no side"),
+        ("spiral", (), {"side": None}, "--side: None is no side"),
         ("turning", (), {"speed": 0.0}, "--speed: 0 m/s"),
         ("turning", (), {"speed": 1e160}, "--speed: 1e+160 m/s: the speed of the approach must be above 0"),
         ("turning", (), {"duration": 0.0}, "--duration: 0 s must be positive"),

@@ -433,19 +433,6 @@ def test_a_run_needs_no_vessel_file_any_more(tmp_path: Path) -> None:
         store.stored_plan(tmp_path / "run")
 
 
-def test_patches_rebuild_variants_from_anywhere(tmp_path: Path) -> None:
-    document = tmp_path / "own.toml"
-    document.write_text((Path(load_vessel("gunnerus-28.9").file)).read_text())
-    plan = tiny_plan(tmp_path, {"family.1.base": "./own.toml"})
-    assert store.write_patches(tmp_path / "far" / "away", plan.foundations) == 3
-    for model in plan.foundations[:-1]:
-        rebuilt = load_vessel(str(tmp_path / "far" / "away" / f"{model.name}.toml"))
-        assert model.variant is not None
-        assert list(rebuilt.parameters.values()) == model.variant.parameters
-    bundled = (tmp_path / "far" / "away" / "right.toml").read_text()
-    assert 'base = "gunnerus-28.9"' in bundled
-
-
 MISTAKE = ""  # of `Faulty` and `Moved`
 
 

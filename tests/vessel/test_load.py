@@ -9,7 +9,7 @@ import pytest
 
 from shipid.document import replace_values
 from shipid.errors import DocumentError
-from shipid.vessel.load import Vessel, check_document, load_vessel, term_sources
+from shipid.vessel.load import Vessel, check_document, load_vessel
 
 UNIT = re.compile(
     r"-|prime|bis|deg|rad(?:/s)?|rev/s(?:\^2)?|(?:(?:kg|m|s|N)(?:\^-?\d+)?)(?: (?:kg|m|s|N)(?:\^-?\d+)?)*"
@@ -91,26 +91,6 @@ def test_patches_may_be_stacked(tmp_path: Path) -> None:
 
 
 BOW = '[thruster.bow]\nkind = "tunnel"\nx = 3.0\nz = 0.1\nF_1 = 300.0\nF_2 = 5.0\nF_3 = 60.0\n'
-
-
-def test_a_source_is_that_of_the_document_that_wrote_the_block(tmp_path: Path) -> None:
-    """A block added above is not given the source of the vessel below, nor one below that of the document above."""
-    below = term_sources(load_vessel("kvlcc2-l7"))
-    named, bare, patch = tmp_path / "named.toml", tmp_path / "bare.toml", tmp_path / "patch.toml"
-    named.write_text(f'extends = "kvlcc2-l7"\nname = "N"\nsource = "the yard"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
-    bare.write_text(f'extends = "kvlcc2-l7"\nname = "B"\n{BOW}\n[hull.mmg]\nY_u = 0.0\n')
-    patch.write_text('base = "./named.toml"\n[set]\n"hull.mmg.Y_u" = 0.0\n')
-    expected = {**below, "thruster.bow": "the yard", "hull.mmg": "the yard"}
-    assert term_sources(load_vessel(str(named))) == expected
-    assert term_sources(load_vessel(str(patch))) == expected
-    assert term_sources(load_vessel(str(bare))) == {**below, "thruster.bow": ""}
-    text = named.read_text().replace("x = 3.0", 'x = 3.0\nsource = "a drawing"')
-    named.write_text(text)
-    assert term_sources(load_vessel(str(named)))["thruster.bow"] == "a drawing"
-
-
-def test_every_term_of_a_bundled_vessel_names_its_source(bundled_vessel: Vessel) -> None:
-    assert all(len(source) > 10 for source in term_sources(bundled_vessel).values())
 
 
 @pytest.mark.parametrize("value", [None, 1e308, -1e30, 10**400, 1e-200])

@@ -1,21 +1,17 @@
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import casadi as ca
 import pytest
 
-from shipid.document import bundled_documents
 from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS
 from shipid.physics.signals import rows_of_role
-from shipid.vessel.load import load_vessel
 from shipid.vessel.schema import (
     function_parameters,
     function_signals,
     structural_keys,
     term_parameters,
-    vessel_model,
 )
 
 
@@ -42,38 +38,6 @@ def _properties(schema: dict[str, Any], node: dict[str, Any]) -> list[dict[str, 
         return _properties(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]])
     options = [*node.get("anyOf", []), *node.get("oneOf", [])]
     return [node_ for option in options for node_ in _properties(schema, option)] if options else [node]
-
-
-def _unknown(schema: dict[str, Any], node: dict[str, Any], value: Any, path: str) -> list[str]:
-    """Dotted paths of keys that no alternative of the schema allows."""
-    if not isinstance(value, dict):
-        return []
-    complaints = []
-    for option in _properties(schema, node):
-        declared, extra = option.get("properties", {}), option.get("additionalProperties", True)
-        if "kind" in declared and declared["kind"].get("const") != value.get("kind"):
-            continue
-        unknown: list[str] = []
-        for key, entry in value.items():
-            by_name = [inner for name, inner in option.get("patternProperties", {}).items() if re.search(name, key)]
-            inner = declared.get(key, by_name[0] if by_name else extra)
-            if inner is False:
-                unknown.append(f"{path}.{key}")
-            elif isinstance(inner, dict):
-                unknown += _unknown(schema, inner, entry, f"{path}.{key}")
-        complaints.append(unknown)
-    return min(complaints, key=len, default=[f"{path} fits nothing"])
-
-
-@pytest.mark.parametrize("name", list(bundled_documents("models")))
-def test_json_schema_knows_the_keys_of_bundled_vessels(name: str) -> None:
-    schema = vessel_model().model_json_schema()
-    document = load_vessel(name).document
-    assert _unknown(schema, schema, document, "") == []
-    assert set(schema["required"]) <= set(document)
-    thruster, block = next(iter(document["thruster"].items()))
-    spoilt = {**document, "thruster": {thruster: {**block, "D": 1.0}}}
-    assert _unknown(schema, schema, spoilt, "") == [f".thruster.{thruster}.D"]
 
 
 @pytest.mark.parametrize("kind", list(ACTUATORS))

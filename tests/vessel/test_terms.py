@@ -30,11 +30,11 @@ import numpy as np
 from casadi import SX
 
 from shipid.physics import Term
-from shipid.physics.frames import force_at
+from shipid.physics.frames import wrench_of_force
 
 
 def wrench(Y):
-    return force_at(SX(0), SX(0), SX(0), SX(0), Y)
+    return wrench_of_force(SX(0), SX(0), SX(0), SX(0), Y)
 
 
 def plain(nu_r: SX, *, C: Annotated[SX, "kg m^-1"]) -> SX:
