@@ -18,11 +18,12 @@ import pytest
 import shipid
 from shipid.document import bundled_documents_folder
 from shipid.errors import ShipidError
+from shipid.study.plan import default_folder
 from tests.documented import code
 from tests.study.tiny import TINY, without_workers
 
 ROOT = Path(__file__).parents[1]
-QUICK = f'"{shipid.read_plan("quick").folder}"'  # as a page of the documentation names it
+QUICK = f'"{default_folder(shipid.read_plan("quick"))}"'  # as a page of the documentation names it
 
 
 def test_the_wheel_takes_models_and_studies_along() -> None:
