@@ -62,13 +62,22 @@ def light(picture: str) -> str:
 
 
 def pictures(run: Path) -> Iterator[tuple[str, go.Figure]]:
-    """Name and figure of every picture of the readme."""
+    """Name and figure of every picture of the readme and the gallery."""
     results = shipid.figures.content_of(shipid.read_results(run))
     question = shipid.figures.prediction(results, N_D=10)
     words = "The true path of one turn, and what each model says. Each had 10 runs of data."
     title = f"Where will the ship be in 30 s?<br><sup>{words}</sup>"
     yield "question", question.update_layout(title_text=title)
     yield "answer", shipid.figures.error_map(results)
+    yield "gain", shipid.figures.gain(results)
+    yield "error-over-horizon", shipid.figures.error_over_horizon(results)
+    yield "factors", shipid.figures.factors(results)
+    yield "tracks", shipid.figures.tracks(results)
+    yield "coverage", shipid.figures.coverage(results)
+    mariner, kvlcc2 = shipid.load_vessel("mariner"), shipid.load_vessel("kvlcc2-l7")
+    yield "turning-circle", shipid.figures.track(shipid.measure_standard(mariner, "turning", [35]))
+    yield "zigzag", shipid.figures.histories(shipid.measure_standard(kvlcc2, "zigzag", [20, 20]))
+    yield "spiral", shipid.figures.spiral(shipid.measure_standard(mariner, "spiral"))
 
 
 if __name__ == "__main__":

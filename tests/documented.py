@@ -74,7 +74,7 @@ def commit(tree: Path, heading: str) -> list[Path]:
     files = []
     for path, block in additions(heading):
         file = tree / path
-        if parse_addition(block)[2] or file.exists():
+        if file.exists():
             add(file, block)
         else:
             file.write_text(block, encoding="utf-8")

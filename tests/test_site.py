@@ -20,6 +20,10 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
 FIGURES = ("image/svg+xml", "application/vnd.plotly.v1+json")
+CODE_NAME = re.compile(
+    r"\b(?!(?:aboard|make|mariner|tab|test)_)(?:[A-Z][a-z]+[A-Z]\w*|[a-z]\w*_[a-z]{2,}\w*|[a-z]\w+(?=\())"
+)
+"""Names of code within a sentence; those of exported code, of test files and of examples are not the package's."""
 
 
 class Page(HTMLParser):
@@ -110,6 +114,20 @@ def test_a_notebook_is_stored_with_its_figures_and_light(file: Path) -> None:
 @pytest.fixture
 def records() -> ModuleType:
     return load(DOCS / "records.py")
+
+
+def test_names_in_sentences_are_those_of_the_code() -> None:
+    """A tool that renames reads code and blocks of code, not `words` in a sentence."""
+    sources = [file for folder in ("shipid", "tests", "docs") for file in (ROOT / folder).rglob("*.py")]
+    words = set(re.findall(r"\w+", "".join(file.read_text(encoding="utf-8") for file in sources)))
+    missing = []
+    for page in [ROOT / "README.md", *DOCS.glob("*.md")]:
+        text = re.sub(r"^(`{3,}).*?^\1 *$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+        spans = re.findall(r"`([^`\n]+)`", text)
+        missing += [f"{page.name}: {name}" for span in spans for name in CODE_NAME.findall(span) if name not in words]
+        files = {file for span in spans for file in re.findall(r"shipid/[\w/]+\.py", span)}
+        missing += [f"{page.name}: {file}" for file in files if not (ROOT / file).is_file()]
+    assert not missing, "\n".join(missing)
 
 
 @pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=lambda file: file.stem)
