@@ -162,8 +162,8 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
         f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown "
-        f"to beat no physics ({grid.table.metres(NO_MODEL, 0)}), which has an error larger by {_difference_range(leads[0])}; "
-        f"that most keep the lead is {keeps}: {later}"
+        f"to beat no physics ({grid.table.metres(NO_MODEL, 0)}), which has an error larger by "
+        f"{_difference_range(leads[0])}; that most keep the lead is {keeps}: {later}"
     )
     numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
     return weakest_verdict((begins, keeps)), evidence, numbers

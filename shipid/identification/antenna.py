@@ -153,7 +153,8 @@ def antenna_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
     if share[worst] >= OUTSIDE and size > 0:
         name = short_names(free_factors(solution.vessel, solution.settings).paths)[worst]
         change, width = 100 * changes[worst] / size, 100 * half[worst] / size
-        moves = f" and moves {name} by {significant_digits(change, 2, '+')} %, its interval is +-{significant_digits(width, 2)} %"
+        moves = f" and moves {name} by {significant_digits(change, 2, '+')} %, "
+        moves += f"its interval is +-{significant_digits(width, 2)} %"
     ways = ((seen.x, "ahead", "astern"), (seen.y, "to starboard", "to port"))
     parts = [
         f"{significant_digits(abs(size), 2)} m {there if size > 0 else back}"

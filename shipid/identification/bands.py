@@ -52,8 +52,8 @@ def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str
     if not 0 < horizon < LONG * longest:
         return ""
     return (
-        f"the horizon of {horizon:g} s is short against residuals that are correlated over {significant_digits(longest)} s: "
-        "estimates may be biased beyond any interval; fit whole runs (horizon 0)"
+        f"the horizon of {horizon:g} s is short against residuals that are correlated over "
+        f"{significant_digits(longest)} s: estimates may be biased beyond any interval; fit whole runs (horizon 0)"
     )
 
 

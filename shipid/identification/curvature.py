@@ -82,7 +82,7 @@ def _squares_after_step(e: Array, J: Array) -> float:
 
 
 def curvature_sentence(judged: Statistics, seen: Mapping[str, tuple[float, float]]) -> str:
-    """The factors whose intervals end too early on a side, and by how much; none: empty. seen : of `interval_end_ratios`."""
+    """Name the factors whose intervals end too early, and by how much; empty for none. seen : `interval_end_ratios`."""
     names = dict(zip(judged.fit.paths, short_names(judged.fit.paths), strict=True))
     short = [
         (times, path, f"{names[path]} {side} {times:.2g}")
@@ -94,8 +94,8 @@ def curvature_sentence(judged: Statistics, seen: Mapping[str, tuple[float, float
         return ""
     return (
         "the fit is not linear, and these intervals end too early; their ends are at least so many times as far from "
-        f"the estimates: {join_names([words for _, _, words in short])}; compare with --profile {max(short)[1]}, or fit "
-        "runs whose commands vary more"
+        f"the estimates: {join_names([words for _, _, words in short])}; compare with --profile {max(short)[1]}, or "
+        "fit runs whose commands vary more"
     )
 
 

@@ -99,8 +99,8 @@ def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     remedy = f"--set commands=between{f' --set step={late.between / 2:.3g}' if gear else ''}"
     remedy = f"compare with {remedy}" if not solution.settings.outputs else "log faster"
     return (
-        f"commands count from their row, on average {significant_digits(late.between / 2)} s late, and the fit is better with "
-        f"commands {late.rows:.2g} rows earlier: half a row {moves}; {remedy}"
+        f"commands count from their row, on average {significant_digits(late.between / 2)} s late, and the fit "
+        f"is better with commands {late.rows:.2g} rows earlier: half a row {moves}; {remedy}"
     )
 
 

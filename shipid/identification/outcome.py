@@ -236,8 +236,8 @@ def without_shared(
         clocks = "where every run has its clock, metadata['clock'] must be 'run'"
         raise DataError(f"every run shares its moments with the runs held out: hold out others ({clocks})", path="runs")
     warnings = tuple(
-        f"run {run} shares {'less than 1 %' if share < 0.01 else percent_text(share)} of its rows in time with the runs "
-        "held out: " + ("they take no part in the fit" if run in left else "it takes no part in the fit")
+        f"run {run} shares {'less than 1 %' if share < 0.01 else percent_text(share)} of its rows in time with the "
+        "runs held out: " + ("they take no part in the fit" if run in left else "it takes no part in the fit")
         for run, share in lost.items()
         if share > 0
     )
@@ -727,8 +727,8 @@ def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, Fre
         begun = "initial_state" in solution.settings.widths
         starts = "" if begun else ", or predictions begin at noisy rows (compare with --nuisance initial_state)"
         warnings.append(
-            f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the model, or "
-            f"the wind and current data, are incomplete{starts}"
+            f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the model, "
+            f"or the wind and current data, are incomplete{starts}"
         )
         grown = growth_warning(rate, _longest_run(solution), longest)
         if 0 < horizon < LONG * longest:
@@ -766,8 +766,8 @@ def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, Fre
             for path, (width, factor, half) in contrary.items()
         ]
         warnings.append(
-            f"the runs contradict the priors: by the runs alone the factor of {join_names(said)}; base, log or priors are "
-            "wrong, and the intervals take the priors for true"
+            f"the runs contradict the priors: by the runs alone the factor of {join_names(said)}; base, log or "
+            "priors are wrong, and the intervals take the priors for true"
         )
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]
     if bound:

@@ -151,8 +151,8 @@ def uneven_side_warnings(groups: pd.DataFrame) -> tuple[str, ...]:
         chance = _two_sided_p(apart, float(np.hypot(worse["error"], better["error"])), freedom)
         if chance <= level and abs(worse["turning"]) > max(WORSE * abs(better["turning"]), LEAST):
             sentences.append(
-                f"the error of the turning{where} is {percent_text(worse['turning'], signed=True)} to {worse['side']} and "
-                f"{percent_text(better['turning'], signed=True)} to {better['side']}: the model lacks what "
+                f"the error of the turning{where} is {percent_text(worse['turning'], signed=True)} to {worse['side']} "
+                f"and {percent_text(better['turning'], signed=True)} to {better['side']}: the model lacks what "
                 f"makes the sides differ; to run next: turns to both sides{where}"
             )
             continue

@@ -49,7 +49,10 @@ Index = NDArray[np.int64]
 Kind = Literal["fisher", "sandwich", "blocks"]
 _Part = tuple[Array, Array, Array]  # of a cluster: singular values of J_g R, those of A_g J_g R, directions (k, n)
 KINDS: tuple[Kind, ...] = get_args(Kind)
-"""In order of preference: the first trusted form is reported; if none is, `block_clusters`, or `fisher_covariance` with one block only."""
+"""In order of preference: the first trusted form is reported.
+
+If none is trusted it is `block_clusters`, or `fisher_covariance` with one block only.
+"""
 
 LEVEL = 0.95  # of intervals
 WIDEST = 1.0  # half-width of the 95 % interval of a factor, in base values, from which on it is not identified
@@ -249,7 +252,7 @@ def fit_statistics(fit: LinearFit) -> Statistics:
 
 
 def _fallback_covariance(covariances: Mapping[Kind, Covariance]) -> Kind:
-    """Form to report if none is trusted: `block_clusters`, but `fisher_covariance` for a single block, whose scores sum to 0."""
+    """Form to report if none is trusted: `block_clusters`, or `fisher_covariance` for one block, whose scores sum to 0."""
     blocks = covariances.get("blocks")
     return "blocks" if blocks is None or blocks.clusters > 1 else "fisher"
 

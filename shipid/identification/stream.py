@@ -78,8 +78,8 @@ def current_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str
     wind = ", or of wind that the log lacks" if solution.vessel.document.get("wind") else ""
     return (
         f"residuals look like those of {which}, {significant_digits(seen.size, 2)} m/s, which takes "
-        f"{percent_text(seen.explained)} of their squares away{wind}: estimates make up for it and may be far outside of "
-        f"their intervals; identify again with --nuisance current={significant_digits(seen.size, 1)}"
+        f"{percent_text(seen.explained)} of their squares away{wind}: estimates make up for it and may be far outside "
+        f"of their intervals; identify again with --nuisance current={significant_digits(seen.size, 1)}"
     )
 
 

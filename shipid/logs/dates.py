@@ -217,7 +217,9 @@ def _as_texts(cells: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Return year, month and day, or year and day of the year (N,), as text for `join_date_and_time`; None where there is no such.
+    """Return year, month and day, or year and day of the year (N,), as text; None where the log has neither.
+
+    The text is for `join_date_and_time`.
 
     Years of two digits are of 1969 to 2068, as everywhere in Python.
     """
@@ -233,7 +235,7 @@ def date_texts(parts: list[Array]) -> pd.Series[Any]:
 
 
 def time_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Return hour, minute and, if there is a third, second (N,), as text for `parse_dates`; None where there is no such."""
+    """Return hour, minute and, if there is a third, second (N,), as text for `parse_dates`; None without an hour."""
     hour, minute, *rest = parts
     second = rest[0] if rest else np.zeros(len(hour))
     known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])

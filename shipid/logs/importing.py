@@ -473,7 +473,8 @@ def _cut_into_runs(rows: pd.DataFrame, segments: Iterable[Segment], unit: float,
         start, end = segment.start * unit, segment.end * unit
         inside = (t >= start - slack) & (t <= end + slack)
         if start < t[0] - step - slack or end > t[-1] + step + slack or inside.sum() < 2:
-            message = f"run {segment.run!r}, {format_span(start, end)}, is not in the log, which has {format_span(t[0], t[-1])}"
+            message = f"run {segment.run!r}, {format_span(start, end)}, is not in the log, "
+            message += f"which has {format_span(t[0], t[-1])}"
             raise DataError(message, file=file, path=f"segment.{index}")
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_name_run(part, segment.run))

@@ -41,7 +41,8 @@ def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: 
         if not np.isfinite(t[row]):
             what = _bad_time(log, clock, row, file, path)
         elif t[row] == t[row - 1]:
-            what = f"the time {format_moment(t[row])} appears twice: remove one of the rows, or set [clock] repeated = 'drop'"
+            what = f"the time {format_moment(t[row])} appears twice: "
+            what += "remove one of the rows, or set [clock] repeated = 'drop'"
         else:
             back = f"from {format_moment(t[row - 1])} to {format_moment(t[row])}{rollover_words(t[row] - t[row - 1])}"
             what = f"time goes back {back}: sort or split the log"

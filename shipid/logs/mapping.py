@@ -510,7 +510,8 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
     for name, column in columns.items():
         unit, path = INPUTS.get(name) or unit_of_column(name), f"columns.{name}"
         if unit is None or not (name in mapped or is_command(name) or is_output(name)):
-            hint = f"or <component>.<signal> with a signal of {', '.join((*rows_of_role('command'), *rows_of_role('output')))}"
+            signals = ", ".join((*rows_of_role("command"), *rows_of_role("output")))
+            hint = f"or <component>.<signal> with a signal of {signals}"
             raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
         _unit_factor(column.unit, unit, file, f"{path}.unit")
         if column.unit == "ddmm" and name not in ("latitude", "longitude"):

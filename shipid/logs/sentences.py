@@ -166,8 +166,8 @@ def _read_mwd(fields: Fields) -> Said:
 
 
 SENTENCES: dict[str, Callable[[Fields], Said]] = {
-    "GGA": _read_gga, "GNS": _read_gns, "GLL": _read_gll, "RMC": _read_rmc, "VTG": _read_vtg, "HDT": _read_hdt, "THS": _read_ths, "ROT": _read_rot, "RSA": _read_rsa,
-    "RPM": _read_rpm, "MWV": _read_mwv, "MWD": _read_mwd,
+    "GGA": _read_gga, "GNS": _read_gns, "GLL": _read_gll, "RMC": _read_rmc, "VTG": _read_vtg, "HDT": _read_hdt,
+    "THS": _read_ths, "ROT": _read_rot, "RSA": _read_rsa, "RPM": _read_rpm, "MWV": _read_mwv, "MWD": _read_mwd,
 }  # fmt: skip
 """Kind of a sentence -> what its fields say: deg; rot deg/min; sog kn; rpm; wind speeds m/s."""
 TIMES = {"GGA": 0, "GNS": 0, "GLL": 4, "RMC": 0, "ZDA": 0}

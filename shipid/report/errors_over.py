@@ -153,7 +153,8 @@ def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFra
 def _models_of_close_up(content: ReportContent) -> str:
     """Return a sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
-    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {join_few_names(shown, 6)}."
+    names = join_few_names(shown, 6)
+    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {names}."
     return words if len(shown) < total else ""
 
 

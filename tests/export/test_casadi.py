@@ -79,10 +79,8 @@ def test_a_path_that_diverged_is_none(step, tmp_path):
 
 def test_an_observer_without_wind_and_current_has_derivatives(tmp_path):
     """Before, the Hessian by the orders was no number, for the direction of no wind is none; IPOPT gave up."""
-    predictor = Predictor(
-        Physics(load_vessel("gunnerus-28.9"), 5, 1.0, observer=Observer(current=0.0)), "alone", UnchangedPath({}), {}, {},
-        "known",
-    )  # fmt: skip
+    physics = Physics(load_vessel("gunnerus-28.9"), 5, 1.0, observer=Observer(current=0.0))
+    predictor = Predictor(physics, "alone", UnchangedPath({}), {}, {}, "known")
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
     function, names = ca.Function.load(str(file)), build_model(predictor).layout
     given = {key: np.zeros(size) for key, size in names.sizes.items()}

@@ -186,7 +186,8 @@ def _column_lines(guess: Guess) -> Iterator[str]:
             f"# ! {finding.kind} ({_confidence_text(finding.confidence)}): {finding.sentence}" for finding in findings
         )
     for column in guess.columns:
-        yield f"\n[columns.{_toml_key(column.name)}]    # {_confidence_text(column.confidence)}{_column_remark(column)}: {column.evidence}"
+        sure = f"{_confidence_text(column.confidence)}{_column_remark(column)}"
+        yield f"\n[columns.{_toml_key(column.name)}]    # {sure}: {column.evidence}"
         parts = guess.sniffed.in_parts.get(column.source, (column.source,))
         source = parts[0] if len(parts) == 1 else parts
         yield from _toml_lines({"from": source, "unit": column.unit, **column.extra})

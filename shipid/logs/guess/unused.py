@@ -72,7 +72,8 @@ def _unused_reason(state: State, name: str, numbers: bool) -> str:
         return f"it may be {_meaning_in_words(meaning)}, but it is the same in every row"
     partner = PARTNERS.get(meaning)
     if partner and not any(partner in meaning_scores(other) for other in state.free() if other != name):
-        return f"it may be {_meaning_in_words(meaning)}, which says something together with a {partner} alone: there is none"
+        words = _meaning_in_words(meaning)
+        return f"it may be {words}, which says something together with a {partner} alone: there is none"
     return f"it may be {_meaning_in_words(meaning)}, but the motion in the log does not bear that out"
 
 
