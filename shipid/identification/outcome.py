@@ -727,8 +727,8 @@ def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, Fre
         begun = "initial_state" in solution.settings.widths
         starts = "" if begun else ", or predictions begin at noisy rows (compare with --nuisance initial_state)"
         warnings.append(
-            f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the model, "
-            f"or the wind and current data, are incomplete{starts}"
+            f"residuals of {join_names(list(coloured))} are correlated over {significant_digits(longest)} s: the "
+            f"model, or the wind and current data, are incomplete{starts}"
         )
         grown = growth_warning(rate, _longest_run(solution), longest)
         if 0 < horizon < LONG * longest:

@@ -252,7 +252,7 @@ def fit_statistics(fit: LinearFit) -> Statistics:
 
 
 def _fallback_covariance(covariances: Mapping[Kind, Covariance]) -> Kind:
-    """Form to report if none is trusted: `block_clusters`, or `fisher_covariance` for one block, whose scores sum to 0."""
+    """Form to report if none is trusted: `block_clusters`; `fisher_covariance` for one block, whose scores sum to 0."""
     blocks = covariances.get("blocks")
     return "blocks" if blocks is None or blocks.clusters > 1 else "fisher"
 

@@ -37,6 +37,6 @@ def growth_warning(rate: float, longest: float, memory: float) -> str:
         return ""
     return (
         f"the identified ship is course-unstable: a small yaw grows e-fold in {significant_digits(1 / rate)} s, and "
-        f"random forces with it over whole runs, so estimates may be several times worse than need be, and intervals too narrow; "
-        f"compare with --horizon {significant_digits(SHORTER * memory, 2)}"
+        f"random forces with it over whole runs, so estimates may be several times worse than need be, "
+        f"and intervals too narrow; compare with --horizon {significant_digits(SHORTER * memory, 2)}"
     )
