@@ -37,7 +37,10 @@ if TYPE_CHECKING:
     Source = Results | ReportContent | pd.DataFrame
 
 Statistic = Literal["mean", "90th percentile", "root mean square"]
-COLUMNS_OF_CELLS = ("model", "family", "N_D", "seed", "status", "A", "A_90", "A_rms", "H", "H_90", "rms")
+ABSENT_COLUMNS = {"family": "given", "seed": 0, "status": "ok"} | dict.fromkeys(
+    ("A", "A_90", "A_rms", "H_90", "rms"), np.nan
+)
+"""Columns of a table of cells that a user leaves out -> their value; errors in m."""
 
 __all__ = [
     "correlations",
@@ -225,12 +228,13 @@ def content_of(source: Source) -> ReportContent:
     if isinstance(source, ReportContent):
         return source
     if isinstance(source, pd.DataFrame):
-        if lacking := [name for name in COLUMNS_OF_CELLS if name not in source]:
-            raise ShipidError(f"lacks the columns {', '.join(lacking)}: give what `read_cells` returns", path="cells")
-        models = source.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
+        if lacking := [name for name in ("model", "N_D", "H") if name not in source]:
+            raise ShipidError(f"lacks the columns {', '.join(lacking)}", path="cells")
+        cells = source.assign(**{name: value for name, value in ABSENT_COLUMNS.items() if name not in source})
+        models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
         models = models.assign(status="ok", description="")
         naive = dict.fromkeys(("mean", "p90", "rms"), np.nan)
-        return ReportContent(title="", name="", cells=source, models=models, naive=naive)
+        return ReportContent(title="", name="", cells=cells, models=models, naive=naive)
     from shipid.answer.pages import report_content
     from shipid.study.results import Results
 

@@ -83,7 +83,7 @@ def test_a_table_of_cells_is_enough() -> None:
 
 
 def test_what_is_no_source_is_one_sentence() -> None:
-    with pytest.raises(ShipidError, match=r"cells: lacks the columns family, N_D, .*give what `read_cells` returns"):
+    with pytest.raises(ShipidError, match=r"cells: lacks the columns N_D, H"):
         figures.gain(pd.DataFrame({"model": ["a"]}))
     with pytest.raises(ShipidError, match="source must be a Results, as of `read_results`, or a table of cells"):
         figures.gain("results/quick")  # type: ignore[arg-type]

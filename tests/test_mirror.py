@@ -21,9 +21,10 @@ ELSEWHERE = {
     # the parts of one graph: what is written from them equals Python, for every method
     **{
         f"export/{part}.py": "export/test_c.py"
-        for part in ("blocks", "c_predictor", "c_vessel", "correctors", "equations", "known", "model")
+        for part in ("c_predictor", "c_vessel", "correctors", "equations", "known", "model", "recorder")
     },
     "export/fmu_c.py": "export/test_fmu.py",
+    "hybrid/deployed.py": "test_predictor.py",
     "report/replay.py": "cli/test_replay.py",
     "report/motion.py": "cli/test_replay.py",
 }
