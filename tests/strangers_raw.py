@@ -37,7 +37,7 @@ class RawColumn:
     what means nothing. also : other signals with the same values. unit : true unit. written : place of the unit,
     "header", "row" or "nowhere". scale : with the sign. offset : of the convention (zone of a map, frame). zero : error
     of the instrument, not in the log. wrap : least and greatest value of an angle. late, held : s by which a value
-    is old, and between new values. at : m forward of amidships, where the sensor is. noise : raw units.
+    is old, and between new values. at : m forward of amidships, where the sensor is. noise, quantum : raw units.
     """
 
     header: str
@@ -60,13 +60,21 @@ class RawColumn:
         """-1 where the column counts against the convention of datasets."""
         return -1 if self.scale < 0 else 1
 
+    @property
+    def quantum(self) -> float:
+        """Last digit."""
+        return float(10.0**-self.decimals)
+
 
 @dataclass(frozen=True)
 class RawFile:
-    """A file: its path in the folder, and its runs."""
+    """A file: its path in the folder, runs, number of the header's and first data line, and row of `record` by line."""
 
     path: str
     runs: tuple[str, ...]
+    header_line: int
+    data_line: int
+    rows: NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -455,6 +463,7 @@ def _write(
     files: list[RawFile] = []
     for path, names in groups.items():
         lines: list[list[str]] = []
+        kept: list[NDArray[np.intp]] = []
         for name in names:
             rows = record.iloc[places[name]]
             order = _order(random, len(rows), faults)
@@ -476,6 +485,7 @@ def _write(
                 cells.append(_texts(values, column, style))
             table = list(zip(*cells, strict=True))
             lines += [list(table[place]) for place in order]
+            kept.append(np.asarray(places[name])[order])
         head, header_line = _head(style, columns, starts[names[0]], path)
         text = _joined([*head[header_line:], *lines], style["separator"])
         tail = [style["separator"] * (len(columns) - 1) if style["separator"] in ",;" else ""] * style["empty"]
@@ -484,7 +494,7 @@ def _write(
         target.parent.mkdir(parents=True, exist_ok=True)
         body = str(style["newline"]).join(whole) + str(style["newline"])
         target.write_bytes(body.encode(style["encoding"], errors="replace"))
-        files.append(RawFile(path, tuple(names)))
+        files.append(RawFile(path, tuple(names), header_line, len(head), np.concatenate(kept)))
     return tuple(files)
 
 

@@ -76,7 +76,9 @@ def study_new(
         choices = [
             {"path": choice.path, "value": _toml_text(choice.value), "why": choice.why} for choice in draft.choices
         ]
-        answer.records("choices", choices, {"path": "choice", "value": "value", "why": "because"})
+        answer.rows("choices", choices, None)
+        for choice in choices:
+            answer.say(f"{choice['path']} = {choice['value']}" + (f"  # {choice['why']}" if choice["why"] else ""))
         for warning in draft.warnings:
             typer.echo(f"warning: {warning}", err=True)
         for look in draft.looks.values():

@@ -59,7 +59,7 @@ def test_pages_are_written_anew_from_the_folder(tiny_run: Path, tmp_path: Path) 
 def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
     tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The run ends while a report is made of its first half: the tables are those of the whole run."""
+    """The run waits with its tables until the report of its first half is written; they are those of the whole run."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     events = events_here(plan, folder)
     next(event for event in events if event.kind == "cell" and event.done == 4)
@@ -69,13 +69,13 @@ def test_a_report_of_a_run_that_goes_on_is_no_end_of_it(
     def meanwhile(*args: Any) -> Any:
         content = report_content(*args)
         run.start()
-        run.join()
         return content
 
     with without_figures():
         monkeypatch.setattr(pages, "report_content", meanwhile)
         report = write_pages(folder)
         monkeypatch.undo()
+        run.join()
         assert "4 of 8 cells" in report.read_text()
         assert set(pd.read_parquet(folder / "results.parquet")["cell"]) == set(read_results(tiny_run).cells["cell"])
         assert seals.sealed_faults(folder) == []

@@ -256,7 +256,8 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.study.prepare:partition": lambda *_: (),
         "shipid.study.screen:notes_on_windows": lambda *_: [],
         "shipid.answer.rotate:choose_turns": lambda *given: given[2],
-        "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(program="shipid", parts={}),
+        "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(parts={}),
+        "shipid.study.plan:program_of": lambda *_: "shipid",
     }
     for place, stand_in in stand_ins.items():
         module, _, name = place.partition(":")

@@ -82,7 +82,7 @@ def test_the_page_draws_runs_in_the_units_of_its_axes() -> None:
         title="", name="", series=series, errors=errors, ahead=5.0, provenance={}, command=""
     )
     panels = replay.replayed_motion(content).draw(series["run"].iloc[0])
-    *over_time, (track, _) = (list(panel.data) for panel in panels)
+    *over_time, (track, _) = (list(panel["data"]) for panel in panels)
     for (measured, _), value in zip(over_time, (5.0, 0.1, 2.0), strict=True):
         y = np.asarray(measured["y"], dtype=float)
         assert y[np.isfinite(y)] == pytest.approx(value)

@@ -41,7 +41,7 @@ def file(log: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    monkeypatch.setattr(outcome.design, "candidates", lambda *_: candidate_manoeuvres(SHIP, [3.0])[8:])
+    monkeypatch.setattr(outcome.design, "candidate_manoeuvres", lambda *_: candidate_manoeuvres(SHIP, [3.0])[8:])
     text = output_of(
         *("identify", "gunnerus-28.9", file, "--parameters", f"{ONE}, hull.derivatives.N_uv"),
         *("--prior", "hull.*[order >= 2]=0.5", "--bounds", f"{ONE}=[0.5, 2]", "--horizon", 0, "--test", "*3"),

@@ -213,7 +213,7 @@ def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
     log: Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before, one that diverged ended the command without a word of the fit."""
-    every, some = outcome.design.informed, candidate_manoeuvres(SHIP, [3.0])[4:9:4]
+    every, some = outcome.design.information_of_candidates, candidate_manoeuvres(SHIP, [3.0])[4:9:4]
 
     def informed(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[InformedCandidate]:
         if any(one.title.startswith("turning") for one in choice):
@@ -221,8 +221,8 @@ def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
         return every(vessel, choice, *args, **how)
 
     monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
-    monkeypatch.setattr(outcome.design, "candidates", lambda *_: some)
-    monkeypatch.setattr(outcome.design, "informed", informed)
+    monkeypatch.setattr(outcome.design, "candidate_manoeuvres", lambda *_: some)
+    monkeypatch.setattr(outcome.design, "information_of_candidates", informed)
     done = run_identification(off(), log.select(["M01", "M02"]), settings(parameters=FEW[:1]), programme=True)
     assert done.solution.status == "ok"
     assert done.programme is not None

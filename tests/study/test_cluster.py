@@ -48,10 +48,10 @@ def workers(address: str, place: Path, *more: str) -> Iterator[None]:
             process.wait(20)
 
 
-def napping(seconds: float) -> Callable[[int, int], int]:
+def napping(seconds: float) -> Callable[[int, int, object], int]:
     """Work that takes some time; made here, so that it travels to the workers by value."""
 
-    def work(shared: int, task: int) -> int:
+    def work(shared: int, task: int, _: object) -> int:
         time.sleep(seconds)
         return shared + task
 
