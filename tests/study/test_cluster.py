@@ -83,7 +83,7 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
             done.append(result)
         assert sorted(done) == [(i, 10 + i) for i in range(12)]
 
-        def full(_: int, __: int) -> int:
+        def full(_: int, __: int, ___: object) -> int:
             raise OSError(28, "No space left on device")
 
         with pytest.raises(OSError, match="No space left"):  # before, the scheduler was said to be gone
