@@ -11,7 +11,7 @@ light ink on a dark ground.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     Source = Results | ReportContent | pd.DataFrame
 
 Statistic = Literal["mean", "90th percentile", "root mean square"]
-ABSENT_COLUMNS = {"family": "given", "seed": 0, "status": "ok"} | dict.fromkeys(
+ABSENT_COLUMNS: dict[str, Any] = {"family": "given", "seed": 0, "status": "ok"} | dict.fromkeys(
     ("A", "A_90", "A_rms", "H_90", "rms"), np.nan
 )
 """Columns of a table of cells that a user leaves out -> their value; errors in m."""

@@ -93,7 +93,7 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
         both = [*islice(one, 1), *other, *one]  # before, the scheduler gave both runs of one plan the results of one
         assert sorted(both) == [(1, 11), (1, 21), (2, 12), (2, 22)]
 
-        def failing(_: int, task: int) -> float:
+        def failing(_: int, task: int, __: object) -> float:
             return 1 / task
 
         with pytest.raises(ZeroDivisionError):
