@@ -156,7 +156,7 @@ def test_a_scheduler_that_cannot_read_the_work_is_not_said_to_be_gone(
         own = importlib.import_module("own_method_here").Own()
         words = r"the Dask scheduler cannot read the work \(No module named 'own_method_here'\): start scheduler and"
         with pytest.raises(ShipidError, match=words) as caught:
-            list(on_dask(address, lambda _, __: 0, own, [("t", 1)], "x"))
+            list(on_dask(address, lambda *_: 0, own, [("t", 1)], "x"))
     assert "\n" not in str(caught.value)
 
 
@@ -166,7 +166,7 @@ def _late(address: str) -> list[str]:
 
 @pytest.mark.slow
 def test_a_task_that_kills_its_workers_is_named_when_the_others_are_done(tmp_path: Path) -> None:
-    def hungry(_: int, task: int) -> int:
+    def hungry(_: int, task: int, __: object) -> int:
         if task == 1:
             time.sleep(2.0)  # a nanny whose first worker dies before the nanny is up gives up
             os._exit(9)  # as the system ends a process that takes too much memory
