@@ -144,7 +144,7 @@ def test_a_method_in_a_users_script_is_known_to_every_command(tmp_path: Path) ->
     assert "mine" in script("study", "compare", "one", "two", folder=tmp_path)
     page = (tmp_path / "two" / "report.html").read_text(encoding="utf-8")
     assert f'aria-label="Command">python my.py study run {TINY} --set' in page
-    with pytest.raises(ShipidError, match="open the run by the script that puts it into TERMS or METHODS"):
+    with pytest.raises(ShipidError, match="'mean-error' is no kind of method"):
         shipid.read_cells(tmp_path / "one")
 
 
