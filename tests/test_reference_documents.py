@@ -59,7 +59,7 @@ def test_pages_of_keys_have_every_kind_with_its_keys_and_their_words(made: Modul
         assert {field.alias or name for name, field in method.model_fields.items()} <= named(block), kind
     assert all(f'kind = "{kind}"' in study for kind in KINDS)
     assert all(f"`[{key}]`" in vessel or f'kind = "{key.partition(".")[2]}"' in vessel for key in TERMS)
-    assert vessel.count("`inflow`: u_P = (1 - w_P) u") == 1, "what a docstring refers to is explained once"
+    assert vessel.count("`propeller_inflow`: u_P = (1 - w_P) u") == 1, "what a docstring refers to is explained once"
     assert all(f'kind = "{kind}"' in mapping for kind in (*READERS, *REPAIRS))
     row = re.search(r"^\| `offset` \|.*$", section(study, '`kind = "path-drawn"`'), re.MULTILINE)
     assert row, "path-drawn has a row for `offset`"
