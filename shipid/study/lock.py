@@ -54,12 +54,14 @@ def sole_writer(folder: Path, name: str = WRITER, *, wait: bool = False) -> Iter
 
 
 def current_writer(folder: Path) -> str:
-    """The process that works in a folder, in words; empty if there is none."""
+    """The process that works in a folder, in words; empty if there is none, or where the folder cannot be locked."""
     try:
-        with sole_writer(folder):
+        with FileLock(folder / f".{WRITER}.lock", blocking=False, fallback_to_soft=False):
             return ""
-    except (ResultError, OSError):
+    except Timeout:
         return _holder_words(folder / f".{WRITER}.txt")
+    except OSError:  # a folder that this user may only read
+        return ""
 
 
 def _holder_words(holder: Path) -> str:

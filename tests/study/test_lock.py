@@ -66,3 +66,17 @@ def test_a_file_system_without_locks_is_a_warning(
     with sole_writer(tmp_path):
         pass
     assert "is on a file system without locks: let one process at a time work in it" in caplog.text
+
+
+def test_nobody_is_said_to_work_in_a_folder_that_may_only_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`study check` of a colleague's folder reads it; it named another process there."""
+
+    def refused(*_: Any, **__: Any) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(FileLock, "acquire", refused)
+    assert current_writer(tmp_path) == ""
+    with pytest.raises(ResultError, match="cannot be locked"), sole_writer(tmp_path):
+        pass
