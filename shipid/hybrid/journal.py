@@ -2,14 +2,16 @@
 
 There is one Optuna study for each cell. One process writes a journal, a line for each trial that has ended, so a search
 has no trial that is half done. A last line that a killed process left half written is cut off when the file is opened
-again. Each study carries the digest of the plan that it belongs to.
+again. Each trial carries a checksum, each study the digest of the plan that it belongs to.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,7 @@ from shipid.hybrid.method import Row, Space
 COUNT = "trials"  # attribute of a study: how many it will have
 DIGEST = "digest"  # attribute of a study: of the plan that it belongs to
 FIXED, NUMBER = "fixed", "number"  # attributes of a trial: all settings in order, null if searched; its place
+CHECKSUM = "crc32"  # attribute of a trial: of its cell and row
 REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
@@ -53,7 +56,7 @@ class Journal:
         self._studies = {name: optuna.load_study(study_name=name, storage=self.storage) for name in names}
 
     def rows(self, cell: str) -> list[Row]:
-        """Return the trials of a search that ended, in order."""
+        """Return the trials of a search that ended, in order; ResultError for one that is not as it was written."""
         if cell not in self._studies:
             return []
         study = self._studies[cell]
@@ -62,8 +65,16 @@ class Journal:
         rows: list[Row] = []
         for trial in study.trials:
             if trial.user_attrs.get(NUMBER) == len(rows):  # neither one of a dashboard, nor one that came twice
-                rows.append(_row_of_trial(len(rows), trial))
+                rows.append(self._checked_row(cell, len(rows), trial))
         return rows
+
+    def _checked_row(self, cell: str, number: int, trial: FrozenTrial) -> Row:
+        """A trial as it was added; ResultError if it is damaged."""
+        with suppress(KeyError, TypeError):  # an attribute is missing or is another's
+            row = _row_of_trial(number, trial)
+            if trial.user_attrs[CHECKSUM] == _row_checksum(cell, row):
+                return row
+        raise ResultError(f"damaged: trial {number} of {cell} is not as written; {REMEDY}", file=self.file)
 
     def count(self, cell: str) -> int | None:
         """Return how many trials the budget of a search allowed; None before that is decided."""
@@ -78,7 +89,7 @@ class Journal:
         """Append trials to searches: cell -> rows, each with the next number."""
         where = distributions(space)
         for cell, mine in rows.items():
-            self._study(cell).add_trials([frozen_trial(row, where) for row in mine])
+            self._study(cell).add_trials([frozen_trial(row, where, cell) for row in mine])
 
     def _study(self, cell: str) -> optuna.Study:
         """The study of a cell to be written to, made where there is none."""
@@ -120,8 +131,8 @@ def distributions(space: Space) -> dict[str, BaseDistribution]:
     return drawn
 
 
-def frozen_trial(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial:
-    """A trial that ended, as Optuna keeps it; attributes hold what is not searched, and the order of all."""
+def frozen_trial(row: Row, where: Mapping[str, BaseDistribution], cell: str = "") -> FrozenTrial:
+    """A trial of a cell that ended, as Optuna keeps it; attributes hold what is not searched, and the order of all."""
     searched = {name: value for name, value in row["params"].items() if name in where}
     complete = row["state"] == "complete"
     fixed = {name: None if name in where else value for name, value in row["params"].items()}
@@ -135,8 +146,14 @@ def frozen_trial(row: Row, where: Mapping[str, BaseDistribution]) -> FrozenTrial
             "epochs": row["epochs"],
             FIXED: fixed,
             NUMBER: row["number"],
+            CHECKSUM: _row_checksum(cell, row),
         },
     )
+
+
+def _row_checksum(cell: str, row: Row) -> int:
+    """CRC-32 of a row of a search."""
+    return zlib.crc32(json.dumps([cell, sorted(row.items())]).encode())
 
 
 def _widen_distribution(where: BaseDistribution, value: float) -> BaseDistribution:

@@ -104,6 +104,35 @@ def test_a_write_that_was_cut_off_anywhere_loses_its_last_trial_at_most(tmp_path
     assert repr(last.rows("b")) == repr(rows(2, 4))
 
 
+@pytest.mark.parametrize("seed", [*range(20), *(pytest.param(k, marks=pytest.mark.slow) for k in range(20, 300))])
+def test_damage_anywhere_is_said_or_loses_trials_and_never_changes_one(tmp_path: Path, seed: int) -> None:
+    """One bit, or some bytes; what is lost is added again."""
+    file, written = tmp_path / "t.log", {"a": rows(5, seed), "b": rows(3, seed + 1)}
+    Journal(file).add(written, SPACE)
+    rng, content = np.random.default_rng(seed), bytearray(file.read_bytes())
+    place = int(rng.integers(len(content)))
+    if seed % 3 == 0:
+        place = len(content) - 1 - place % len(content.splitlines()[-1])  # the last line
+    if rng.random() < 0.5:
+        content[place] ^= 1 << int(rng.integers(8))
+    else:
+        content[place : place + int(rng.integers(1, 9))] = rng.bytes(int(rng.integers(0, 5)))
+    file.write_bytes(content)
+    said, read = "", dict[str, Any]()
+    try:
+        journal = Journal(file)
+        read = {cell: journal.rows(cell) for cell in written}
+    except ResultError as error:
+        said = str(error)
+    assert bool(read) != ("damaged" in said)
+    assert "\n" not in said
+    for cell in read:
+        mine, kept = written[cell], len(read[cell])
+        assert repr(read[cell]) == repr(mine[:kept])
+        journal.add({cell: mine[kept:]}, SPACE)
+        assert repr(Journal(file).rows(cell)) == repr(mine)
+
+
 def test_journals_of_units_are_merged(tmp_path: Path) -> None:
     """One file holds the studies of all, each with its trials; half a line is left out."""
     written = [{"a": rows(5, 1), "b": rows(3, 2)}, {}, {"c": rows(4, 3)}, {"d": rows(2, 4)}]
