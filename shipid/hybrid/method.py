@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, NonNegativeInt, model_validator
 
-from shipid.arguments import as_float_array
+from shipid.arguments import as_float_array, check_mapping, check_number
 from shipid.checked import CheckedModel
 from shipid.data.windows import Instants, Windows, locked_view
 from shipid.document import parse_model
@@ -294,6 +294,12 @@ def _check_fitted(where: str, one: FitResult, shape: tuple[int, ...], learns: bo
     with locate_errors(where, type(one.corrector)):
         if fault := fault_of_corrector(one.corrector):
             raise ShipidError(f"{where}: {fault}")
+        chosen, past = one.corrector.hyperparameters, one.corrector.past
+    check_mapping(f"{where}: hyperparameters of the corrector", chosen, "a name to a number", DataError)
+    for key, value in {**chosen, "past": past, "seconds": one.seconds}.items():
+        check_number(f"{where}: {key}", value, DataError)
+    if not 0 <= past < np.inf:
+        raise DataError(f"{where}: past of the corrector must be seconds, from 0 on, not {past!r}")
 
 
 def widen_range(low: float, high: float) -> tuple[float, float]:

@@ -95,6 +95,10 @@ ROW = trial_row(0, {}, 1.0, 0.0)
             {"right": FitResult(None, [{**ROW, "value": np.nan, "state": "stopped"}], 0.0)},
             "trial 0: value must be finite, not nan, unless",
         ),
+        ({"right": FitResult(UnchangedPath({}, "1 s"), [ROW], 0.0)}, "past must be a number, not '1 s'"),  # type: ignore[arg-type]
+        ({"right": FitResult(UnchangedPath({}, -1.0), [ROW], 0.0)}, "past of the corrector must be seconds, from 0 on"),
+        ({"right": FitResult(UnchangedPath({}), [ROW], "1 s")}, "seconds must be a number, not '1 s'"),  # type: ignore[arg-type]
+        ({"right": FitResult(UnchangedPath({"k": "3"}), [ROW], 0.0)}, "k must be a number"),  # type: ignore[dict-item]
         ({"right": FitResult(UnchangedPath({}), [], 0.0)}, "a corrector needs a trial that is complete, or give"),
         (
             {"right": FitResult(UnchangedPath({}), [trial_row(0, {}, np.nan, 0.0)], 0.0)},
