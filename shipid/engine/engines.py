@@ -21,7 +21,6 @@ AUTO, REPEATED = "auto", "repeated"  # `repeated`: as `auto`, where so many call
 Result = TypeVar("Result")
 COMPONENTS_A_STEP = 4  # drawn components that take as long as all the rest of a step
 NATIVE_FROM = 2e5  # rate evaluations: below it compiling C (half a second, once) costs more than it saves
-KERNEL_FROM = 5e8  # the same for a kernel on a GPU (15 s): 2e8 of small batches, 3e9 of large ones on an H200
 BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operation an instruction
 
 
@@ -69,13 +68,7 @@ class Engine:
 def _run_eager(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
     from shipid.engine.torch import run_torch  # PyTorch takes a second to import
 
-    return run_torch(model, batch, job, compiled=False)
-
-
-def _run_compiled(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
-    from shipid.engine.torch import run_torch
-
-    return run_torch(model, batch, job, compiled=True)
+    return run_torch(model, batch, job)
 
 
 def _torch_gradient(
@@ -101,9 +94,6 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
     ),
     "single": Engine(run_single, available=_is_compiler_available, measure=measure_single, checks=True),
     "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
-    "compiled": Engine(
-        _run_compiled, preferred=lambda load: load.device != "cpu" and load.work > KERNEL_FROM, any_device=True
-    ),
     "torch": Engine(_run_eager, preferred=lambda _: True, gradient=_torch_gradient, any_device=True),
 }
 
@@ -124,8 +114,7 @@ def engine_by_name(name: str, device: str) -> Engine | None:
         raise ShipidError(f"there is no engine {name!r}: {suggest_name(name, [AUTO, *ENGINES])}")
     engine = ENGINES.get(name)
     if device != "cpu" and engine is not None and not engine.any_device:
-        others = " or ".join(repr(other) for other, entry in ENGINES.items() if entry.any_device)
-        raise ShipidError(f"engine {name!r} runs on the CPU: use {others} on {device!r}")
+        raise ShipidError(f"engine {name!r} runs on the CPU: use 'torch' on {device!r}")
     check_device(device)
     return engine
 

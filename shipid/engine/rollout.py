@@ -91,8 +91,8 @@ def rollout(
     keep : channels to record, default all states and memories.
     engine : `native` (C on SIMD vectors and threads), `single` (the same in single precision, for starts near the
         origin: a northing of 6,500 km counts in steps of 0.5 m), `casadi` (its virtual machine, sample by sample),
-        `torch` (eager), `compiled` (TorchInductor kernels, for a GPU), or `auto`: by size and by what there is;
-        `repeated` is `auto` where so many calls follow that compiling pays for any size.
+        `torch`, or `auto`: by size and by what there is; `repeated` is `auto` where so many calls follow that
+        compiling pays for any size.
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
 
     Raises

@@ -42,18 +42,13 @@ def _rollouts(samples: int, count: int) -> dict[str, Any]:
     ways = {
         "native": lambda: states("native", "cpu"),
         "torch on the GPU": lambda: states("torch", "cuda"),
-        "compiled on the GPU": lambda: states("compiled", "cuda"),
     }
-    first = {name: round(clock(way), 1) for name, way in ways.items()}
     for name in ways:
         assert np.allclose(ways[name](), ways["native"](), rtol=1e-9, atol=1e-9), name
     seconds = best_of(ways, rounds=5, settled=True)
     size = f"{samples} samples, {count} variants"
     work = samples * count * STEPS / 1e6
-    return {
-        **{f"{size}: {name} [million steps/s]": round(work / took, 1) for name, took in seconds.items()},
-        f"{size}: first call of compiled [s]": first["compiled on the GPU"],
-    }
+    return {f"{size}: {name} [million steps/s]": round(work / took, 1) for name, took in seconds.items()}
 
 
 def _batches() -> dict[str, Any]:

@@ -67,7 +67,7 @@ def test_an_engine_that_measures_is_asked_to(monkeypatch: pytest.MonkeyPatch, dr
 def test_a_wrong_name_lists_all_engines(toy: str, draw_inputs: Draw) -> None:
     with pytest.raises(ShipidError, match="there is no engine 'wind'") as caught:
         rollout(SHIP, **draw_inputs(SHIP, 1), step=1.0, num_steps=1, engine="wind")
-    for name in ("auto", toy, "native", "casadi", "compiled", "torch"):
+    for name in ("auto", toy, "native", "casadi", "torch"):
         assert name in str(caught.value)
 
 
@@ -81,7 +81,6 @@ def test_a_wrong_name_lists_all_engines(toy: str, draw_inputs: Draw) -> None:
         (4000, 100, "cpu", True, "native"),
         (4000, 100, "cpu", False, "torch"),
         (4000, 100, "cuda", True, "torch"),
-        (4000, 200_000, "cuda", True, "compiled"),
     ],
 )
 def test_auto_goes_by_size_and_by_what_there_is(

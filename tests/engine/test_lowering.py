@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 import torch
 
-from shipid.engine import torch as batched
 from shipid.engine.lowering import lower_function
 from shipid.engine.native import find_compiler
-from shipid.engine.rollout import Method, Trajectories, rollout
-from shipid.engine.torch import kernels
+from shipid.engine.rollout import Method, rollout
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -133,27 +131,3 @@ def test_every_printed_operation_has_casadis_value() -> None:
     rng = np.random.default_rng(0)
     inputs = {"x": rng.uniform(-2, 2, (2, 50)), "parameters": np.tile([[0.7], [0.1]], (1, 50))}
     np.testing.assert_allclose(evaluate(function, inputs), by_casadi(function, inputs), rtol=1e-14, atol=1e-15)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # PyTorch's compiler uses what PyTorch deprecates
-@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler on this machine")
-def test_a_family_compiles_once(draw_inputs: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Eight variants, batches of one block or of several, one compilation; the same numbers as CasADi's."""
-    vessel = load_vessel("gunnerus-28.9").with_values({"wind.off": True})
-    parameters = family(vessel, 8)
-    before = len(kernels)
-    monkeypatch.setattr(batched, "COMPILED_BLOCK", 8)
-    monkeypatch.setattr(batched, "GRAIN", 8)
-    options: dict[str, Any] = {"step": 1.0, "num_steps": 3, "parameters": parameters}
-
-    def both(num_samples: int) -> tuple[Trajectories, Trajectories]:
-        given = draw_inputs(vessel, num_samples)
-        return rollout(vessel, **given, **options, engine="compiled"), rollout(
-            vessel, **given, **options, engine="casadi"
-        )
-
-    for num_samples in (21, 7, 5):
-        compiled, exact = both(num_samples)
-        np.testing.assert_allclose(compiled.states, exact.states, rtol=1e-10, atol=1e-10)
-    assert len(kernels) - before == 1

@@ -14,13 +14,11 @@ from shipid.vessel.load import load_vessel  # noqa: E402
 
 
 @pytest.mark.parametrize("num_samples", [1, 255, 256, 8193, 20000])
-@pytest.mark.parametrize("compiled", [False, True])
-def test_blocks_cover_all_samples_with_little_padding(num_samples: int, compiled: bool) -> None:
-    width = engine._block_width(num_samples, 1, 1, compiled, "cpu")
-    padded = -(-num_samples // width) * width
-    assert width <= (engine.COMPILED_BLOCK if compiled else engine.EAGER_BLOCK)
-    assert padded - num_samples < (engine.GRAIN if compiled else 1) * (padded // width)
-    assert not compiled or width % engine.GRAIN == 0
+@pytest.mark.parametrize("num_variants", [1, 16, 10_000])
+def test_blocks_are_about_equal_and_bounded(num_samples: int, num_variants: int) -> None:
+    width = engine._block_width(num_samples, num_variants, 1, "cpu")
+    assert width * num_variants <= max(engine.CPU_BLOCK, engine.LEAST_BLOCK * num_variants)
+    assert -(-num_samples // width) * width - num_samples <= num_samples // width
 
 
 def test_a_rollout_agrees_with_casadi() -> None:
