@@ -22,10 +22,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from shipid.engine import libraries
 from shipid.engine.collect import collect_terms
 from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, count_threads, integrate_step
-from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build_library, load_library, run_compiler
+from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build_library, obtain_library, run_compiler
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, PrintedFunction, print_function
 from shipid.engine.tables import RampTable, even_tables, find_tables
 from shipid.engine.threads import run_tasks, threaded_source
@@ -80,44 +79,21 @@ NOTED = 128  # vectors of distances that are counted at a time: between the step
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
 
-@cache
-def _probe_compiler() -> tuple[str, bytes] | None:
-    """Path of a C compiler that can build a shared library, and a library that it built; None if there is none."""
-    trial = "#include <math.h>\ndouble run(double x) { return sin(x); }"
-    tried: set[str] = set()
-    for name in ("gcc", "cc", "clang"):
-        command = shutil.which(name)
-        if command is None or os.path.realpath(command) in tried:
-            continue
-        tried.add(os.path.realpath(command))
-        try:
-            with tempfile.TemporaryDirectory() as folder:
-                library = Path(folder) / "probe.so"
-                failure = build_library(_compiler_command(command, CompilerTarget(1)), trial, library, PROBE_LIMIT)
-                if failure is None:
-                    return command, library.read_bytes()
-        except OSError as error:
-            place = f"no temporary folder can be made ({error.strerror}): set TMPDIR to a folder that can be written"
-            log.warning("engine 'native' is not used, others are slower: %s", place)
-            return None
-        log.warning(
-            "the C compiler %s cannot be used (%s)",
-            escape_unprintable(command),
-            escape_unprintable(failure.splitlines()[0]),
-        )
-    if not tried:
-        log.warning("engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)")
-    return None
-
-
 _refused: list[str] = []  # why this process compiles no more, if so
 _interpreted: set[str] = set()  # functions that this process could not compile, while it goes on with others
 
 
+@cache
+def _compiler_on_path() -> str | None:
+    command = next(filter(None, map(shutil.which, ("gcc", "cc", "clang"))), None)
+    if command is None:
+        log.warning("engine 'native' is not used, others are slower: there is no C compiler (gcc, cc or clang)")
+    return command
+
+
 def find_compiler() -> str | None:
-    """Path of a C compiler whose libraries can be kept and loaded here; None if there is none."""
-    probed = None if _refused else _probe_compiler()
-    return None if probed is None or _native_folder() is None else probed[0]
+    """Path of a C compiler; None if there is none, or if one has failed in this process."""
+    return None if _refused else _compiler_on_path()
 
 
 def engine_description() -> str:
@@ -137,7 +113,7 @@ def noted_engine() -> str | None:
 
     None where nothing has asked for a compiler yet; to look for one takes a moment.
     """
-    return engine_description() if _refused or _probe_compiler.cache_info().currsize else None
+    return engine_description() if _refused or compiler_target.cache_info().currsize else None
 
 
 def refuse_compiling(reason: str) -> None:
@@ -157,12 +133,6 @@ def _user_cache() -> str:
     """The user's folder for what can be made anew."""
     wanted = os.environ.get("XDG_CACHE_HOME", "")
     return wanted if os.path.isabs(wanted) else os.path.join(os.path.expanduser("~"), ".cache")  # as it is specified
-
-
-def _native_folder() -> Path | None:
-    """Folder of compiled libraries in the user's cache; None if none can be loaded here."""
-    probed = _probe_compiler()
-    return None if probed is None else libraries.library_folder(_user_cache(), probed[1])
 
 
 @cache
@@ -192,9 +162,12 @@ def compiler_target(precision: Precision = DOUBLE) -> CompilerTarget:
     called = f"{best.prefix}v_tanh{precision.letter}"
     probe = f"typedef {precision.real} V __attribute__((vector_size({precision.bits // 8 * best.lanes}))); "
     probe += f"V {called}(V); V run(V x) {{ return {called}(x); }}"
-    with tempfile.TemporaryDirectory() as folder:
-        failure = build_library(_compiler_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
-    return best if failure is None else replace(best, prefix="")
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            build_library(_compiler_command(command, best), probe, Path(folder) / "probe.so", PROBE_LIMIT)
+    except (NoLibrary, OSError):
+        return replace(best, prefix="")
+    return best
 
 
 def _compiler_command(command: str, wanted: CompilerTarget, further: Sequence[str] = ()) -> list[str]:
@@ -451,7 +424,7 @@ def _compile_rollout(
 
 
 def compile_or_explain(source: Callable[[], str]) -> Any:
-    """The compiled function `run` of C source; NoLibrary if there is no compiler or it fails."""
+    """The compiled function `run` of C source; NoLibrary, with what to do, if there is no compiler or it fails."""
     if find_compiler() is None:
         raise NoLibrary(
             "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
@@ -465,35 +438,15 @@ def compile_or_explain(source: Callable[[], str]) -> Any:
 def compile_source(source: str, further: Sequence[str] = ()) -> Any:
     """The compiled function `run` of C source, from the cache if possible; `further`: options of the compiler.
 
-    A library in the cache that is damaged or may be another user's is not loaded but compiled anew. NoLibrary if the
-    compiler fails or hangs, or where nothing can be written.
+    NoLibrary if the compiler fails or hangs, or where nothing can be written.
     """
-    command, folder = find_compiler(), _native_folder()
-    if command is None or folder is None:
+    command = find_compiler()
+    if command is None:
         raise NoLibrary("there is no C compiler")
-    words = [
-        source,
-        *OPTIONS,
-        *further,
-        command,
-        compiler_version(command),
-        platform.machine(),
-        *sorted(_processor_flags()),
-    ]
-    library = folder / f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
-    try:
-        return load_library(library)
-    except OSError:
-        pass  # not there
-    except NoLibrary as error:
-        log.warning("%s: compiled anew", escape_unprintable(error.message))
-    failure = build_library(_compiler_command(command, compiler_target(), further), source, library)
-    if failure is not None:
-        raise NoLibrary(f"the C compiler failed ({failure.splitlines()[0]})")
-    try:
-        return load_library(library)
-    except OSError as error:
-        raise NoLibrary(f"{library} is gone ({error.strerror})") from None
+    options, processor = (*OPTIONS, *further), (platform.machine(), *sorted(_processor_flags()))
+    words = [source, *options, command, compiler_version(command), *processor]
+    name = f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
+    return obtain_library(_compiler_command(command, compiler_target(), further), source, _user_cache(), name)
 
 
 def pad_samples(array: Array, wide: int, precision: Precision = DOUBLE) -> Array:

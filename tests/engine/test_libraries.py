@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from shipid.engine import libraries, native
-from shipid.engine.libraries import NoLibrary, build_library, foreign_owner_words, load_library, run_compiler
+from shipid.engine.libraries import build_library, load_library, run_compiler
 from shipid.engine.native import CompilerTarget, find_compiler
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError
@@ -32,10 +32,10 @@ SOURCE = "double run(void) { return 1.0; }"
 def forget() -> None:
     """As a new process: nothing is compiled, no folder is chosen, no compiler is known."""
     native._compile_rollout.cache_clear()
-    native._probe_compiler.cache_clear()
+    native._compiler_on_path.cache_clear()
     native.compiler_target.cache_clear()
     native.compiler_version.cache_clear()
-    libraries.library_folder.cache_clear()
+    libraries._library_folders.cache_clear()
 
 
 @pytest.fixture(autouse=True)
@@ -73,54 +73,55 @@ def compiled() -> bytes:
     assert command is not None
     with TemporaryDirectory() as folder:
         library = Path(folder) / "model.so"
-        assert build_library(native._compiler_command(command, CompilerTarget(1)), SOURCE, library) is None
+        build_library(native._compiler_command(command, CompilerTarget(1)), SOURCE, library)
         return library.read_bytes()
 
 
-@pytest.mark.parametrize("kept", [0, 1, 100, 4096, 0.5, 0.9, -1, -33])
+@pytest.mark.parametrize("kept", [0, 100, 0.9, -1])
 def test_a_truncated_library_is_never_loaded(kept: float, tmp_path: Path) -> None:
     library = made(tmp_path / "a")
     content = library.read_bytes()
     library.write_bytes(content[: int(kept * len(content)) if isinstance(kept, float) else kept])
-    with pytest.raises(NoLibrary, match="is damaged"):
+    with pytest.raises(OSError, match="is damaged"):
         load_library(library)
 
 
 @pytest.mark.parametrize("seed", seeds(4, 20))
-def test_a_library_with_another_byte_is_never_loaded(seed: int, tmp_path: Path) -> None:
+def test_a_library_with_another_byte_or_name_is_never_loaded(seed: int, tmp_path: Path) -> None:
     library = made(tmp_path / "a")
+    other = library.with_name("other.so")
+    other.write_bytes(library.read_bytes())
     content, rng = bytearray(library.read_bytes()), np.random.default_rng(seed)
     content[rng.integers(len(content))] ^= 1 << int(rng.integers(8))
     library.write_bytes(content)
-    with pytest.raises(NoLibrary, match="is damaged"):
-        load_library(library)
+    for wrong in (library, other):
+        with pytest.raises(OSError, match="is damaged"):
+            load_library(wrong)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no owners of files")
 def test_the_work_of_others_is_never_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     library = made(tmp_path / "a")
-    assert foreign_owner_words(library) is None
-    for place, mode in ((library, 0o720), (library, 0o702), (library.parent, 0o720), (library.parent, 0o702)):
+    for place, mode in ((library, 0o720), (library, 0o702), (library.parent, 0o720), (tmp_path, 0o707)):
         before = stat.S_IMODE(place.stat().st_mode)
         place.chmod(mode)
-        assert "written by other" in str(foreign_owner_words(library))
+        with pytest.raises(OSError, match="written by other"):
+            load_library(library)
         place.chmod(before)
-    tmp_path.chmod(0o707)  # others could put another folder in the place of this one
-    assert "written by other" in str(foreign_owner_words(library))
-    tmp_path.chmod(0o1707)
-    assert foreign_owner_words(library) is None
-    tmp_path.chmod(0o700)
+    tmp_path.chmod(0o1707)  # where nobody can put another folder in the place of this one
+    assert load_library(library) is not None
     link = library.with_name("link.so")
     link.symlink_to(library)
-    assert "no file" in str(foreign_owner_words(link))
+    with pytest.raises(OSError, match="no file"):
+        load_library(link)
     monkeypatch.setattr(os, "geteuid", lambda: 12345)
-    with pytest.raises(NoLibrary, match="belongs to another user"):
+    with pytest.raises(OSError, match="belongs to another user"):
         load_library(library)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", ["truncated", "foreign", "open to others", "folder"])
-def test_a_rollout_mends_the_cache(
+@pytest.mark.parametrize("damage", ["truncated", "open to others", "folder"])
+def test_a_rollout_mends_the_cache_or_goes_without(
     damage: str, empty_cache: Path, numbers: Callable[..., np.ndarray], caplog: pytest.LogCaptureFixture
 ) -> None:
     sound = numbers()
@@ -132,18 +133,12 @@ def test_a_rollout_mends_the_cache(
     else:
         library.write_bytes(content[:5000] if damage == "truncated" else content)
         library.chmod(0o777 if damage == "open to others" else 0o700)
-        if damage == "foreign":
-            if os.geteuid():
-                pytest.skip("only root can give files away")
-            os.chown(library, 12345, 12345)
     forget()
     with caplog.at_level(logging.WARNING):
-        states = numbers()
+        np.testing.assert_array_equal(numbers(), sound)
     if damage != "folder":
-        np.testing.assert_array_equal(states, sound)
         assert load_library(library) is not None
-    np.testing.assert_allclose(states, sound, rtol=1e-9)
-    assert len([record for record in caplog.records if "anew" in record.message or "not used" in record.message]) <= 2
+    assert len(caplog.records) == (damage == "folder")
 
 
 def test_a_folder_of_another_user_is_not_used(
@@ -181,37 +176,23 @@ def test_a_place_that_runs_no_programs(
     forget()
     with caplog.at_level(logging.WARNING):
         np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
-    (line,) = [record.getMessage() for record in caplog.records]
-    assert "Operation not permitted" in line
-    assert ("not used" if everywhere else "not kept") in line
+    lines = [record.getMessage() for record in caplog.records]
+    assert all("Operation not permitted" in line for line in lines)
+    assert ["not used" in line for line in lines] == ([False, True] if everywhere else [False])
     if everywhere:
         with pytest.raises(ShipidError, match="use 'torch'"):
             numbers("native")
 
 
-def test_a_full_disk_is_one_line(
-    numbers: Callable[..., np.ndarray], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    """No library fits anywhere, after the probe has fitted."""
-    sound = numbers()
-    forget()
-    assert find_compiler() is not None
-    monkeypatch.setattr(native, "build_library", lambda *_: "ld: final link failed: No space left on device")
-    (Path(os.environ["XDG_CACHE_HOME"]) / "shipid").rename(Path(os.environ["XDG_CACHE_HOME"]) / "gone")
-    (Path(os.environ["XDG_CACHE_HOME"]) / "shipid").mkdir(mode=0o700)
-    with caplog.at_level(logging.WARNING):
-        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
-        numbers()
-    (line,) = [record.getMessage() for record in caplog.records]
-    assert "No space left" in line
-    assert find_compiler() is None
-
-
-@pytest.mark.parametrize("seed", seeds(1, 6))
+@pytest.mark.parametrize("seed", range(3))
 def test_what_a_strange_compiler_says_is_one_line_that_names_it_and_controls_no_terminal(
-    seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    seed: int,
+    tmp_path: Path,
+    numbers: Callable[..., np.ndarray],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """Also of one that ends without an error, and without a library: before, the cache was named."""
+    """Also of one that ends without an error, and without a library."""
     words = bytes(np.random.default_rng(seed).integers(1, 256, 40, dtype=np.uint8)) + b"\x1b[31m"
     (tmp_path / "said").write_bytes(b"error: " + words.replace(b"\n", b" "))
     (tmp_path / "tools").mkdir()
@@ -222,37 +203,23 @@ def test_what_a_strange_compiler_says_is_one_line_that_names_it_and_controls_no_
     monkeypatch.setenv("PATH", str(tmp_path / "tools"))
     forget()
     with caplog.at_level(logging.WARNING):
-        assert native.engine_description() == "casadi"
-        native.refuse_compiling((tmp_path / "said").read_bytes().decode(errors="replace"))
-    first, second = (record.getMessage() for record in caplog.records)
-    assert first.startswith(f"the C compiler {tmp_path / 'tools' / 'gcc'} cannot be used (")
-    assert ("without a library" in first) == bool(seed % 3)
-    assert first.isprintable()
-    assert second.isprintable()
-
-
-def test_a_compiler_that_never_returns_is_ended(
-    tmp_path: Path,
-    numbers: Callable[..., np.ndarray],
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    sound = numbers()
-    tools = tmp_path / "tools"
-    tools.mkdir()
-    (tools / "gcc").write_text("#!/bin/sh\n/bin/sleep 600 & echo $! > " + str(tmp_path / "child") + "\nwait\n")
-    (tools / "gcc").chmod(0o700)
-    monkeypatch.setenv("PATH", str(tools))
-    monkeypatch.setattr(native, "PROBE_LIMIT", 0.5)
-    forget()
-    with caplog.at_level(logging.WARNING):
-        np.testing.assert_allclose(numbers(), sound, rtol=1e-9)
+        assert np.isfinite(numbers()).all()
+        numbers()
+    assert native.engine_description() == "casadi"
     (line,) = [record.getMessage() for record in caplog.records]
-    assert "hangs: not done after 0.5 s" in line
-    child, limit = int((tmp_path / "child").read_text()), time.monotonic() + 5.0
-    while _alive(child) and time.monotonic() < limit:
+    assert f"the C compiler {tmp_path / 'tools' / 'gcc'} failed (" in line
+    assert ("without a library" in line) == bool(seed % 3)
+    assert line.isprintable()
+
+
+def test_a_compiler_that_never_returns_is_ended_with_its_children(tmp_path: Path) -> None:
+    child = tmp_path / "child"
+    reason, _ = run_compiler(["sh", "-c", f"sleep 600 & echo $! > {child}; wait"], limit=0.5)
+    assert reason == "hangs: not done after 0.5 s"
+    limit = time.monotonic() + 5.0
+    while _alive(int(child.read_text())) and time.monotonic() < limit:
         time.sleep(0.02)
-    assert not _alive(child)
+    assert not _alive(int(child.read_text()))
 
 
 def _alive(number: int) -> bool:
@@ -273,10 +240,3 @@ def test_a_compiler_that_cannot_be_started_is_a_reason(tmp_path: Path) -> None:
     reason, _ = run_compiler([str(tmp_path / "none")])
     assert reason is not None
     assert reason.startswith("cannot be started")
-
-
-def test_a_library_under_the_name_of_another_is_never_loaded(tmp_path: Path) -> None:
-    library = made(tmp_path / "a")
-    other = library.rename(library.with_name("other.so"))
-    with pytest.raises(NoLibrary, match="is damaged"):
-        load_library(other)

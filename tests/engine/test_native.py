@@ -112,7 +112,7 @@ def test_a_compiler_that_fails_is_one_line(monkeypatch: pytest.MonkeyPatch, draw
     monkeypatch.setattr(
         native, "compiler_target", lambda *_: replace(compiler_target(), flags=("-mno-such-processor",))
     )
-    with pytest.raises(ShipidError, match=r"the C compiler failed \(.*no-such-processor") as caught:
+    with pytest.raises(ShipidError, match=r"the C compiler .* failed \(.*no-such-processor") as caught:
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
     assert "\n" not in str(caught.value)
 
@@ -179,11 +179,9 @@ def test_the_engine_of_a_process_is_the_one_that_it_has_by_now(
     libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No compiler is looked for to say so; a model that could not be compiled ends the native engine."""
-    if native.find_compiler() is None:
-        pytest.skip("no compiler")
     monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
     monkeypatch.setattr(native, "_refused", [])
-    native._probe_compiler.cache_clear()
+    native.compiler_target.cache_clear()
     assert native.noted_engine() is None
     assert native.engine_description() == native.noted_engine()
     native.refuse_compiling("the C compiler failed (Killed)")
