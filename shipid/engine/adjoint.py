@@ -16,16 +16,19 @@ import numpy as np
 from casadi import SX
 
 from shipid.engine.casadi import summed_rates
-from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob, integrate_step
+from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob
 from shipid.engine.native import (
     C,
     StagedSource,
+    TapeLine,
     as_c_longs,
     compile_or_explain,
     compiler_target,
     count_parts,
+    forward_statement,
     pad_samples,
     padded_width,
+    record_step,
     run_packed,
 )
 from shipid.engine.printing import STAGES, print_function
@@ -71,34 +74,7 @@ def evaluate_loss(loss: Loss, path: Array) -> tuple[Array, Array]:
     return values, slopes
 
 
-@dataclass(frozen=True)
-class _TapeLine:
-    """One line of a step: `out` = rates of (state, memory), memory after dt, or state + a k."""
-
-    kind: str
-    out: str
-    operands: tuple[str, ...]
-    number: float = 0.0
-
-
-def _record_step(step: float, method: Method) -> tuple[list[_TapeLine], str, str]:
-    """The lines of one step from `x` and `m`, and the names of the state and memory after it."""
-    lines: list[_TapeLine] = []
-
-    def note(kind: str, *operands: str, number: float = 0.0) -> str:
-        lines.append(_TapeLine(kind, f"b{len(lines)}", operands, number))
-        return lines[-1].out
-
-    after, memory_after = integrate_step(
-        lambda x, m: note("rates", x, m),
-        lambda m, dt: note("advance", m, number=dt),
-        lambda x, a, k: note("add", x, k, number=a),
-        "x", "m", step, method,
-    )  # fmt: skip
-    return lines, after, memory_after
-
-
-def _needed_values(lines: Sequence[_TapeLine]) -> set[str]:
+def _needed_values(lines: Sequence[TapeLine]) -> set[str]:
     """Names of the forward values that the sweep needs: operands of rates and memories, and their operands."""
     needed = {name for line in lines if line.kind != "add" for name in line.operands}
     for line in reversed(lines):
@@ -112,7 +88,7 @@ class _AdjointSource(StagedSource):
 
     def __init__(self, model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> None:
         self.model, self.wanted = model, wanted
-        self.tape = _record_step(step, method)
+        self.tape = record_step(step, method)
         sizes = (len(model.state) + len(model.hidden), len(model.memory), len(model.commands), len(model.environment))
         inputs = [SX.sym(name, size) for name, size in zip(INPUTS, (*sizes, len(model.parameters)), strict=True)]
         tau, dt = SX.sym("tau_extra", model.num_dof), SX.sym("dt")
@@ -177,11 +153,11 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         lines, after, memory_after = self.tape
         sizes = {"rates": len(self.model.state) + len(self.model.hidden), "advance": len(self.model.memory)}
         sizes["add"] = sizes["rates"]
-        forward, backward, needed = [], [], _needed_values(lines)
-        for line in lines:
-            size = sizes[line.kind]
-            if line.out in needed:
-                forward.append(f"V {line.out}[{max(1, size)}];" + self._forward(line, size))
+        needed = _needed_values(lines)
+        calls = "rates({0}, {1}, tau, saved0, saved1, {2});", "advance(x, {0}, {1!r}, saved0, saved1, {2});"
+        forward = [
+            forward_statement(line, sizes["rates"], sizes["advance"], *calls) for line in lines if line.out in needed
+        ]
         bars = [f"V {line.out}_bar[{max(1, sizes[line.kind])}] = {{}};" for line in lines]
         bars += [f"V x_bar[{sizes['rates']}] = {{}}, m_bar[{max(1, sizes['advance'])}] = {{}};"]
         bars += [f"for (int i = 0; i < {sizes['rates']}; ++i) {after}_bar[i] = x_next[i];"]
@@ -191,15 +167,7 @@ static void advance_back({inputs}, double step, {saved}, {bars}) {{ const V dt[1
         ends += [f"for (int i = 0; i < {sizes['advance']}; ++i) m_next[i] = m_bar[i];"]
         return "\n".join([*forward, *bars, *backward, *ends])
 
-    def _forward(self, line: _TapeLine, size: int) -> str:
-        if line.kind == "rates":
-            return f"rates({', '.join(line.operands)}, tau, saved0, saved1, {line.out});"
-        if line.kind == "advance":
-            return f"advance(x, {line.operands[0]}, {line.number!r}, saved0, saved1, {line.out});"
-        x, k = line.operands
-        return f"for (int i = 0; i < {size}; ++i) {line.out}[i] = {x}[i] + {line.number!r} * {k}[i];"
-
-    def _backward(self, line: _TapeLine, size: int) -> str:
+    def _backward(self, line: TapeLine, size: int) -> str:
         bar = f"{line.out}_bar"
         if line.kind == "rates":
             x, m = line.operands

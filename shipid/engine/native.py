@@ -14,7 +14,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -65,7 +65,7 @@ _ARRAYS = {
     **dict.fromkeys(("values", "start", "memory", "commands", "environment", "extra"), "REAL"), "goal": "const U",
     **dict.fromkeys(("records", "sums", "worst"), "REAL"), "tally": "unsigned",
 }  # fmt: skip
-_ADD = "for (int i = 0; i < {0}; ++i) {4}[i] = {1}[i] + K({2!r}) * {3}[i];"
+_ADD = "for (int i = 0; i < {0}; ++i) {3}[i] = {1}[i] + K({4!r}) * {2}[i];"
 _FOR_GCC = """#ifndef __clang__
 #pragma GCC optimize "no-tree-pre" // else registers that a step needs hold what one branch has computed: 7 % slower
 #ifndef __AVX512F__
@@ -238,29 +238,54 @@ class StagedSource:
         return "{ " + "\n".join([*heads, *lines]) + " }"
 
 
-def step_statements(
-    num_states: int, num_memory: int, rates: str, advance: str, step: float, method: Method
-) -> tuple[list[str], str, str]:
-    """C statements of one step from `x` and `m`, and the names of state and memory after it.
+@dataclass(frozen=True)
+class TapeLine:
+    """One line of a step: `out` = rates of (state, memory), memory after dt, or state + a k."""
 
-    `integrate_step` runs on names of buffers, and each operation emits a line.
+    kind: str
+    out: str
+    operands: tuple[str, ...]
+    number: float = 0.0
 
-    rates : C call with places for state, memory and result. advance : the same for memory, time [s] and result.
-    """
-    lines: list[str] = []
 
-    def named(size: int, line: str, *given: str | float) -> str:
-        out = f"b{len(lines)}"
-        lines.append(f"V {out}[{max(1, size)}]; " + line.format(*given, out))
-        return out
+def record_step(step: float, method: Method) -> tuple[list[TapeLine], str, str]:
+    """The lines of one step from `x` and `m`, and the names of the state and memory after it."""
+    lines: list[TapeLine] = []
+
+    def note(kind: str, *operands: str, number: float = 0.0) -> str:
+        lines.append(TapeLine(kind, f"b{len(lines)}", operands, number))
+        return lines[-1].out
 
     after, later = integrate_step(
-        lambda x, m: named(num_states, rates, x, m),
-        lambda m, dt: named(num_memory, advance, m, dt),
-        lambda x, a, k: named(num_states, _ADD, num_states, x, a, k),
+        lambda x, m: note("rates", x, m),
+        lambda m, dt: note("advance", m, number=dt),
+        lambda x, a, k: note("add", x, k, number=a),
         "x", "m", step, method,
     )  # fmt: skip
     return lines, after, later
+
+
+def forward_statement(line: TapeLine, num_states: int, num_memory: int, rates: str, advance: str) -> str:
+    """C statement of a line.
+
+    rates : C call with places for state, memory and result. advance : the same for memory, time [s] and result.
+    """
+    size = num_memory if line.kind == "advance" else num_states
+    if line.kind == "add":
+        text = _ADD.format(size, *line.operands, line.out, line.number)
+    elif line.kind == "rates":
+        text = rates.format(*line.operands, line.out)
+    else:
+        text = advance.format(*line.operands, line.number, line.out)
+    return f"V {line.out}[{max(1, size)}]; {text}"
+
+
+def step_statements(
+    num_states: int, num_memory: int, rates: str, advance: str, step: float, method: Method
+) -> tuple[list[str], str, str]:
+    """C statements of one step from `x` and `m`, and the names of the state and memory after it."""
+    lines, after, later = record_step(step, method)
+    return [forward_statement(line, num_states, num_memory, rates, advance) for line in lines], after, later
 
 
 def _collected_rates(model: Dynamics) -> ca.Function:
