@@ -26,9 +26,8 @@ def check_returned(
     symbols = _as_symbols(value)
     if symbols is None or symbols.shape != (count, 1):
         words = words or f"{count} {plural_word(count, 'number')}"
-        raise ShipidError(
-            f"{where} must return {words}, not {_value_words(value, symbols)}{definition_location(function)}"
-        )
+        returned = type(value).__name__ if symbols is None else f"a matrix of {symbols.shape}"
+        raise ShipidError(f"{where} must return {words}, not {returned}{definition_location(function)}")
     if is_user_code(function) and (fault := _symbol_fault(symbols, ca.veccat(*_flatten_arguments(given)))):
         raise ShipidError(f"{where} {fault}{definition_location(function)}")
     return symbols
@@ -42,15 +41,6 @@ def _as_symbols(value: Any) -> SX | None:
         return ca.SX(value)
     except (NotImplementedError, TypeError, ValueError, RuntimeError):  # CasADi, for what it takes for no matrix
         return None
-
-
-def _value_words(value: Any, symbols: SX | None) -> str:
-    if value is None:
-        return "None: end it with `return`"
-    if symbols is None:
-        many = isinstance(value, list | tuple)
-        return f"{type(value).__name__}{': join its entries by ca.vertcat' if many else ''}"
-    return f"{symbols.numel()} {plural_word(symbols.numel(), 'number')}" if symbols.is_column() else f"{symbols.shape}"
 
 
 def _flatten_arguments(given: Iterable[Any]) -> Iterable[Any]:

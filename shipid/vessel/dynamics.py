@@ -37,7 +37,7 @@ from shipid.vessel.schema import (
     vessel_model,
 )
 from shipid.vessel.schema import function_parameters as declared
-from shipid.vessel.terms import call_user_function, check_term, no_signal, term_states
+from shipid.vessel.terms import call_user_function, check_term, term_states
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
@@ -281,7 +281,9 @@ def _call_term(
     kept = {keyword: value for keyword, value in keywords.items() if keyword not in others}
     unknown = next((name for name in function_signals(function) if name not in available), None)
     if unknown is not None:
-        raise ShipidError(f"{where}: {no_signal(unknown, tuple(available))}{definition_location(function)}")
+        remedy = suggest_name(unknown, tuple(available))
+        place = definition_location(function)
+        raise ShipidError(f"{where}: its positional argument {unknown!r} is no signal: {remedy}{place}")
     taken = [available[name] for name in function_signals(function)]
     return call_user_function(where, function, *taken, **kept), [*taken, *kept.values()]
 

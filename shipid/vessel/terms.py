@@ -27,17 +27,16 @@ POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR
 @cache
 def split_keys(keys: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
     """Group and kind of each key of TERMS; ShipidError for a key that is not `<group>.<kind>`."""
-    return tuple(map(_split_key, keys))
-
-
-def _split_key(key: Any) -> tuple[str, str]:
-    group, _, kind = str(key).partition(".")
-    entry = TERMS[key]
-    place = definition_location(entry.function) if isinstance(entry, Term) and callable(entry.function) else ""
-    if isinstance(key, str) and group in GROUPS and re.fullmatch(NAME, kind) and kind not in RESERVED:
-        return group, kind
-    remedy = f"write <block>.<kind>, such as TERMS['hull.drag'], with one of the blocks {join_names(GROUPS)}"
-    raise ShipidError(f"TERMS[{key!r}]: no block of a vessel document and a kind in it: {remedy}{place}")
+    pairs = []
+    for key in keys:
+        group, _, kind = str(key).partition(".")
+        if not isinstance(key, str) or group not in GROUPS or not re.fullmatch(NAME, kind) or kind in RESERVED:
+            function = getattr(TERMS[key], "function", None)
+            place = definition_location(function) if callable(function) else ""
+            remedy = f"write <block>.<kind>, such as TERMS['hull.drag'], with one of the blocks {join_names(GROUPS)}"
+            raise ShipidError(f"TERMS[{key!r}]: no block of a vessel document and a kind in it: {remedy}{place}")
+        pairs.append((group, kind))
+    return tuple(pairs)
 
 
 def check_term(key: str) -> Term:
@@ -79,64 +78,41 @@ def _check_signature(where: str, term: Term, function: Any) -> None:
         arguments = inspect.signature(function).parameters
     except (TypeError, ValueError, NameError, AttributeError, SyntaxError) as error:
         raise ShipidError(f"{where}: its arguments cannot be read ({error}): write a plain function{place}") from None
-    for name, argument in arguments.items():
-        is_parameter = get_origin(hints.get(name)) is Annotated
-        if argument.kind is argument.VAR_POSITIONAL:
-            fault = f"`*{name}` cannot be filled: name each signal"
-        elif argument.kind in POSITIONAL:
-            sums = function is term.function and (term.components or term.drawn)  # over arrays named as they are called
-            fault = "" if sums else no_signal(name, term_signals(term))
-            fault = f"its parameter {name!r} must be behind a `*` in `def`" if is_parameter else fault
-        else:
-            fault = (
-                _parameter_fault(name, argument, get_args(hints[name]))
-                if is_parameter
-                else _without_unit(name, argument)
-            )
-        if fault:
+    sums = function is term.function and bool(term.components or term.drawn)  # over arrays named as they are called
+    for argument in arguments.values():
+        if fault := _argument_fault(argument, hints.get(argument.name), () if sums else term_signals(term)):
             raise ShipidError(f"{where}: {fault}{place}")
+
+
+def _argument_fault(argument: inspect.Parameter, hint: Any, signals: tuple[str, ...]) -> str:
+    """What is wrong with an argument; empty for nothing. signals : names of positional ones; empty: any."""
+    name, known = argument.name, get_origin(hint) is Annotated
+    parameter = f'{name}: Annotated[SX, "m"]'
+    if argument.kind in (*POSITIONAL, argument.VAR_POSITIONAL):
+        if argument.kind in POSITIONAL and not known and (not signals or name in signals):
+            return ""
+        remedy = f"a parameter is behind a `*`, with its unit: `*, {parameter}`"
+        return f"its positional argument {name!r} is no signal: {suggest_name(name, signals)}: {remedy}"
+    base, unit = get_args(hint)[:2] if known else (hint, None)
+    tables = any(get_origin(one) in (Mapping, dict) or one in (Mapping, dict) for one in (base, *get_args(base)))
+    if name in RESERVED:
+        return f"its parameter {name!r} is a key that blocks have anyway: use another name"
+    if argument.kind is argument.VAR_KEYWORD or tables:
+        return "" if isinstance(unit, Grammar) else f"{name!r} is a table and needs a grammar of shipid.physics.grammar"
+    if not isinstance(unit, str | Grammar):
+        return f"its parameter {name!r} has no unit: write `{parameter}`; a constant belongs outside the signature"
+    if isinstance(unit, str) and (remedy := unit_fault(unit)):
+        return f"the unit {unit!r} of its parameter {name!r} is not known: {remedy}"
+    default = argument.default
+    if default not in (argument.empty, None) and (isinstance(default, bool) or not isinstance(default, Real)):
+        return f"the default of its parameter {name!r} must be a number, not {default!r}"
+    return ""
 
 
 def term_signals(term: Term) -> tuple[str, ...]:
     """Positional arguments that the functions of a term may have, beside the arrays that it sums over."""
     own = [name for name in MOTION if name != "state" or term.states is not None]
     return (*own, *GIVEN, *rows_of_role("command"), *rows_of_role("environment"))
-
-
-def no_signal(name: str, valid: tuple[str, ...]) -> str:
-    """What is wrong with a positional argument; empty for the name of a signal."""
-    if name in valid:
-        return ""
-    if name == "state":
-        return "it takes `state` and has no `states`: write Term(..., states=..., rates=...)"
-    remedy = f'a parameter is behind a `*`, with its unit: `*, {name}: Annotated[SX, "m"]`'
-    return f"its positional argument {name!r} is no signal: {suggest_name(name, valid)}: {remedy}"
-
-
-def _without_unit(name: str, argument: inspect.Parameter) -> str:
-    if argument.kind is argument.VAR_KEYWORD:
-        return f"`**{name}` has no grammar: write `**{name}: Annotated[SX, ...]` with one of shipid.physics.grammar"
-    constant = "" if argument.default is argument.empty else "; a constant belongs outside the signature"
-    return f'its parameter {name!r} has no unit: write `{name}: Annotated[SX, "m"]` with its unit{constant}'
-
-
-def _parameter_fault(name: str, argument: inspect.Parameter, parts: tuple[Any, ...]) -> str:
-    """What is wrong with a parameter of the type `Annotated[*parts]`; empty for nothing."""
-    base, unit, *_ = parts
-    tables = any(get_origin(one) in (Mapping, dict) or one in (Mapping, dict) for one in (base, *get_args(base)))
-    if name in RESERVED:
-        return f"its parameter {name!r} is a key that blocks have anyway: use another name"
-    if argument.kind is argument.VAR_KEYWORD or tables:
-        of = "a table" if tables else "`**`"
-        return "" if isinstance(unit, Grammar) else f"{name!r} is {of} and needs a grammar of shipid.physics.grammar"
-    if not isinstance(unit, str | Grammar):
-        return f"the unit of its parameter {name!r} must be a text, such as 'm', not {unit!r}"
-    if isinstance(unit, str) and (remedy := unit_fault(unit)):
-        return f"the unit {unit!r} of its parameter {name!r} is not known: {remedy}"
-    default = None if argument.default is argument.empty else argument.default
-    if default is not None and (isinstance(default, bool) or not isinstance(default, Real)):
-        return f"the default of its parameter {name!r} must be a number, not {default!r}"
-    return ""
 
 
 def term_states(key: str, block: Mapping[str, Any]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.engine.adjoint import _needed_values, _record_step, evaluate_loss
+from shipid.engine.adjoint import _needed_values, evaluate_loss, record_step
 from shipid.errors import ShipidError
 
 
@@ -23,7 +23,7 @@ def test_a_loss_of_wrong_shapes_is_refused() -> None:
 
 @pytest.mark.parametrize(("method", "stages"), [("euler", 1), ("rk4", 4)])
 def test_the_recorded_step_has_the_stages_of_the_method(method: str, stages: int) -> None:
-    lines, after, memory_after = _record_step(0.5, method)  # type: ignore[arg-type]
+    lines, after, memory_after = record_step(0.5, method)  # type: ignore[arg-type]
     assert sum(line.kind == "rates" for line in lines) == stages
     assert {after, memory_after} <= {line.out for line in lines}
     advances = [line.number for line in lines if line.kind == "advance"]
@@ -31,7 +31,7 @@ def test_the_recorded_step_has_the_stages_of_the_method(method: str, stages: int
 
 
 def test_only_operands_of_nonlinear_functions_are_needed() -> None:
-    lines, after, _ = _record_step(0.5, "rk4")
+    lines, after, _ = record_step(0.5, "rk4")
     needed = _needed_values(lines)
     assert after not in needed  # the last sum is linear
     assert {line.operands[0] for line in lines if line.kind == "rates"} <= needed

@@ -30,11 +30,11 @@ def test_symbols_and_numbers_pass(value: Any) -> None:
 @pytest.mark.parametrize(
     ("value", "found"),
     [
-        (v, "1 number"),
-        (ca.vertcat(v, v, v), "3 numbers"),
-        (ca.horzcat(v, v), r"\(1, 2\)"),
-        (None, "None: end it with `return`"),
-        ([v, v], "list: join its entries by ca.vertcat"),
+        (v, r"a matrix of \(1, 1\)"),
+        (ca.vertcat(v, v, v), r"a matrix of \(3, 1\)"),
+        (ca.horzcat(v, v), r"a matrix of \(1, 2\)"),
+        (None, "NoneType"),
+        ([v, v], "list"),
         (ca.MX.sym("v", 2), "MX"),
         ({}, "dict"),
     ],
