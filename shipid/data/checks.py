@@ -20,9 +20,8 @@ from shipid.data.dataset import (
     stretches_of_runs,
     unit_of_column,
 )
-from shipid.data.lapses import CommandFault, find_command_faults
 from shipid.errors import DataError
-from shipid.physics.signals import is_all_round, signal_row
+from shipid.physics.signals import signal_row
 
 Plane = np.ndarray[Any, np.dtype[np.complex128]]
 
@@ -40,12 +39,6 @@ LEAST_DELAY, LONGEST_DELAY, DELAY_SHARE = (
     0.35,
 )  # s: least delay reported, longest tried; share of the misfit it explains
 LEAST_DELAY_WINDOWS, MOST_DELAY_WINDOWS = 20, 5000  # windows that show a delay
-FAULT_WORDS = {
-    "zero": "is 0 for a moment, faster than it moves elsewhere",
-    "spike": "leaves its course and comes back, faster than it moves elsewhere",
-    "still": "repeats one value while the ship turns to both sides, and is noisy in other turns",
-    "pause": "is 0 for a moment, with the same order before and after, which may have been ordered",
-}
 LEAST_CHANGE, SPIKE_MISFIT = 0.1, 6.0  # of the larger changes: less says nothing; of the usual misfit: more is a spike
 
 
@@ -59,18 +52,21 @@ def check_dataset(dataset: Dataset) -> pd.DataFrame:
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     by_run = stretches_by_run(dataset)
     motions = {run: _motion(stretches) for run, stretches in by_run.items()}
-    faulty = _check_commands(dataset)
     table = []
     for run, stretches in by_run.items():
         heading = [*_check_heading(stretches)]
         rate_is_right = any(row["check"] == "heading scale" and row["ok"] and row["value"] for row in heading)
-        results = [*_check_clock(stretches), *_check_ranges(stretches, {"r"} if rate_is_right else set()), *heading]
-        results += [
-            *_check_path(stretches),
-            _check_frozen(stretches),
-            _check_overlap(run, motions, shares_clock(dataset)),
+        table += [
+            {"run": run, **row}
+            for row in (
+                *_check_clock(stretches),
+                *_check_ranges(stretches, {"r"} if rate_is_right else set()),
+                *heading,
+                *_check_path(stretches),
+                _check_frozen(stretches),
+                _check_overlap(run, motions, shares_clock(dataset)),
+            )
         ]
-        table += [{"run": run, **row} for row in [*results, *faulty.get(run, [])]]
     return pd.DataFrame(table)[["check", "run", "value", "unit", "limit", "ok", "sentence"]]
 
 
@@ -95,42 +91,26 @@ def _check_clock(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
         GAP_STEPS * usual + slack,
         f"the longest step is {longest:.3g} s, the usual one {usual:.3g} s",
     )
-    jitter = float(np.sqrt(np.mean((steps - usual) ** 2))) / usual
-    sentence = f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS)"
-    fits = _clock_fits_motion(stretches) if jitter > JITTER_LIMIT and longest <= GAP_STEPS * usual + slack else False
-    rounded = fits is None and float(np.std(steps)) <= JITTER_LIMIT * usual
-    words = "; are the times those of the samples, or of their arrival?"
-    if jitter <= JITTER_LIMIT:
-        words = ""
-    elif fits:
-        words = "; positions and heading bear them out"
-    elif rounded:
-        words = "; so little comes of a clock that rounds"
-    elif fits is None:
-        words += " Positions and heading are too noisy, or too steady, to tell"
-    yield _check_row(
-        "jitter", jitter, "1", JITTER_LIMIT, f"{sentence}{words}", ok=jitter <= JITTER_LIMIT or rounded or bool(fits)
-    )
+    jitter = float(np.std(steps)) / usual
+    even = jitter <= JITTER_LIMIT
+    fits = even or (longest <= GAP_STEPS * usual + slack and _clock_fits_motion(stretches))
+    words = "" if even else "; are the times those of the samples, or of their arrival?"
+    words = "; positions and heading bear them out" if fits and not even else words
+    sentence = f"steps differ from {usual:.3g} s by {100 * jitter:.2g} % (RMS){words}"
+    yield _check_row("jitter", jitter, "1", JITTER_LIMIT, sentence, ok=fits)
 
 
-def _clock_fits_motion(stretches: list[pd.DataFrame]) -> bool | None:
-    """Whether positions or heading are smoother on their clock than on one with even steps; None: they cannot tell.
-
-    Neither may be rougher on it. Noise hides both a clock that is right and one that is wrong.
-    """
-    long = [rows for rows in stretches if len(rows) >= 5]
-    smoother = False
+def _clock_fits_motion(stretches: list[pd.DataFrame]) -> bool:
+    """Whether positions or heading are smoother on their clock than on one with even steps, and neither is rougher."""
+    ratios = []
     for names in (("north", "east"), ("psi",)):
+        columns = [(rows, name) for rows in stretches if len(rows) >= 5 for name in names]
         uneven, even = (
-            root_mean_square(
-                np.array([_roughness_on_clock(rows, name, clock) for rows in long for name in names] or [0.0])
-            )
+            float(np.sum([_roughness_on_clock(rows, name, clock) ** 2 for rows, name in columns]))
             for clock in (True, False)
         )
-        if uneven > ROUGHNESS_RATIO * even:
-            return False
-        smoother |= even > ROUGHNESS_RATIO * uneven
-    return True if smoother else None
+        ratios.append(np.sqrt(uneven / even) if even else 1.0)
+    return bool(ratios and max(ratios) <= ROUGHNESS_RATIO and min(ratios) < 1 / ROUGHNESS_RATIO)
 
 
 def _roughness_on_clock(rows: pd.DataFrame, name: str, clock: bool) -> float:
@@ -152,35 +132,6 @@ def _check_ranges(stretches: list[pd.DataFrame], proved: set[str]) -> Iterator[d
             yield _check_row(f"range {name}", largest, unit, row.plausible, sentence, ok=name in proved or None)
 
 
-def _check_commands(dataset: Dataset) -> dict[str, list[dict[str, Any]]]:
-    """Run -> a failure for each command that lapses in it; what is usual for a command say all runs together."""
-    parts = [*stretches_of_runs(dataset)]
-    psi = np.concatenate([np.unwrap(rows["psi"]) for _, rows in parts])
-    t = np.concatenate([rows["t"] for _, rows in parts])
-    runs = np.concatenate([np.full(len(rows), run, dtype=object) for run, rows in parts])
-    steps = np.diff(t)
-    follows = np.ones(len(steps), dtype=bool)
-    follows[np.cumsum([len(rows) for _, rows in parts])[:-1] - 1] = False
-    if not follows.any():
-        return {}
-    follows &= steps <= GAP_STEPS * np.median(steps[follows])
-    found: dict[str, list[dict[str, Any]]] = {}
-    for name in dataset.commands:
-        values = np.concatenate([np.unwrap(rows[name]) if is_all_round(name) else rows[name] for _, rows in parts])
-        by_run: dict[str, list[CommandFault]] = {}
-        for lapse in find_command_faults(name, t, values, psi, follows):
-            by_run.setdefault(runs[lapse.first], []).append(lapse)
-        for run, some in by_run.items():
-            count = sum(lapse.end - lapse.first for lapse in some)
-            said = [words for kind, words in FAULT_WORDS.items() if any(lapse.kind == kind for lapse in some)]
-            where = f"{count} row{'s' * (count > 1)}, the first at t = {t[some[0].first]:.10g} s"
-            ordered = all(lapse.kind == "pause" for lapse in some)
-            by = "a break" if any(lapse.kind == "still" for lapse in some) else "despike or a break"
-            sentence = f"{name} {' and '.join(said)}: {where}. If it was not so, mend it in the mapping by {by}"
-            found.setdefault(run, []).append(_check_row(f"lapses {name}", float(count), "1", 0.0, sentence, ok=ordered))
-    return found
-
-
 def white_noise_of(values: Array) -> float:
     """Standard deviation of the white noise of a smooth signal (N,), from its second differences.
 
@@ -192,17 +143,8 @@ def white_noise_of(values: Array) -> float:
     return float(np.median(np.abs(np.diff(values, 2))) / (0.6745 * np.sqrt(6.0)))
 
 
-@dataclass(frozen=True)
-class _TurningWindows:
+def _compare_turning(stretches: list[pd.DataFrame]) -> tuple[Array, Array, Array]:
     """Changes of heading and integrals of r over windows (K,) [rad], and the standard deviation of their difference."""
-
-    seen: Array
-    integrated: Array
-    error: Array
-
-
-def _compare_turning(stretches: list[pd.DataFrame]) -> _TurningWindows:
-    """Compare heading and yaw rate over windows that do not overlap, with the error that their noise makes."""
     seen, integrated, errors = [], [], []
     for rows in stretches:
         t, psi, r = (rows[name].to_numpy() for name in ("t", "psi", "r"))
@@ -223,8 +165,8 @@ def _compare_turning(stretches: list[pd.DataFrame]) -> _TurningWindows:
             + width * (usual * curvature / 12) ** 2
         )
         errors.append(np.full(len(edges) - 1, np.sqrt(variance)))
-    join = [np.concatenate(parts) if parts else np.empty(0) for parts in (seen, integrated, errors)]
-    return _TurningWindows(*join)
+    seen, integrated, errors = (np.concatenate([np.empty(0), *parts]) for parts in (seen, integrated, errors))
+    return seen, integrated, errors
 
 
 def _check_heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
@@ -233,19 +175,19 @@ def _check_heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     A difference is reported where it is large and not made by noise: neither a noisy log in good order nor a small
     error of an exact one fails.
     """
-    windows = _compare_turning(stretches)
-    if len(windows.seen) < 2:
+    turned, integrated, errors = _compare_turning(stretches)
+    if len(turned) < 2:
         return
     size = root_mean_square(np.concatenate([rows["r"].to_numpy() for rows in stretches]))
-    change = root_mean_square(windows.seen)
+    change = root_mean_square(turned)
     if max(size, change / WINDOW_SECONDS) < LEAST_YAW_RATE:
         yield _check_row("heading scale", 0.0, "1", 0.0, "too straight to compare heading and rate", ok=True)
         return
-    error, noise = windows.seen - windows.integrated, root_mean_square(windows.error)
+    error, noise = turned - integrated, root_mean_square(errors)
     chance = noise * np.sqrt(1 + STANDARD_ERRORS * np.sqrt(2 / len(error)))  # of a mean square of so many
-    power = float(np.sum(windows.integrated**2)) or 1.0
-    scale = float(np.sum(windows.seen * windows.integrated)) / power
-    spread = root_mean_square(windows.seen - scale * windows.integrated) / np.sqrt(power)
+    power = float(np.sum(integrated**2)) or 1.0
+    scale = float(np.sum(turned * integrated)) / power
+    spread = root_mean_square(turned - scale * integrated) / np.sqrt(power)
     words = "; wrong sign of r or psi?" if scale < 0 else "; degrees or another unit?"
     sentence = f"changes of psi are {scale:.3f} +- {spread:.2g} times the integral of r{words}"
     limit = SCALE_ERROR + STANDARD_ERRORS * spread
@@ -389,15 +331,11 @@ def _path_noise(rows: pd.DataFrame, speed: Array) -> float:
 
 def _drift_of_positions(rows: pd.DataFrame) -> Array:
     """Distance [m] between positions and integrated velocities, which start together every 30 s, (N,)."""
-    t, psi, u, v = (rows[name].to_numpy() for name in ("t", "psi", "u", "v"))
-    rates = (u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi))
+    t = rows["t"].to_numpy()
     part = np.floor((t - t[0]) / DRIFT_SECONDS + 1e-9).astype(int)
     start = np.flatnonzero(np.diff(part, prepend=-1))[np.cumsum(np.diff(part, prepend=-1) > 0) - 1]
-    errors = [
-        rows[name].to_numpy() - cumulative_integral(t, rate)
-        for name, rate in zip(("north", "east"), rates, strict=True)
-    ]
-    return np.asarray(np.hypot(*(error - error[start] for error in errors)))
+    error = (rows["north"] + 1j * rows["east"]).to_numpy() - travelled_path(rows)
+    return np.asarray(np.abs(error - error[start]))
 
 
 def check_series(dataset: Dataset) -> pd.DataFrame:
@@ -474,15 +412,8 @@ def _copies_among(dataset: Dataset, runs: Iterable[str], earlier: list[str], *, 
 
 def _share_in_other_run(mine: _Motion, other: _Motion, shared: bool) -> float:
     """Share of the rows of a run that another run has, too: the same instants of one clock, or the same motion."""
-    if shared:
-        t, instants = mine.t, other.t
-        at = np.clip(np.searchsorted(instants, t), 1, len(instants) - 1) if len(instants) > 1 else np.zeros(len(t), int)
-        near = np.minimum(np.abs(instants[at] - t), np.abs(instants[at - 1] - t))
-        slack = 0.25 * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
-        share = float(np.mean(near <= slack))
-        if share > 0:
-            return share
-    return _share_of_same_motion(mine, other)
+    same = float(np.mean(np.isin(mine.t, other.t))) if shared else 0.0
+    return max(same, _share_of_same_motion(mine, other))
 
 
 def _share_of_same_motion(mine: _Motion, other: _Motion) -> float:
