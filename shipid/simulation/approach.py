@@ -17,15 +17,16 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import course_helmsman
 from shipid.physics.signals import ACTUAL, is_shaft, is_steering, neutral_value
-from shipid.units import GRAVITY, join_names
+from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
+from shipid.vessel.stability import bisect_root
 
 Array = NDArray[np.float64]
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
 FROUDE = 0.2  # of the service speed of a ship whose document gives none
-MOST_SHAFT, HALVINGS = 1000.0, 60  # rev/s; of the interval of a shaft speed
+MOST_SHAFT = 1000.0  # rev/s: no screw turns so fast
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
@@ -36,7 +37,6 @@ CREEPING, AT_REST = 0.02, 1e-4  # Froude numbers: a ship below the second, or as
 KEEPING = 0.35  # rad: greatest helm of the helmsman that holds the approach
 LENGTH, FASTEST = 100.0, 100.0  # m, of a ship whose document does not say; m/s
 REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from rest (approach = "rest")'
-SWINGING = {"w", "p", "q"}  # velocities that nothing but damping ends
 
 
 @dataclass(frozen=True)
@@ -194,10 +194,7 @@ def balanced_shaft(controls: Controls, speed: float) -> float | None:
         if high >= MOST_SHAFT:
             return None
         low, high = high, min(2 * high, MOST_SHAFT)
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if surplus(middle) < 0 else (low, middle)
-    return high
+    return bisect_root(surplus, low, high)
 
 
 class NotStraight(ShipidError):
@@ -266,9 +263,8 @@ def steady_approach(
                 f"take a smaller step than {step:g} s"
             )
         velocities = model.state[model.num_dof :]
-        changes = {name: np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities}
-        unsettled = np.max(list(changes.values()), axis=0) >= settled[moving]
-        restless = [name for name, change in changes.items() if (change >= settled[moving]).any()]
+        changes = [np.abs(path[name][-1, 0] - state[name][moving]) for name in velocities]
+        unsettled = np.max(changes, axis=0) >= settled[moving]
         if held:  # on course, too: a slow integral part changes the velocities little
             unsettled |= np.abs(path["psi"][-1, 0]) >= SETTLED
         for name in names:
@@ -290,10 +286,7 @@ def steady_approach(
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
             return Approach(state | {name: np.zeros(count) for name in anew}, kept, helm)
     remedy = 'start from rest (approach = "rest")' if held else REMEDY
-    if restless and set(restless) <= SWINGING:
-        remedy = f"its hull damps {join_names(restless)} too little (Z_w, K_p and M_q do so), or {remedy}"
-    still = f", {join_names(restless)} still {'changes' if len(restless) == 1 else 'change'}" if restless else ""
-    ahead = f"straight ahead at {_rpm_words(n[moving], moving >= 0)} rpm{still}"
+    ahead = f"straight ahead at {_rpm_words(n[moving], moving >= 0)} rpm"
     raise NotStraight(f"{vessel.name} is not steady after {longest:.0f} s {ahead}: {remedy}")
 
 
@@ -323,13 +316,14 @@ def _steady_speed(controls: Controls, n: float) -> float:
 
 def _balanced_speed(vessel: Vessel, orders: Mapping[str, float]) -> float:
     """Speed ahead [m/s] at which the surge acceleration is 0 with these commands, the others neutral."""
+
+    def shortfall(speed: float) -> float:
+        return -float(straight_acceleration(vessel, speed, orders)[0])
+
     low, high = 0.0, 0.1
-    while high < FASTEST and straight_acceleration(vessel, high, orders)[0] > 0:
+    while high < FASTEST and shortfall(high) < 0:
         low, high = high, 2 * high
-    for _ in range(30):
-        middle = (low + high) / 2
-        low, high = (middle, high) if straight_acceleration(vessel, middle, orders)[0] > 0 else (low, middle)
-    return high
+    return bisect_root(shortfall, low, high, 30)
 
 
 def _held_helm(

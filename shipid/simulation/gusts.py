@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.checked import CheckedModel
-from shipid.errors import DocumentError
 from shipid.vessel.perturb import uniform_draw
 
 Array = NDArray[np.float64]
@@ -51,13 +50,7 @@ def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tup
     Parameters
     ----------
     keys : for each of the S series the key of its random draws, such as (seed, "manoeuvre", number).
-
-    Raises
-    ------
-    DocumentError : a mean speed is negative.
     """
-    if np.any(mean_speed < 0):
-        raise DocumentError(f"mean wind speed must be at least 0 m/s, not {np.min(mean_speed):g}", path="gusts")
     amplitudes = np.sqrt(2 * _bin_variances(gusts, mean_speed))
     result = np.empty((len(time), len(mean_speed)))
     # one by one: no series may depend on the others, not even in the last bit

@@ -111,16 +111,9 @@ def perform_manoeuvres(
 
 def _check_manoeuvres(given: Any) -> list[Manoeuvre]:
     """One manoeuvre or several as a list; ShipidError for what is none, and for no manoeuvre."""
-    given = [given] if isinstance(given, Manoeuvre | str) else given
-    if not isinstance(given, Iterable):
-        raise ShipidError(f"manoeuvres must be a manoeuvre, or several, not {given!r}")
-    manoeuvres = list(given)
-    for one in manoeuvres:
-        if not isinstance(one, Manoeuvre):
-            remedy = "give some of `shipid.simulation.manoeuvre`, such as Zigzag(...)"
-            raise ShipidError(f"{one!r} is no manoeuvre: {remedy}")
-    if not manoeuvres:
-        raise ShipidError("no manoeuvre is given: give at least one")
+    manoeuvres = list(given) if isinstance(given, Iterable) and not isinstance(given, Manoeuvre | str) else [given]
+    if not manoeuvres or not all(isinstance(one, Manoeuvre) for one in manoeuvres):
+        raise ShipidError(f"give manoeuvres of `shipid.simulation.manoeuvre`, such as Zigzag(...), not {given!r}")
     return manoeuvres
 
 

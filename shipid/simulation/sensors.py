@@ -12,14 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid.arguments import whole_steps
 from shipid.checked import CheckedModel
-from shipid.errors import DocumentError, suggest_name
+from shipid.errors import DocumentError
 from shipid.physics.signals import is_wrapped_angle
 from shipid.vessel.perturb import uniform_draw
 
 Array = NDArray[np.float64]
 NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
-UNMEASURED = ("run", "t", "flags")
 SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
 
@@ -50,20 +49,10 @@ def measure_record(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: 
     ----------
     fine : columns `run`, `t` [s] and others (SI), `t` in equal steps within each run.
 
-    Raises
-    ------
-    DocumentError : a sensor has no column, or `interval` is no multiple of the record's step.
+    DocumentError where a run is no clock of equal steps, or `interval` no multiple of them.
     """
-    _check_sensor_columns(sensors, [str(name) for name in fine.columns])
     logs = [_measure_run(str(run), rows, sensors, interval, seed) for run, rows in fine.groupby("run", sort=False)]
     return pd.concat(logs, ignore_index=True)
-
-
-def _check_sensor_columns(sensors: Mapping[str, Sensor], columns: list[str]) -> None:
-    valid = [name for name in columns if name not in UNMEASURED]
-    for name in sensors:
-        if name not in valid:
-            raise DocumentError(f"no column {name!r} to measure: {suggest_name(name, valid)}", path="sensors")
 
 
 def _measure_run(

@@ -88,7 +88,7 @@ def define_standard(
         raise ShipidError(f"no manoeuvre is called {name!r}: {suggest_name(name, kinds)}", path="NAME")
     kind = kinds[name]
     angles = as_float_array("angles", angles).ravel().tolist()
-    _check_angles(name, angles, kind.angles)
+    _check_angles(name, angles, len(kind.angles))
     if not isinstance(side, str) or side not in get_args(Side):
         raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
     if not isinstance(approach, str) or approach not in APPROACHES:
@@ -134,17 +134,14 @@ def define_standard(
     return Standard(name, manoeuvre.title(name.replace("-", " ")), manoeuvre, float(asked), interval / STEPS, interval)
 
 
-def _check_angles(name: str, angles: Sequence[float], wanted: Sequence[str]) -> None:
-    """Refuse angles [deg] that are not as wanted; warn of a helm that may be in rad."""
-    most = len(wanted)
+def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
+    """Refuse angles [deg] that a kind does not take, or that are none."""
     if len(angles) > most:
         raise ShipidError(f"{name} takes {most or 'no'} {plural_word(most, 'angle')}", path="ANGLES")
-    if any(angle <= 0 for angle in angles):
-        raise ShipidError("angles are positive: --side gives the direction of the first turn", path="ANGLES")
-    for place, angle in enumerate(angles):
-        greatest = MOST_HEADING if place else MOST_HELM
-        if not angle <= greatest:
-            raise ShipidError(f"{angle:g} deg: give at most {greatest:g} deg", path="ANGLES")
+    for angle, greatest in zip(angles, (MOST_HELM, MOST_HEADING), strict=False):
+        if not 0 < angle <= greatest:
+            remedy = f"angles are above 0 and at most {greatest:g} deg; --side gives the direction of the first turn"
+            raise ShipidError(f"{angle:g} deg: {remedy}", path="ANGLES")
 
 
 def shaft_speed(controls: Controls, speed: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -15,6 +15,14 @@ WATER = "waves."  # prefix of states of the water, which no motion changes: time
 STEP, FINE = 1e-4, 1e-2  # size of a small yaw over the speed; of differences about it over that size
 SHARE = 0.1  # of sway or yaw in a motion: a motion with less, such as roll or heave, is no yaw
 TURNS = 2  # of the search for the motion that grows most to one side
+
+
+def bisect_root(function: Callable[[float], float], low: float, high: float, halvings: int = 60) -> float:
+    """Root of a function that is negative at low and positive at high; the upper end if it never is."""
+    for _ in range(halvings):
+        middle = (low + high) / 2
+        low, high = (middle, high) if function(middle) < 0 else (low, middle)
+    return high
 
 
 def yaw_growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:

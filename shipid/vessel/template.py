@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,7 +34,7 @@ from shipid.vessel.regressions import (
     thrust_polynomial,
     wave_resistance,
 )
-from shipid.vessel.stability import yaw_growth
+from shipid.vessel.stability import bisect_root, yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -413,7 +413,7 @@ def guess_screw(given: Particulars) -> Screw:
     n = given.rpm / 60
     if given.propeller_diameter is None and not _is_pitch_between(given, D, n, (PITCHES[0], STRONG_PITCH)):
         least, most = (share * given.draught for share in DIAMETERS)
-        wanted = _bisect_root(lambda size: _thrust_surplus(given, size, n, PITCH), least, most)
+        wanted = bisect_root(lambda size: _thrust_surplus(given, size, n, PITCH), least, most)
         if least < wanted < most:
             D, words = wanted, f"drives {given.service:.3g} m/s at {60 * n:.4g} rpm with P / D = {PITCH:g}"
     if not _is_pitch_between(given, D, n, PITCHES):
@@ -423,7 +423,7 @@ def guess_screw(given: Particulars) -> Screw:
             f"{high:.3g} rpm could. Is it the engine's speed, not the screw's? Is --speed another one?",
             path="--rpm",
         )
-    pitch = _bisect_root(lambda ratio: _thrust_surplus(given, D, n, ratio), *PITCHES)
+    pitch = bisect_root(lambda ratio: _thrust_surplus(given, D, n, ratio), *PITCHES)
     balance = f"P / D = {pitch:.3g} balances the resistance at {given.service:.3g} m/s and {60 * n:.4g} rpm"
     return Screw(D, n, pitch, thrust_polynomial(pitch), {"D_p": words, "K_T": balance})
 
@@ -436,7 +436,7 @@ def _is_pitch_between(given: Particulars, D: float, n: float, pitches: tuple[flo
 
 def _shaft_speed_of_screw(given: Particulars, D: float, pitch: float) -> float:
     """Shaft speed [rev/s] at which a screw drives the ship at its service speed."""
-    return _bisect_root(lambda n: _thrust_surplus(given, D, n, pitch), 0.0, FASTEST)
+    return bisect_root(lambda n: _thrust_surplus(given, D, n, pitch), 0.0, FASTEST)
 
 
 def _thrust_surplus(given: Particulars, D: float, n: float, pitch: float) -> float:
@@ -445,14 +445,6 @@ def _thrust_surplus(given: Particulars, D: float, n: float, pitch: float) -> flo
     J = min((1 - _wake_fraction(given)[0]) * given.service / (max(n, 1e-3) * D), J_MOST)
     thrust = given.rho * n**2 * D**4 * (k_0 + J * (k_1 + J * k_2))
     return given.units * (1 - _thrust_deduction(given, D)[0]) * thrust - total_resistance(given)
-
-
-def _bisect_root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Root of a function that is negative at low and positive at high; the upper end if it never is."""
-    for _ in range(60):
-        middle = (low + high) / 2
-        low, high = (middle, high) if function(middle) < 0 else (low, middle)
-    return high
 
 
 def propeller_values(given: Particulars, side: int = 0) -> Values:
@@ -564,7 +556,7 @@ def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, f
 
     needed, balanced = total_resistance(given), f"{given.service:.3g} m/s and {given.rpm:.4g} rpm"
     if known is None:
-        D = _bisect_root(lambda diameter: thrust(diameter) - needed, *(share * given.draught for share in DIAMETERS))
+        D = bisect_root(lambda diameter: thrust(diameter) - needed, *(share * given.draught for share in DIAMETERS))
         size = f"balances the resistance at {balanced}"
     scale = needed / thrust(D) if thrust(D) > 0 else math.inf
     if not SCALES[0] <= scale <= SCALES[1]:
@@ -668,4 +660,4 @@ def _service_shaft(vessel: Vessel, speed: float) -> float:
         low, high = high, 2 * high
     if high >= 1e3:
         raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
-    return _bisect_root(surge, low, high)
+    return bisect_root(surge, low, high)

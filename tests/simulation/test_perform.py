@@ -91,7 +91,7 @@ def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
 @pytest.mark.parametrize(
     ("manoeuvres", "how", "message"),
     [
-        ([], {}, "no manoeuvre is given"),
+        ([], {}, "give manoeuvres of"),
         ([CIRCLE], {"interval": 0.25}, "interval 0.25 s must be a multiple of step 0.1 s"),
         ([CIRCLE], {"interval": 0.01}, "must be a multiple"),
         ([CIRCLE.model_copy(update={"name": "a"})] * 2, {}, "two runs are named 'a'"),
@@ -132,10 +132,7 @@ def test_a_zigzag_in_waves_still_turns_at_the_execute_heading() -> None:
     [
         ({"environment": {"V_w": [3.0, 4.0, 5.0]}}, "environment 'V_w' must be one value or 2"),
         ({"components": {"waves.drift": np.zeros((1, 1, 41))}}, "for 1 ships, and there are 2 manoeuvres"),
-        ({"interval": 0.0}, "interval must be a number above 0 and finite, not 0"),
-        ({"step": 0}, "step must be a number above 0 and finite, not 0"),
         ({"step": np.nan}, "step must be a number above 0 and finite, not nan"),
-        ({"duration": -5.0}, "duration must be a number above 0 and finite, not -5"),
         ({"method": "RK4"}, "method 'RK4' is not known: did you mean 'rk4'"),
         ({"outputs": ["port.thrus"]}, r"outputs 'port\.thrus' is not known: did you mean 'port\.thrust'\?"),
         ({"environment": {"V_w": "3"}}, "environment 'V_w' must be an array of numbers, not str"),

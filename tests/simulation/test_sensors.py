@@ -105,15 +105,6 @@ def test_draws_depend_on_seed_run_and_column_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "message"),
-    [("psy", "did you mean 'psi'"), ("run", "valid: north, psi, u, v"), ("flags", "no column 'flags'")],
-)
-def test_a_sensor_needs_a_column(name: str, message: str) -> None:
-    with pytest.raises(DocumentError, match=message):
-        measure_record(record(), {name: Sensor()}, 1.0, seed=1)
-
-
-@pytest.mark.parametrize(
     "block", [{"noise": -0.1}, {"bias": -1.0}, {"latency": -1.0}, {"interval": 0.0}, {"quantum": -1}, {"drift": 1.0}]
 )
 def test_wrong_blocks_are_refused(block: dict[str, Any]) -> None:
