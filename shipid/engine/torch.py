@@ -19,7 +19,7 @@ CPU_BLOCK, DEVICE_BLOCK = (
     16384,
     1048576,
 )  # samples x variants of one block, by `python -m tests.benchmarks rollouts`, `gpu`
-LEAST_BLOCK = 256  # samples of one block of a large family
+LEAST_SAMPLES = 256  # samples of one block of a large family
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,5 +196,5 @@ def _series_at(series: torch.Tensor, k: int) -> torch.Tensor:
 def _block_width(num_samples: int, num_variants: int, num_components: int, device: str) -> int:
     """Number of samples in a block: about equal blocks whose intermediate results fit in the cache."""
     most = (CPU_BLOCK if device == "cpu" else DEVICE_BLOCK) // num_variants
-    most = max(max(LEAST_BLOCK, most) // num_components, 1)
+    most = max(max(LEAST_SAMPLES, most) // num_components, 1)
     return -(-num_samples // -(-num_samples // most))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from shipid.document import Document
@@ -43,46 +43,41 @@ def bind_block(path: str, block: Mapping[str, Any], declared: tuple[Parameter, .
     return result
 
 
+def _equation_blocks(
+    document: Document,
+) -> Iterator[tuple[str, Mapping[str, Any], tuple[Parameter, ...], str | None]]:
+    """Dotted path, block and parameters of all that the equations use; of an actuator, too, the unit that it moves."""
+    yield "inertia", document["inertia"], function_parameters(rigid_body_entries), None
+    yield "added_mass", document.get("added_mass", {}), function_parameters(added_mass_entries), None
+    for path, key, block in term_blocks(document):
+        yield path, block, term_parameters(TERMS[key]), None
+        for command, actuator in active_actuators(block):
+            declared = function_parameters(ACTUATORS[actuator["kind"]].advance)
+            yield f"{path}.actuator.{command}", actuator, declared, SIGNALS[command].unit
+
+
 def bind_document(document: Document) -> dict[str, Binding]:
     """Dotted path of every block that the equations use -> the binding of its function's keywords."""
-    result = {"inertia": bind_block("inertia", document["inertia"], function_parameters(rigid_body_entries))}
-    result["added_mass"] = bind_block(
-        "added_mass", document.get("added_mass", {}), function_parameters(added_mass_entries)
-    )
-    for path, key, block in term_blocks(document):
-        result[path] = bind_block(path, block, term_parameters(TERMS[key]))
-        for command, actuator in active_actuators(block):
-            where = f"{path}.actuator.{command}"
-            result[where] = bind_block(where, actuator, function_parameters(ACTUATORS[actuator["kind"]].advance))
-    return result
+    return {path: bind_block(path, block, declared) for path, block, declared, _ in _equation_blocks(document)}
 
 
 def parameter_units(document: Document) -> dict[str, str]:
     """Dotted path -> unit of every parameter, in the order of use."""
-    known = {"inertia": function_parameters(rigid_body_entries), "added_mass": function_parameters(added_mass_entries)}
-    moved: dict[str, str] = {}
-    for path, key, block in term_blocks(document):
-        known[path] = term_parameters(TERMS[key])
-        for command, actuator in active_actuators(block):
-            known[f"{path}.actuator.{command}"] = function_parameters(ACTUATORS[actuator["kind"]].advance)
-            moved[f"{path}.actuator.{command}"] = SIGNALS[command].unit
     rows: list[tuple[str, str]] = []
-    for where, binding in bind_document(document).items():
-        declared = {parameter.name: parameter for parameter in known[where]}
-        table = next((parameter for parameter in declared.values() if parameter.kind == "open"), None)
-        for keyword, target in binding.items():
+    for path, block, parameters, moved in _equation_blocks(document):
+        declared = {parameter.name: parameter for parameter in parameters}
+        table = next((parameter for parameter in parameters if parameter.kind == "open"), None)
+        for keyword, target in bind_block(path, block, parameters).items():
             parameter = declared.get(keyword, table)
             assert parameter is not None
             unit = parameter.unit
             if isinstance(target, str):
-                rows.append(
-                    (target, unit.unit(keyword) if isinstance(unit, Grammar) else _resolve_unit(unit, moved.get(where)))
-                )
+                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else _resolve_unit(unit, moved)))
             elif isinstance(target, list):
-                rows += [(path, str(unit)) for path in target]
+                rows += [(entry, str(unit)) for entry in target]
             elif isinstance(target, dict):
                 assert isinstance(unit, Grammar)
-                rows += [(path, unit.unit(key)) for key, path in target.items()]
+                rows += [(entry, unit.unit(key)) for key, entry in target.items()]
     return dict(rows)
 
 

@@ -21,10 +21,10 @@ from shipid.files import open_file
 from shipid.physics import TERMS
 from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import total_mass
-from shipid.physics.signals import ACTUAL, signal_row
+from shipid.physics.signals import ACTUAL
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bind_document, parameter_units
-from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, first_contradiction, out_of_range
+from shipid.vessel.ranges import UNUSUAL, first_contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -40,10 +40,6 @@ from shipid.vessel.schema import (
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-MOST_RADIANS = 7.0  # more than a full turn: a larger limit of an actuator is in degrees
-LONGEST_CHAIN = 20  # documents that extend or patch one another
-MOST_BLOCK = 2.0  # m / (rho L_pp B T), as LEAST_BLOCK: far beyond any ship and its degraded models
 
 
 @dataclass(frozen=True)
@@ -217,12 +213,9 @@ def _read_table_file(source: Path, columns: tuple[str, ...], file: Path, path: s
     try:
         with open_file(source) as stream:
             frame = pd.read_csv(stream, comment="#")
-    except FileNotFoundError:
-        raise DocumentError(f"{source}: no such file in the folder of the vessel", file=file, path=path) from None
-    except OSError as error:
-        raise DocumentError(f"{source}: cannot be read: {error.strerror}", file=file, path=path) from None
-    except ValueError:
-        raise DocumentError(f"{source}: not a CSV table with a header", file=file, path=path) from None
+    except (OSError, ValueError) as error:
+        words = getattr(error, "strerror", None) or "not a CSV table with a header"
+        raise DocumentError(f"{source}: cannot be read: {words}", file=file, path=path) from None
     missing = next((name for name in columns if name not in frame), None)
     if missing is not None:
         message = f"{source}: has no column {missing!r}: {suggest_name(missing, [str(name) for name in frame])}"
@@ -240,9 +233,6 @@ def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Pat
         other = documents.find_document(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
-    if len(above) >= LONGEST_CHAIN:
-        message = f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out"
-        raise DocumentError(message, file=file, path=path)
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
@@ -333,31 +323,19 @@ def _check_behind(vessel: Vessel) -> None:
 
 
 def _check_sense(vessel: Vessel) -> None:
-    """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow, tonnes for kg."""
+    """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow."""
     values = vessel.parameters
     for path, value in values.items():
         group, _, name = path.rpartition(".")
         fault = ""
         if group == "added_mass" and AXES[MOTIONS.index(name[2])] == name[0] and value > 0:
             fault = f"{value:g}: added mass is on the force side, so {name} is negative"
-        elif ".actuator." in path and name in ("low", "high"):
-            row = signal_row(path.rsplit(".", 2)[-2])
-            if row is not None and row.angle and abs(value) > MOST_RADIANS:
-                fault = f"{value:g}: is in rad, and that is more than a full turn"
-            elif name == "high" and value <= (low := values.get(f"{group}.low", -math.inf)):
-                fault = f"{value:g}: must be above low, {low:g}"
+        elif ".actuator." in path and name == "high" and value <= (low := values.get(f"{group}.low", -math.inf)):
+            fault = f"{value:g}: must be above low, {low:g}"
         elif name == "x_fwd" and value <= values.get(f"{group}.x_aft", -math.inf):
             fault = f"{value:g}: must be ahead of x_aft"
         if fault:
             raise DocumentError(fault, file=vessel.file, path=path)
-    sizes = vessel.document.get("particulars", {})
-    rho = vessel.document.get("constants", {}).get("rho")
-    if rho is not None and {"L_pp", "B", "T"} <= sizes.keys():
-        m = values["inertia.m"]
-        share = m / (rho * sizes["L_pp"] * sizes["B"] * sizes["T"])
-        if not LEAST_BLOCK < share < MOST_BLOCK:
-            message = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
-            raise DocumentError(message, file=vessel.file, path="inertia.m")
 
 
 def _check_component(path: str, group: str, block: Any, file: str) -> None:
@@ -387,12 +365,9 @@ def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
 def _check_circle(path: str, block: Mapping[str, Any], file: str) -> None:
     """DocumentError for a propeller in four quadrants whose table has a gap at 180 deg."""
     beta, thrust = block["beta_deg"], block["C_T"]
-    if (beta[0], beta[-1]) != (-180, 180):
-        message = f"goes from {beta[0]:g} to {beta[-1]:g}: must go from -180 to 180"
+    if (beta[0], beta[-1]) != (-180, 180) or thrust[0] != thrust[-1]:
+        message = "must go from -180 to 180, where C_T must be the same"
         raise DocumentError(message, file=file, path=f"{path}.beta_deg")
-    if thrust[0] != thrust[-1]:
-        message = f"{thrust[0]:g} at -180 deg and {thrust[-1]:g} at 180 deg: must be equal"
-        raise DocumentError(message, file=file, path=f"{path}.C_T")
 
 
 def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:
@@ -437,23 +412,21 @@ def _check_inertia(vessel: Vessel) -> None:
         if row in vessel.axes and not vessel.document["inertia"].get(name):
             message = f"missing: {len(vessel.axes)} degrees of freedom need it"
             raise DocumentError(message, file=vessel.file, path=f"inertia.{name}")
-    if not _is_positive(vessel._mass):
+    if not _is_positive(vessel.mass):
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )
         raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
 
 
-def _is_positive(M: list[list[float]]) -> bool:
-    """Whether a matrix is positive definite: all pivots of its symmetric part are above 0."""
-    rows = [[M[i][j] + M[j][i] for j in range(len(M))] for i in range(len(M))]
-    while rows:
-        (pivot, *right), *below = rows
-        if not pivot > 0:
-            return False
-        rows = [
-            [entry - first / pivot * above for entry, above in zip(rest, right, strict=True)] for first, *rest in below
-        ]
+def _is_positive(M: NDArray[np.float64]) -> bool:
+    """Whether a matrix is positive definite, by its symmetric part."""
+    import numpy as np
+
+    try:
+        np.linalg.cholesky(M + M.T)
+    except np.linalg.LinAlgError:
+        return False
     return True
 
 

@@ -297,36 +297,30 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
 def draw_variant(
     family: Family, member: int, base: Vessel, counter: int = 0, file: str | Path | None = None
 ) -> Variant:
-    """Draw one member of a resolved family; bit for bit the same on every machine.
-
-    Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
-
-    member : from 0. counter : how often it was redrawn. Raises ShipidError where one of them is no whole number, and
-    DocumentError for a path that the base lacks or a member that is no valid vessel.
-    """
-    return _draw_members(family, base, file, [member], counter)[0]
-
-
-def draw_members(
-    family: Family, base: Vessel, file: str | Path | None = None, numbers: Iterable[int] | None = None
-) -> list[Variant]:
-    """Members of a resolved family, all or those of the given numbers from 0, none redrawn.
-
-    Raises ShipidError for a number that is no whole number, and DocumentError as `draw_variant` does.
-    """
-    return _draw_members(family, base, file, range(family.members) if numbers is None else numbers)
+    """Draw one member of a resolved family, redrawn so often; see `draw_members`."""
+    return draw_members(family, base, file, [member], counter)[0]
 
 
 Step = tuple[str, Callable[[float, Any, float], float], Any, str | None]
 """Dotted path of a number, change of a rule, argument of the rule, and the key of its draw; None where none is made."""
 
 
-def _draw_members(
-    family: Family, base: Vessel, file: str | Path | None, numbers: Iterable[int], counter: int = 0
+def draw_members(
+    family: Family,
+    base: Vessel,
+    file: str | Path | None = None,
+    numbers: Iterable[int] | None = None,
+    counter: int = 0,
 ) -> list[Variant]:
-    """Members of these numbers from 0, each drawn again so often; DocumentError for one that is no valid vessel."""
+    """Members of a resolved family, all or those of the given numbers from 0; the same on every machine to the bit.
+
+    Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
+
+    counter : how often each was redrawn. Raises ShipidError where a number is no whole one, DocumentError for a path
+    that the base lacks or a member that is no valid vessel.
+    """
     steps, original, result = _draw_steps(family, base, file), base.parameters, []
-    counter = check_whole_number("counter", counter)
+    counter, numbers = check_whole_number("counter", counter), range(family.members) if numbers is None else numbers
     if not isinstance(numbers, Iterable):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
     for number in (check_whole_number("member", number) for number in numbers):  # of 1.0 is another hash

@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
+from operator import or_
 from types import GenericAlias
 from typing import Annotated, Any, Literal, get_args, get_origin
 
@@ -239,12 +240,7 @@ def _actuator_model(memories: tuple[tuple[str, ActuatorModel], ...]) -> Any:
 
 
 def _union_by_kind(models: list[type[VesselBlock]]) -> Any:
-    if len(models) == 1:
-        return models[0]
-    union: Any = models[0]
-    for model in models[1:]:
-        union = union | model
-    return Annotated[union, Field(discriminator="kind")]
+    return Annotated[reduce(or_, models), Field(discriminator="kind")] if len(models) > 1 else models[0]
 
 
 def kinds_of_group(group: str) -> list[str]:
@@ -254,15 +250,6 @@ def kinds_of_group(group: str) -> list[str]:
 
 def _keys_of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
-
-
-def _kind_model(group: str, of: Mapping[str, type[VesselBlock]]) -> Any:
-    return _union_by_kind([of[key] for key in _keys_of_group(group)])
-
-
-def _fixed_group_model(group: str, of: Mapping[str, type[VesselBlock]]) -> Any:
-    fields: dict[str, Any] = {key.split(".")[1]: (of[key] | None, None) for key in _keys_of_group(group)}
-    return create_model(group, __base__=VesselBlock, **fields)
 
 
 def vessel_model() -> type[BaseModel]:
@@ -275,6 +262,10 @@ def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseM
     """Model of a vessel document with these terms; kept by all that it is made of, for a notebook may put in others."""
     split_keys(tuple(key for key, _ in terms))
     of = {key: term_model(key) for key, _ in terms}
+    wind, thruster = (_union_by_kind([of[key] for key in _keys_of_group(group)]) for group in ("wind", "thruster"))
+    fixed: dict[str, dict[str, Any]] = {
+        group: {key.split(".")[1]: (of[key] | None, None) for key in _keys_of_group(group)} for group in FIXED
+    }
     current: dict[str, Any] = {"kind": (Literal["uniform"], ...)}
     fields: dict[str, Any] = {
         "name": (str, ...),
@@ -288,9 +279,9 @@ def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseM
             block_model("added_mass", function_parameters(added_mass_entries), coriolis=(_CORIOLIS, "full")) | None,
             None,
         ),
-        **{group: (_fixed_group_model(group, of) | None, None) for group in FIXED},
-        "wind": (_kind_model("wind", of) | None, None),
-        "thruster": (GenericAlias(dict, (str, _kind_model("thruster", of))), {}),
+        **{group: (create_model(group, __base__=VesselBlock, **fixed[group]) | None, None) for group in FIXED},
+        "wind": (wind | None, None),
+        "thruster": (GenericAlias(dict, (str, thruster)), {}),
         "current": (create_model("current", __base__=VesselBlock, **current) | None, None),
     }
     return create_model("vessel", __base__=VesselBlock, **fields)

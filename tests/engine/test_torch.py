@@ -17,7 +17,7 @@ from shipid.vessel.load import load_vessel  # noqa: E402
 @pytest.mark.parametrize("num_variants", [1, 16, 10_000])
 def test_blocks_are_about_equal_and_bounded(num_samples: int, num_variants: int) -> None:
     width = engine._block_width(num_samples, num_variants, 1, "cpu")
-    assert width * num_variants <= max(engine.CPU_BLOCK, engine.LEAST_BLOCK * num_variants)
+    assert width * num_variants <= max(engine.CPU_BLOCK, engine.LEAST_SAMPLES * num_variants)
     assert -(-num_samples // width) * width - num_samples <= num_samples // width
 
 

@@ -104,7 +104,6 @@ CONTRADICTIONS: dict[str, tuple[str, float, str]] = {
     "flow of the other end": ("thruster.rudder.ell_R", 4.97, "thruster.rudder.ell_R"),
     "per cent of a wake": ("thruster.propeller.w_P0", 40.0, "thruster.propeller.w_P0"),
     "thrust that the hull takes whole": ("thruster.propeller.t_P", 1.2, "thruster.propeller.t_P"),
-    "no range of advance ratios": ("thruster.propeller.J_max", -1.0, "thruster.propeller.J_max"),
 }
 """What is wrong -> the number, its value, and the number that the message names."""
 
