@@ -9,15 +9,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
 import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from shipid.arguments import as_names, as_path, check_class
+from shipid.document import requirement_words
 from shipid.errors import DataError, suggest_name
 from shipid.files import open_file, read_arrow, replace_whole
 from shipid.physics.signals import SIGNALS, is_command, is_output, is_wrapped_angle, rows_of_role, signal_of
@@ -305,26 +307,24 @@ def check_schema(frame: pd.DataFrame, metadata: dict[str, Any]) -> None:
         raise DataError(f"run {names_of_runs[run[row]]!r}: time does not increase at t = {t[row]:g} s", path="t")
 
 
+class _Metadata(BaseModel):
+    """The entries of the metadata that are read here; there may be more."""
+
+    model_config = ConfigDict(strict=True)
+    flags: Annotated[list[str], Field(max_length=MOST_FLAGS)] = []
+    units: dict[str, Any] = {}
+    clock: Literal["run", "shared"] = "shared"
+    repairs: list[dict[str, Any]] = []
+
+
 def check_metadata(metadata: Any) -> None:
     """Raise DataError unless the metadata are a table whose known entries have their types."""
-    if not isinstance(metadata, dict):
-        raise DataError(f"damaged metadata: {type(metadata).__name__}, must be a table")
-    kinds = {"flags": list, "units": dict, "clock": str, "repairs": list}
-    wrong = [
-        (key, f"must be a {kind.__name__}")
-        for key, kind in kinds.items()
-        if not isinstance(metadata.get(key, kind()), kind)
-    ]
-    if not wrong:
-        flags, clock = metadata.get("flags", []), metadata.get("clock", "shared")
-        wrong += [("flags", f"{name!r} is no name of a flag") for name in flags if not isinstance(name, str)]
-        wrong += [("flags", f"more than {MOST_FLAGS} flags")] * (len(flags) > MOST_FLAGS)
-        wrong += [
-            ("repairs", f"{row!r} is no repair") for row in metadata.get("repairs", []) if not isinstance(row, dict)
-        ]
-        wrong += [("clock", f"clock is {clock!r}, must be 'run' or 'shared'")] * (clock not in ("run", "shared"))
-    for key, what in wrong:
-        raise DataError(f"damaged metadata: {what}", path=key)
+    try:
+        _Metadata.model_validate(metadata)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        path = ".".join(map(str, first["loc"])) or None
+        raise DataError(f"damaged metadata: {requirement_words(first)}", path=path) from None
 
 
 def _check_column(name: str, column: pd.Series[Any]) -> None:
@@ -401,7 +401,13 @@ def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
         return Dataset(table.to_pandas(use_threads=False), json.loads(stored))
     except DataError as error:
         raise DataError(error.message, file=file, path=error.path) from None
-    except (ValueError, RecursionError) as error:
-        raise DataError(f"damaged metadata: {error}", file=file) from None
-    except (pyarrow.ArrowException, TypeError, KeyError, AttributeError, OverflowError) as error:
-        raise DataError(f"damaged table: {error}", file=file) from None
+    except (
+        pyarrow.ArrowException,
+        ValueError,
+        RecursionError,
+        TypeError,
+        KeyError,
+        AttributeError,
+        OverflowError,
+    ) as error:
+        raise DataError(f"damaged: {error}", file=file) from None

@@ -9,7 +9,7 @@ import pandas as pd
 
 from shipid.data.checks import root_mean_square
 from shipid.data.dataset import Dataset, stretches_of_runs, unit_of_column
-from shipid.engine.casadi import evaluate_outputs, memory_along
+from shipid.engine.casadi import evaluate_samples, memory_along
 from shipid.simulation.log import body_velocities, state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -44,8 +44,7 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
             [columns[name] for name in model.commands],
             [columns.get(name, still) for name in model.environment],
         )
-        state, reached, orders, weather = (np.array(part).reshape(len(part), len(rows)) for part in seen)
-        shown = evaluate_outputs(model, state, reached, orders, weather, values)[places]
+        shown = evaluate_samples(model, "measured", seen, values)[places]
         parts.append(pd.DataFrame({"run": run, "t": columns["t"], **dict(zip(wanted, shown, strict=True))}))
     return pd.concat(parts, ignore_index=True)
 

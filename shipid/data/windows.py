@@ -192,16 +192,13 @@ def _checked_choice(chosen: Any, count: int) -> NDArray[Any] | slice:
     """A mask, indices (n,) or a slice of so many entries; DataError for what chooses no row of them."""
     if isinstance(chosen, slice):
         return chosen
-    places = np.asarray(chosen)
-    if places.shape == (0,):
-        places = places.astype(np.intp)
-    if places.ndim != 1 or places.dtype.kind not in "biu":
-        raise DataError(f"give a mask, indices or a slice to select by, not {chosen!r}")
-    if places.dtype.kind == "b" and len(places) != count:
-        raise DataError(f"a mask of {len(places)} values does not fit {count} entries")
-    if places.dtype.kind != "b" and len(places) and not -count <= places.min() <= places.max() < count:
-        odd = places[(places < -count) | (places >= count)][0]
-        raise DataError(f"there are {count} entries, so no index {odd}")
+    places = np.asarray(chosen, dtype=np.intp if np.shape(chosen) == (0,) else None)
+    try:
+        known = places.ndim == 1 and np.arange(count)[places].ndim == 1
+    except IndexError:
+        known = False
+    if not known:
+        raise DataError(f"give a mask, indices or a slice of {count} entries to select by, not {chosen!r}")
     return places
 
 

@@ -152,22 +152,15 @@ def _map_function(model: Dynamics, name: Literal["orders", "measured"]) -> ca.Fu
     return function.map(name, "serial", BLOCK, [function.n_in() - 1], [])
 
 
-def evaluate_orders(
-    model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
+def evaluate_samples(
+    model: Dynamics, name: Literal["orders", "measured"], inputs: Sequence[Sequence[Array]], parameters: Array
 ) -> Array:
-    """Orders (n_ordered, n) of the helmsman in n samples, each input (channels, n); parameters (P,)."""
-    return _evaluate_samples(_map_function(model, "orders"), [states, memory, commands, environment], parameters)
+    """Orders of the helmsman, or what instruments on the components show, (entries, n), in n samples.
 
-
-def evaluate_outputs(
-    model: Dynamics, states: Array, memory: Array, commands: Array, environment: Array, parameters: Array
-) -> Array:
-    """Outputs (n_outputs, n) of the components in n samples, each input (channels, n); parameters (P,)."""
-    return _evaluate_samples(_map_function(model, "measured"), [states, memory, commands, environment], parameters)
-
-
-def _evaluate_samples(mapped: ca.Function, inputs: Sequence[Array], parameters: Array) -> Array:
-    count = inputs[0].shape[1]
+    inputs : states, memory, commands and environment, channels (n,) each. parameters : (P,).
+    """
+    count = len(inputs[0][0])
+    given, mapped = [np.array(part).reshape(len(part), count) for part in inputs], _map_function(model, name)
     blocks = np.minimum(np.arange(-(-count // BLOCK) * BLOCK), count - 1).reshape(-1, BLOCK)  # the last is padded
-    parts = [np.array(mapped(*(part[:, samples] for part in inputs), parameters)) for samples in blocks]
+    parts = [np.array(mapped(*(part[:, samples] for part in given), parameters)) for samples in blocks]
     return np.concatenate(parts, axis=1)[:, :count]

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from shipid.engine.adjoint import Adjoint, Loss, gradient_native
 from shipid.engine.casadi import run_casadi
 from shipid.engine.integrate import Array, RolloutBatch, RolloutJob
 from shipid.engine.libraries import NoLibrary
-from shipid.engine.native import find_compiler, measure_native, measure_single, refuse_compiling, run_native, run_single
+from shipid.engine.native import find_compiler, measure_native, refuse_compiling, run_native
+from shipid.engine.vectors import SINGLE
 from shipid.errors import ShipidError, suggest_name
 from shipid.vessel.dynamics import Dynamics
 
@@ -25,29 +27,12 @@ BATCH_FROM = 2048  # samples x variants: below it CasADi beats one tensor operat
 
 
 @dataclass(frozen=True)
-class Load:
-    """Size of a rollout, by which `auto` selects an engine.
-
-    work : evaluations of the right-hand side, with an allowance for drawn components.
-    width : samples x variants.
-    device : a PyTorch device.
-    """
-
-    work: float
-    width: int
-    device: str
-
-
-def _is_never_preferred(_: Load) -> bool:
-    return False
-
-
-@dataclass(frozen=True)
 class Engine:
     """An implementation of rollouts.
 
     run : (model, batch, job) -> records (R, V, S, C) and the greatest speed (V, S) [m/s, rad/s].
-    preferred : whether `auto` selects this engine for a load, if it selects no engine before it.
+    preferred : whether `auto` selects this engine, if it selects no engine before it, for so many evaluations of the
+        right-hand side, with an allowance for drawn components; samples x variants; and a PyTorch device.
     available : whether this machine meets the requirements of the engine.
     measure : (model, batch, job, goal (T, 2, S)) -> sum of distances (V, S), tally (V, BINS) and greatest speed (V, S);
         the distances are those of the two channels of the job to the goal after every step. None if it cannot.
@@ -57,7 +42,7 @@ class Engine:
     """
 
     run: Callable[[Dynamics, RolloutBatch, RolloutJob], tuple[Array, Array]]
-    preferred: Callable[[Load], bool] = _is_never_preferred
+    preferred: Callable[[float, int, str], bool] = lambda *_: False
     available: Callable[[], bool] = lambda: True
     measure: Callable[[Dynamics, RolloutBatch, RolloutJob, Array], tuple[Array, Array, Array]] | None = None
     gradient: Callable[[Dynamics, RolloutBatch, RolloutJob, tuple[int, ...], Loss], Adjoint] | None = None
@@ -79,22 +64,23 @@ def _torch_gradient(
     return gradient_torch(model, batch, job, wanted, loss)
 
 
-def _is_compiler_available() -> bool:
-    return find_compiler() is not None
-
-
 ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
     "native": Engine(
         run_native,
-        preferred=lambda load: load.device == "cpu" and load.work > NATIVE_FROM,
-        available=_is_compiler_available,
+        preferred=lambda work, _, device: device == "cpu" and work > NATIVE_FROM,
+        available=lambda: find_compiler() is not None,
         measure=measure_native,
         gradient=gradient_native,
         checks=True,
     ),
-    "single": Engine(run_single, available=_is_compiler_available, measure=measure_single, checks=True),
-    "casadi": Engine(run_casadi, preferred=lambda load: load.device == "cpu" and load.width < BATCH_FROM),
-    "torch": Engine(_run_eager, preferred=lambda _: True, gradient=_torch_gradient, any_device=True),
+    "single": Engine(
+        partial(run_native, precision=SINGLE),
+        available=lambda: find_compiler() is not None,
+        measure=partial(measure_native, precision=SINGLE),
+        checks=True,
+    ),
+    "casadi": Engine(run_casadi, preferred=lambda _, width, device: device == "cpu" and width < BATCH_FROM),
+    "torch": Engine(_run_eager, preferred=lambda *_: True, gradient=_torch_gradient, any_device=True),
 }
 
 
@@ -124,8 +110,8 @@ def choose_engine(batch: RolloutBatch, job: RolloutJob, repeated: bool = False) 
     weight = 1 + sum(drawn.shape[2] for drawn in batch.components) / COMPONENTS_A_STEP
     width = batch.state.shape[1] * len(batch.parameters)
     work = job.num_steps * width * (4 if job.method == "rk4" else 1) * weight
-    load = Load(max(work, 2 * NATIVE_FROM) if repeated else work, width, job.device)
-    return next(engine for engine in ENGINES.values() if engine.preferred(load) and engine.available())
+    work = max(work, 2 * NATIVE_FROM) if repeated else work
+    return next(one for one in ENGINES.values() if one.preferred(work, width, job.device) and one.available())
 
 
 def run_with_fallback(asked: Engine | None, choose: Callable[[], Engine], work: Callable[[Engine], Result]) -> Result:

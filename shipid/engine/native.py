@@ -28,7 +28,7 @@ from shipid.engine.libraries import PROBE_LIMIT, NoLibrary, build_library, obtai
 from shipid.engine.printing import ARITHMETIC, LIBM, STAGES, Dialect, PrintedFunction, print_function
 from shipid.engine.tables import RampTable, even_tables, find_tables
 from shipid.engine.threads import run_tasks, threaded_source
-from shipid.engine.vectors import DOUBLE, SINGLE, CompilerTarget, Precision, vector_source
+from shipid.engine.vectors import DOUBLE, CompilerTarget, Precision, vector_source
 from shipid.errors import escape_unprintable
 from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
 from shipid.vessel.dynamics import Dynamics
@@ -495,7 +495,7 @@ def run_native(
     """Records (R, V, S, C) and the greatest speed (V, S)."""
     num_samples = batch.state.shape[1]
     records, worst = run_packed(model, batch, job, precision)
-    return records.transpose(1, 0, 3, 2)[:, :, :num_samples], worst[:, :num_samples]
+    return records.transpose(1, 0, 3, 2)[:, :, :num_samples].astype(float, copy=False), worst[:, :num_samples]
 
 
 def run_packed(
@@ -523,17 +523,6 @@ def measure_native(
     _run_job(model, batch, job, precision, worst=worst, goal=there, sums=sums, tally=tally)
     whole = tally[:, 0] if tally.shape[1] == 1 else tally.sum(axis=1, dtype=np.uint32)
     return sums[:, :num_samples].astype(float, copy=False), whole, worst[:, :num_samples]
-
-
-def run_single(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:
-    """As `run_native`, in single precision."""
-    records, worst = run_native(model, batch, job, SINGLE)
-    return records.astype(float), worst
-
-
-def measure_single(model: Dynamics, batch: RolloutBatch, job: RolloutJob, goal: Array) -> tuple[Array, Array, Array]:
-    """As `measure_native`, in single precision."""
-    return measure_native(model, batch, job, goal, SINGLE)
 
 
 def padded_width(batch: RolloutBatch, precision: Precision = DOUBLE) -> int:

@@ -244,8 +244,7 @@ def first_execute(record: Record) -> FirstExecute:
     """The first execute of a record.
 
     A helm may be over in the first row already. If the ship turns there, it belongs to an earlier manoeuvre, and the
-    next execute counts. If she does not turn, this is the execute. There is one exception: she does not turn until the
-    helm is all the way over. Then it held her course until there, as against wind, and the full helm is the execute.
+    next execute counts. If she does not turn, this is the execute.
     """
     size, rate = np.abs(record.helm), np.abs(record.r)
     if not size.max() > 0:
@@ -255,14 +254,6 @@ def first_execute(record: Record) -> FirstExecute:
     if over[0] and rate[0] > STEADY_CHANGE * rate.max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
         over &= np.logical_or.accumulate(~(over & same))  # the helm of an earlier manoeuvre ends at its first release
-    elif over[0]:
-        angle = _helm_angle(size[int(np.argmax(rate > STEADY_CHANGE * rate.max())) :])
-        full = int(np.argmax(size >= FULL_HELM * angle))
-        if (
-            full
-            and np.interp(start_of_change(record.t, record.helm, full), record.t, rate) <= STEADY_CHANGE * rate.max()
-        ):
-            over[:full] = False
     if not over.any():
         return FirstExecute(NAN, 0, 0.0, 1.0)
     row = int(np.argmax(over))

@@ -124,10 +124,8 @@ def pull_out_measures(record: Record) -> Measures:
     put = row < len(record.t)
     release = start_of_change(record.t, record.helm, row) if put else NAN
     if put:  # the helm is left amidships until it is moved again
-        moved = np.flatnonzero(np.abs(record.helm[row:]) > MIDSHIPS * over.angle)
-        again = moved[np.append(True, np.diff(moved) == 1)] if len(moved) and moved[0] == 0 else moved[:0]
-        later = np.setdiff1d(moved, again)
-        record = record.upto(row + int(later[0]) if len(later) else len(record.t))
+        moved = row + np.flatnonzero(np.diff((np.abs(record.helm[row:]) > MIDSHIPS * over.angle).astype(int)) > 0) + 1
+        record = record.upto(int(moved[0]) if len(moved) else len(record.t))
     t, end = record.t, float(record.t[-1])
     rate = over.side * float(np.interp(release, t, record.r)) if put else NAN
     why = "the helm is not put amidships after the turn"

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from shipid.engine.casadi import evaluate_samples
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
@@ -334,16 +335,15 @@ def _held_helm(
     orders: Mapping[str, Array],
 ) -> dict[str, Array]:
     """Angle command -> (S,) order [rad] that the helmsman gives in the steady state."""
-    count = len(next(iter(state.values())))
-    calm = np.zeros((len(model.environment), count))
-    rows = [
-        np.array([given[name] for name in names]).reshape(len(names), count)
-        for given, names in (
-            (state, (*model.state, *model.hidden)), (memory, tuple(model.memory)), (orders, model.commands)
-        )
-    ]  # fmt: skip
-    values = np.tile(np.array(list(controls.vessel.parameters.values()))[:, None], count)
-    given = dict(zip(model.ordered, np.array(model.orders.map(count)(*rows, calm, values)), strict=True))
+    calm = [np.zeros(len(next(iter(state.values()))))] * len(model.environment)
+    inputs = [
+        [state[name] for name in (*model.state, *model.hidden)],
+        [memory[name] for name in model.memory],
+        [orders[name] for name in model.commands],
+        calm,
+    ]
+    values = evaluate_samples(model, "orders", inputs, np.array(list(controls.vessel.parameters.values())))
+    given = dict(zip(model.ordered, values, strict=True))
     return {name: given[name] for name in controls.helm}
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.arguments import as_float_array, as_names, check_choice, check_mapping, check_positive, whole_steps
-from shipid.engine.casadi import evaluate_orders, evaluate_outputs
+from shipid.engine.casadi import evaluate_samples
 from shipid.engine.engines import engine_by_name
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import Trajectories, rollout
@@ -195,9 +195,9 @@ def _perform_batch(
     if helmsman is None:
         log |= {name: commands[name][steps] + 0.0 for name in model.ordered}
     else:
-        log |= _evaluate_records(model.ordered, evaluate_orders, vessel, model, path, commands, felt, steps)
+        log |= _evaluate_records(model.ordered, "orders", vessel, model, path, commands, felt, steps)
     if outputs:
-        shown = _evaluate_records(tuple(model.outputs), evaluate_outputs, vessel, model, path, commands, felt, steps)
+        shown = _evaluate_records(tuple(model.outputs), "measured", vessel, model, path, commands, felt, steps)
         log |= {name: shown[name] for name in outputs}
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"{ACTUAL}{name}": path[f"{ACTUAL}{name}"][:, 0] for name in lagged}
@@ -269,7 +269,7 @@ def _initial_states(
 
 def _evaluate_records(
     names: Sequence[str],
-    function: Callable[..., Array],
+    function: Literal["orders", "measured"],
     vessel: Vessel,
     model: Dynamics,
     path: Trajectories,
@@ -288,6 +288,7 @@ def _evaluate_records(
     memory = [path[f"{ACTUAL}{name}"][:, 0] for name in model.memory]
     given = [commands[name][steps] for name in model.commands]
     felt = [still + weather[name] for name in model.environment]
-    inputs = (np.array(part).reshape(len(part), records * samples) for part in (states, memory, given, felt))
-    values = function(model, *inputs, np.array(list(vessel.parameters.values()))).reshape(-1, records, samples)
+    inputs = [[channel.ravel() for channel in part] for part in (states, memory, given, felt)]
+    values = evaluate_samples(model, function, inputs, np.array(list(vessel.parameters.values())))
+    values = values.reshape(-1, records, samples)
     return {name: value + 0.0 for name, value in zip(names, values, strict=True)}

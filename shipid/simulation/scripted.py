@@ -16,7 +16,6 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.truth import LONGEST
-from shipid.units import plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -49,23 +48,16 @@ def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
             raise DocumentError("is a study: simulate it by its name, with --set truth.vessel=...")
         script = documents.parse_model(Script, document, file)
         manoeuvres = _script_manoeuvres(script, vessel)
-        _check_run_size(vessel, len(manoeuvres), max(one.length for one in manoeuvres), script.step, "manoeuvre")
+        length = max(one.length for one in manoeuvres)
+        if length > LONGEST:
+            raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s, make it shorter", path="manoeuvre")
+        instants = len(manoeuvres) * length / script.step
+        if fault := excess_memory_words(instants * 2 * len(vessel_dynamics(vessel).commands)):
+            raise DocumentError(f"{len(manoeuvres)} runs in steps of {script.step:g} s {fault}", path="step")
         frame = perform_manoeuvres(vessel, manoeuvres, step=script.step, interval=script.interval)
     except ShipidError as error:
         raise DocumentError(error.message, file=file, path=error.path) from None
     return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
-
-
-def _check_run_size(vessel: Vessel, count: int, length: float, step: float, path: str) -> None:
-    """Raise DocumentError for runs, of `length` and `step` [s], that no machine would end or that exceed this one.
-
-    path : of what makes them long; the step is in the same block, or beside it.
-    """
-    if length > LONGEST:
-        raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s, make it shorter", path=path)
-    if fault := excess_memory_words(count * length / step * 2 * len(vessel_dynamics(vessel).commands)):
-        words = f"{step:g} s: {count} {plural_word(count, 'run')} of {length:g} s {fault}"
-        raise DocumentError(words, path=f"{path.rpartition('.')[0]}.step".removeprefix("."))
 
 
 def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:

@@ -9,7 +9,7 @@ from typing import cast, get_args
 
 import numpy as np
 
-from shipid.arguments import as_float_array, check_class, check_number
+from shipid.arguments import as_float_array, check_choice, check_class, check_number, check_positive
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import ShipidError, suggest_name
 from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
@@ -89,13 +89,10 @@ def define_standard(
     kind = kinds[name]
     angles = as_float_array("angles", angles).ravel().tolist()
     _check_angles(name, angles, len(kind.angles))
-    if not isinstance(side, str) or side not in get_args(Side):
-        raise ShipidError(f"{side!r} is no side: starboard or port", path="--side")
-    if not isinstance(approach, str) or approach not in APPROACHES:
-        raise ShipidError(f"{approach!r} is no approach: {suggest_name(approach, APPROACHES)}", path="--approach")
-    for option, value in (("--duration", duration), ("--step", step)):
-        if value is not None and not 0 < check_number(option.strip("-"), value) < np.inf:
-            raise ShipidError(f"{value:g} s must be positive and finite", path=option)
+    check_choice("side", side, get_args(Side))
+    check_choice("approach", approach, APPROACHES)
+    duration = None if duration is None else check_positive("duration", duration)
+    step = None if step is None else check_positive("step", step)
     length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)

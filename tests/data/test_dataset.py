@@ -1,9 +1,5 @@
 """The schema refuses what it should, and Parquet gives back what went in."""
 
-import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +9,11 @@ import pytest
 
 from shipid.data.dataset import (
     Dataset,
-    cumulative_integral,
     mean_commands,
     read_dataset,
     sample_columns,
     stretches_by_run,
     stretches_of_runs,
-    unit_of_column,
     without_shared_moments,
     write_dataset,
 )
@@ -63,30 +57,6 @@ def test_the_digest_changes_with_everything_in_the_table_and_nothing_else(tmp_pa
     again = Dataset(frame.copy().reset_index(drop=True), {**metadata, "source": "another file"})
     assert again.digest == dataset.digest
     assert read_dataset(write_dataset(dataset, tmp_path / "trial.parquet")).digest == dataset.digest
-
-
-def test_columns_have_names_and_files_their_ending(tmp_path: Path) -> None:
-    dataset = as_dataset(turning(T))
-    with pytest.raises(DataError, match="the column 5 has no name"):
-        Dataset(dataset.frame.assign(**{"V": 1.0}).rename(columns={"V": 5}), dataset.metadata)
-    with pytest.raises(DataError, match=r"let the name end in \.parquet"):
-        write_dataset(dataset, tmp_path / "log.csv")
-    assert not (tmp_path / "log.csv").exists()
-
-
-def test_a_folder_is_no_dataset(tmp_path: Path) -> None:
-    """Arrow reads all tables of a folder as one, in which runs would lie among one another."""
-    for name in ("a", "b"):
-        write_dataset(as_dataset(turning(T)), tmp_path / "days" / f"{name}.parquet")
-    with pytest.raises(DataError, match=r"is a folder: name one dataset; `shipid data join`"):
-        read_dataset(tmp_path / "days")
-
-
-def test_file_is_compressed_parquet_with_json_metadata(tmp_path: Path) -> None:
-    file = write_dataset(as_dataset(turning(T), vessel="x"), tmp_path / "trial.parquet")
-    stored = pyarrow.parquet.ParquetFile(file)
-    assert stored.metadata.row_group(0).column(0).compression == "ZSTD"
-    assert json.loads(stored.schema_arrow.metadata[b"shipid"])["vessel"] == "x"
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
@@ -224,33 +194,6 @@ def test_sample_finds_the_row_that_rounding_moved() -> None:
     np.testing.assert_array_equal(alone["port.n"], [0.0, 0.0])
 
 
-@pytest.mark.parametrize(
-    ("name", "unit"),
-    [
-        ("port.n", "rev/s"),
-        ("rudder_1.delta", "rad"),
-        ("r", "rad/s"),
-        ("port.thrust", "N"),
-        ("thrust", None),
-        ("n", None),
-    ],
-)
-def test_unit_of(name: str, unit: str | None) -> None:
-    assert unit_of_column(name) == unit
-
-
-def test_a_name_that_is_not_utf_8_is_written_and_read(tmp_path: Path) -> None:
-    dataset = as_dataset(turning(T))
-    file = write_dataset(dataset, tmp_path / os.fsdecode(b"\xe9.parquet"))
-    assert read_dataset(file).digest == dataset.digest
-
-
-def test_a_pipe_is_no_dataset(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.parquet")
-    with pytest.raises(DataError, match="a device or a pipe"):
-        read_dataset(tmp_path / "pipe.parquet")
-
-
 def test_metadata_that_no_file_can_hold_are_refused(tmp_path: Path) -> None:
     frame = as_dataset(turning(T)).frame
     with pytest.raises(DataError, match=r"the metadata must be plain data, as JSON holds it \(.*int64"):
@@ -278,17 +221,6 @@ def test_commands_in_force_have_the_integral_of_those_that_hold(seed: int) -> No
     np.testing.assert_array_equal(found["port.n"][same], held[0][same])
 
 
-def test_only_angles_are_unwrapped() -> None:
-    """A position that jumps by more than half a turn, as a number, is no angle."""
-    rows = turning(T).assign(north=np.where(T > 5.0, 40.0, 0.0))
-    np.testing.assert_array_equal(sample_columns(rows, T)["north"], rows["north"])
-
-
-def test_the_integral_of_a_straight_rate_is_exact_on_any_clock() -> None:
-    t = 1e3 + np.cumsum(np.random.default_rng(0).uniform(0.1, 3.0, 40))
-    np.testing.assert_allclose(cumulative_integral(t, 2.0 * t), t**2 - t[0] ** 2, rtol=1e-12, atol=1e-6)
-
-
 def test_no_other_run_keeps_a_moment_of_runs_that_are_set_apart() -> None:
     """On one clock: the run that is set apart stays whole, the other loses what it shares, and is broken there."""
     middle = turning(T[10:20])
@@ -297,15 +229,3 @@ def test_no_other_run_keeps_a_moment_of_runs_that_are_set_apart() -> None:
     assert by_run == {"a": [list(T[10:20])], "b": [list(T[:10]), list(T[20:])]}
     separate = as_dataset(middle, turning(T), clock="run")
     assert without_shared_moments(separate, ["a"]) is separate
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="this system does not say the threads of a process")
-def test_a_dataset_is_read_in_one_thread(tmp_path: Path) -> None:
-    """Where a user may start no other, PyArrow would wait for one without end."""
-    file = write_dataset(as_dataset(turning(T)), tmp_path / "a.parquet")
-    code = (
-        "import os, sys; from shipid.data.dataset import read_dataset; before = len(os.listdir('/proc/self/task')); "
-        "read_dataset(sys.argv[1]); print(len(os.listdir('/proc/self/task')) - before)"
-    )
-    run = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "0"

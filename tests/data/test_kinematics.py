@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad_vec
 from scipy.stats import chi2
 
 from shipid.data.kinematics import (
@@ -94,51 +93,6 @@ def test_white_accelerations_move_a_ship_that_turns_as_on_the_heading_of_the_mid
         ways = [np.vstack([left * turn, np.eye(3)]) for left in np.linspace(0, dt, 2001)]  # what an impulse moves
         added = np.trapezoid([way @ densities @ way.T for way in ways], dx=dt / 2000, axis=0)
         np.testing.assert_allclose(_process_noise(x, dt, given), added, rtol=1e-5, atol=1e-12)
-
-
-def by_least_squares(
-    t: np.ndarray,
-    prior: tuple[np.ndarray, np.ndarray],
-    of: np.ndarray,
-    change: np.ndarray,
-    samples: np.ndarray,
-    error: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Places and their rates (N, 2 k), and covariances, of all rows at once: what a smoother must give.
-
-    place' = of @ rate and rate' = white noise of the spectral density `change` (k, k); samples (N, k) of the places.
-    """
-    k, count = len(of), len(t)
-    ways, values = [np.eye(2 * k, 2 * k * count)], [prior[0]]
-    weights = [np.linalg.inv(prior[1])]
-    for row in range(count - 1):
-        dt = t[row + 1] - t[row]
-
-        def grown(left: float) -> np.ndarray:
-            """What noise adds that is `left` [s] before the end."""
-            way = np.vstack([of * left, np.eye(k)])
-            return way @ change @ way.T
-
-        step = np.zeros((2 * k, 2 * k * count))
-        step[:, 2 * k * row : 2 * k * (row + 1)] = -np.block([[np.eye(k), of * dt], [np.zeros((k, k)), np.eye(k)]])
-        step[:, 2 * k * (row + 1) : 2 * k * (row + 2)] = np.eye(2 * k)
-        ways.append(step)
-        values.append(np.zeros(2 * k))
-        weights.append(np.linalg.inv(quad_vec(grown, 0, dt, epsabs=1e-14)[0]))
-    for row, sample in enumerate(samples):
-        seen = np.zeros((k, 2 * k * count))
-        seen[:, 2 * k * row : 2 * k * row + k] = np.eye(k)
-        ways.append(seen)
-        values.append(sample)
-        weights.append(np.eye(k) / error**2)
-    information = sum(way.T @ weight @ way for way, weight in zip(ways, weights, strict=True))
-    pulled = sum(way.T @ weight @ value for way, weight, value in zip(ways, weights, values, strict=True))
-    covariance = np.linalg.inv(information)
-    whole = (covariance @ pulled).reshape(count, 2 * k)
-    return whole, np.stack([covariance[i : i + 2 * k, i : i + 2 * k] for i in range(0, 2 * k * count, 2 * k)])
-
-
-UNEVEN = np.append(0.0, np.cumsum(np.tile([0.5, 2.0, 1.0], 6)))
 
 
 def test_wrong_noise_is_reported() -> None:

@@ -104,18 +104,6 @@ def test_a_helm_that_is_held_in_circles_is_not_still(angle: float, seed: int) ->
     assert found("rudder.delta", t, rudder, psi) == (set(), set())
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize(("step", "rows"), [(1.0, 15), (1.0, 6), (0.2, 60)])
-@pytest.mark.parametrize("angle", [10.0, 20.0, 35.0])
-def test_a_helm_that_goes_amidships_between_two_equal_orders_is_no_lapse(
-    angle: float, step: float, rows: int, seed: int
-) -> None:
-    random = np.random.default_rng(seed)
-    rudder = np.round(random.normal(0, 0.3, 1200), 1)
-    rudder[600:640], rudder[640 : 640 + rows], rudder[640 + rows : 690 + rows] = angle, 0.0, angle
-    assert found("rudder.delta", step * np.arange(1200.0), rudder, np.cumsum(rudder) * 1e-3) == (set(), set())
-
-
 def test_pauses_of_a_shaft_between_equal_orders_may_be_orders() -> None:
     order = np.full(1200, 120.0)
     order[1000:] = 60.0
@@ -124,12 +112,3 @@ def test_pauses_of_a_shaft_between_equal_orders_may_be_orders() -> None:
     kinds, rows = found("propeller.n", np.arange(1200.0), order, np.zeros(1200))
     assert kinds == {"pause"}
     assert len(rows) == 12
-
-
-def test_a_hard_rudder_that_rests_on_its_stop_is_not_still() -> None:
-    """Held to the digit in each circle, it moves on straight courses alone."""
-    random = np.random.default_rng(0)
-    circle = np.arange(2000) % 500 >= 300
-    values = np.where(circle, 35.0, np.round(random.normal(0, 1.0, 2000), 1))
-    psi = np.cumsum(np.where(circle, 0.02, 0.0))
-    assert found("rudder.delta", np.arange(2000.0), values, psi) == (set(), set())

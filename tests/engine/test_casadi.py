@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipid.engine.casadi import BLOCK, evaluate_orders, memory_along
+from shipid.engine.casadi import BLOCK, evaluate_samples, memory_along
 from shipid.vessel.dynamics import vessel_dynamics
 from tests.conftest import variety
 
@@ -37,7 +37,7 @@ def test_orders_of_many_samples_are_those_of_each() -> None:
     names = ((*model.state, *model.hidden), model.memory, model.commands, model.environment)
     inputs = [rng.uniform(0.1, 1.0, (len(each), 3 * BLOCK + 1)) for each in names]
     for count in (1, BLOCK, BLOCK + 1, 3 * BLOCK + 1):
-        together = evaluate_orders(model, *(part[:, :count] for part in inputs), values)
+        together = evaluate_samples(model, "orders", [part[:, :count] for part in inputs], values)
         assert together.shape == (len(model.ordered), count)
         for k in {0, count // 2, count - 1}:
             alone = np.array(model.orders(*(part[:, k] for part in inputs), values)).ravel()

@@ -53,17 +53,6 @@ def test_a_new_engine_measures_from_its_paths(toy: str, draw_inputs: Draw) -> No
     np.testing.assert_array_equal(measured.tally[0], tally_errors(apart))
 
 
-def test_an_engine_that_measures_is_asked_to(monkeypatch: pytest.MonkeyPatch, draw_inputs: Draw) -> None:
-    def measure(_: Dynamics, batch: RolloutBatch, job: RolloutJob, goal: Array) -> tuple[Array, Array, Array]:
-        assert goal.shape == (4, 2, 3)
-        shape = (len(batch.parameters), batch.state.shape[1])
-        return np.full(shape, 42.0), np.zeros((shape[0], 1)), np.full(shape, job.step)
-
-    monkeypatch.setitem(ENGINES, "ruler", Engine(drift, measure=measure))
-    measured = rollout_distances(SHIP, **draw_inputs(SHIP, 3), goal=np.zeros((4, 3, 2)), step=1.0, engine="ruler")
-    assert (measured.total == 42).all()
-
-
 def test_a_wrong_name_lists_all_engines(toy: str, draw_inputs: Draw) -> None:
     with pytest.raises(ShipidError, match="there is no engine 'wind'") as caught:
         rollout(SHIP, **draw_inputs(SHIP, 1), step=1.0, num_steps=1, engine="wind")

@@ -124,16 +124,6 @@ def test_a_diverged_sample_is_named_and_harms_no_other(draw_inputs: Draw, engine
     np.testing.assert_allclose(harmed.parameters[others], sound.parameters[others], rtol=1e-12)
 
 
-@pytest.mark.skipif("native" not in ABLE, reason="no C compiler on this machine")
-def test_auto_takes_the_compiled_sweep_and_else_pytorch(draw_inputs: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
-    given, options = inputs(SHIP, draw_inputs, "euler")
-    names = ("hull.learned.w_v.1",)
-    by_name = {engine: gradient(SHIP, given, options, engine, names).parameters for engine in ("native", "torch")}
-    np.testing.assert_array_equal(gradient(SHIP, given, options, "auto", names).parameters, by_name["native"])
-    monkeypatch.setattr("shipid.engine.engines.find_compiler", lambda: None)
-    np.testing.assert_array_equal(gradient(SHIP, given, options, "auto", names).parameters, by_name["torch"])
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -157,16 +157,6 @@ def test_commands_act_from_step_to_step(draw_inputs: Draw, engine: Any) -> None:
 
 
 @pytest.mark.parametrize("engine", ["casadi", "torch"])
-def test_every_thins_out_records(vessel: Vessel, draw_inputs: Draw, engine: Any) -> None:
-    given = draw_inputs(vessel, 2)
-    dense = rollout(vessel, **given, step=0.5, num_steps=12, engine=engine)
-    thin = rollout(vessel, **given, step=0.5, num_steps=12, every=4, keep=["u", "north"], engine=engine)
-    np.testing.assert_array_equal(thin["u"], dense["u"][::4])
-    np.testing.assert_array_equal(thin["north"], dense["north"][::4])
-    assert (thin.interval, thin.names, thin.states.shape) == (2.0, ("u", "north"), (4, 1, 2, 2))
-
-
-@pytest.mark.parametrize("engine", ["casadi", "torch"])
 @pytest.mark.parametrize("shape", ["sample", "held", "steps"])
 def test_extra_force_enters_as_force(engine: Any, shape: str) -> None:
     """At rest one small Euler step gives tau / M dt: surge mass 410,931.81 + 79,320.5895 kg."""
@@ -238,24 +228,6 @@ def test_a_missing_channel_is_named(bundled_vessel: Vessel, draw_inputs: Draw, g
     assert bundled_vessel.name in str(caught.value)
 
 
-def test_wrong_shapes_are_refused(draw_inputs: Draw) -> None:
-    vessel = load_vessel("gunnerus-28.9")
-    given = draw_inputs(vessel, 3)
-    with pytest.raises(ShipidError, match=r"'port\.n' must be"):
-        rollout(
-            vessel,
-            given["start"],
-            given["commands"] | {"port.n": np.zeros((4, 3))},
-            given["environment"],
-            step=1.0,
-            num_steps=5,
-        )
-    with pytest.raises(ShipidError, match="parameters must be"):
-        rollout(vessel, **given, step=1.0, num_steps=5, parameters=np.zeros((2, 3)))
-    with pytest.raises(ShipidError, match="multiple of every"):
-        rollout(vessel, **given, step=1.0, num_steps=5, every=2)
-
-
 def test_an_interrupt_waits_for_casadi_and_is_not_lost() -> None:
     reached = False
     before = signal.getsignal(signal.SIGINT)
@@ -290,19 +262,6 @@ LOOKS: dict[str, Callable[[np.ndarray], Any]] = {
     "every other": lambda values: np.repeat(values, 2)[::2],
     "objects": lambda values: values.astype(object),
 }
-
-
-@pytest.mark.parametrize("look", LOOKS.values(), ids=LOOKS)
-def test_inputs_of_any_type_give_the_same_path(look: Callable[[np.ndarray], Any]) -> None:
-    ship = load_vessel("gunnerus-28.9")
-    given = marked(ship)
-    path = rollout(ship, **given, step=0.5, num_steps=4, engine="casadi")
-    looking = {group: {name: look(values) for name, values in part.items()} for group, part in given.items()}
-    again = rollout(ship, **looking, step=np.float32(0.5), num_steps=np.int64(4), engine="casadi")
-    np.testing.assert_array_equal(again.states, path.states)
-    frames = {group: pd.DataFrame(part) for group, part in given.items()}
-    framed: Any = rollout(ship, **frames, step=0.5, num_steps=4, engine="casadi")
-    np.testing.assert_array_equal(framed.states, path.states)
 
 
 def test_parameters_with_names_are_taken_by_name() -> None:

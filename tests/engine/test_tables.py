@@ -12,9 +12,9 @@ import pytest
 
 from shipid.engine import native
 from shipid.engine.integrate import RolloutBatch, RolloutJob
-from shipid.engine.native import compiler_target, find_compiler, run_native, run_single
+from shipid.engine.native import compiler_target, find_compiler, run_native
 from shipid.engine.tables import LEAST, TableLookup, even_tables, find_tables
-from shipid.engine.vectors import CompilerTarget
+from shipid.engine.vectors import DOUBLE, SINGLE, CompilerTarget
 from shipid.physics.wind import interpolate_ramps
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
@@ -94,7 +94,7 @@ def test_a_lookup_has_the_values_of_the_ramps(
         batch = RolloutBatch(
             start, zeros((0, len(u))), zeros((1, 4, len(u))), zeros((1, 2, len(u))), zeros((1, 3, len(u))), together
         )
-        got, short = (way(model, batch, job)[0][1] - start.T for way in (run_native, run_single))
+        got, short = (run_native(model, batch, job, of)[0][1] - start.T for of in (DOUBLE, SINGLE))
         for v, numbers in enumerate(together):
             expected = np.array(rates(start, [], zeros((4, 1)), zeros((2, 1)), numbers, zeros((3, 1)))).T
             scale = np.abs(np.diff(numbers[size : 2 * size]) / np.diff(numbers[:size])).max()

@@ -9,11 +9,11 @@ import pytest
 
 from shipid.measures.criteria import judge_criteria
 from shipid.measures.recognise import recognise_kinds
-from shipid.measures.record import AT_REST, Measures, Record
+from shipid.measures.record import Measures, Record
 from shipid.measures.rows import measure_rows
 from shipid.simulation.standard import standard_manoeuvres
 from shipid.units import DEGREE
-from tests.measures.made_records import RECORDS, START, every, rows
+from tests.measures.made_records import RECORDS, every, rows
 
 MEASURES = {kind: trial.measures for kind, trial in standard_manoeuvres().items()}
 KINDS = list(MEASURES)
@@ -116,13 +116,3 @@ def test_kinds_are_recognised(kind: str) -> None:
     expected = {"pull-out": ("turning", "pull-out"), "spiral": ()}
     assert kinds == expected.get(kind, (kind,))
     assert ("whether it is a spiral" in why) == ("spiral" in kind)
-
-
-@pytest.mark.parametrize("kind", ["zigzag", "turning"])
-def test_a_ship_at_rest_at_the_execute_has_no_share_of_her_speed(kind: str) -> None:
-    """A log that begins with the first order, from a standing ship: neither its end nor the turn is the reason."""
-    record = every(RECORDS[kind](), 0.5)
-    moving = np.minimum(np.maximum(record.t - START, 0.0), 5.0) / 5.0
-    loss = MEASURES[kind](replace(record, u=moving * record.u, v=moving * record.v))["speed_loss"]
-    assert np.isnan(loss.value)
-    assert loss.why == AT_REST

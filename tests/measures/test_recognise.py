@@ -45,29 +45,6 @@ def test_shafts_that_run_and_columns_that_lack() -> None:
         record_of(given)
 
 
-@pytest.mark.parametrize("tunnel", [-9.0, -0.5, 0.5, 9.0])
-@pytest.mark.parametrize("astern", [-1.0, 0.0])
-def test_a_tunnel_that_runs_during_a_stop_is_no_shaft_of_it(tunnel: float, astern: float) -> None:
-    """In revolutions it may be faster than the screw: the mean of both never went astern, or was so from the start."""
-    record = every(RECORDS["stop"](), 0.5)
-    assert record.shaft is not None
-    shaft = np.maximum(record.shaft, astern)
-    given = columns(record) | {"screw.n": shaft, "bow.n": np.full(len(record.t), tunnel)}
-    seen = record_of(given)
-    np.testing.assert_array_equal(seen.shaft, shaft)
-    assert stopping_measures(seen)["execute"].value == START
-    assert recognise_kinds(seen)[0] == (("stop",) if astern < 0 else ())
-
-
-@pytest.mark.parametrize("later", [-3.0, 6.0])
-def test_a_stop_begins_with_the_first_of_two_shafts(later: float) -> None:
-    record = every(RECORDS["stop"](), 0.5)
-    assert record.shaft is not None
-    other = np.where(record.t >= START + later, -1.0, record.shaft[0])
-    seen = record_of(columns(record) | {"port.n": record.shaft, "starboard.n": other})
-    assert stopping_measures(seen)["execute"].value == START + min(later, 0.0)
-
-
 @pytest.mark.parametrize("counted", ["to 180 deg", "to 360 deg"])
 @pytest.mark.parametrize("takes", [0.0, 15.0])
 def test_azimuth_units_turned_astern_stop_a_ship(counted: str, takes: float) -> None:

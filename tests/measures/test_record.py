@@ -9,7 +9,6 @@ import pytest
 
 from shipid.errors import DataError
 from shipid.measures.record import (
-    _level_from,
     cubic_value_at,
     find_plateaus,
     integral_between,
@@ -63,14 +62,6 @@ def test_a_decay_that_goes_on_for_long_has_not_settled(decay: float) -> None:
         assert settled_mean(t, np.full_like(t, rate[-1]), 0.0, 40.0, 1.0) == pytest.approx(rate[-1])
 
 
-def test_waves_do_not_keep_a_rate_from_being_settled() -> None:
-    """Nine of them in a quarter, a tenth of the rate high."""
-    t = np.linspace(0.0, 40.0, 401)
-    for phase in np.linspace(0, 6, 13):
-        rate = 1.0 + 0.1 * np.sin(2 * np.pi * t / 1.1 + phase)
-        assert settled_mean(t, rate, 0.0, 40.0, 1.0) == pytest.approx(1.0, abs=0.02)
-
-
 def test_integrals_begin_and_end_between_samples() -> None:
     assert integral_between(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3 * 3.8 + 4.1**2 - 0.3**2)
     assert mean_between(T, 3.0 + 2 * T, 0.3, 4.1) == pytest.approx(3.0 + 4.4)
@@ -118,13 +109,6 @@ def test_a_noisy_or_coarse_angle_is_traced_back_to_its_level(digits: str, interv
     assert start_of_change(t, angle, half) == pytest.approx(begin, abs=0.3)
 
 
-def test_corrections_before_an_order_do_not_belong_to_it() -> None:
-    """A helmsman who holds the course with 3 deg to both sides, and then orders 10 deg in one row."""
-    t = np.arange(0, 100, 0.1)
-    order = np.where(t >= 50, 10.0, 3.0 * np.sign(np.sin(t / 4)))
-    assert start_of_change(t, order, 500) == t[500]
-
-
 def test_plateaus_are_distinguished_from_the_way_between_them() -> None:
     t = np.arange(0, 90.0, 0.5)
     values = np.where(t < 30, 5.0, np.where(t < 60, 0.0 + 5 * np.exp(-(t - 30) / 3), -5 + 5 * np.exp(-(t - 60) / 3)))
@@ -141,15 +125,3 @@ def test_what_is_no_record_is_refused_by_name(name: str, spoil) -> None:  # type
     record = every(stopped(), 1.0)
     with pytest.raises(DataError, match=f"^{name}: "):
         replace(record, **{name: spoil(getattr(record, name))})
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_plateaus_are_those_of_a_plain_search(seed: int) -> None:
-    """From each last row back to the first row that is off, however long the record."""
-    random = np.random.default_rng(seed)
-    values = np.repeat(random.normal(0, 1, 12), random.integers(1, 400, 12)) + random.normal(0, 0.05, 1)
-    values = values + random.normal(0, random.choice([0.0, 0.02, 0.2]), len(values))
-    tolerance = random.choice([0.05, 0.3])
-    for last in random.integers(0, len(values), 20):
-        off = np.flatnonzero(np.abs(values[:last] - values[last]) > tolerance)
-        assert _level_from(values, int(last), tolerance) == (off[-1] + 1 if len(off) else 0)

@@ -54,34 +54,6 @@ def test_a_loop_as_wide_as_it_was_made() -> None:
     assert measures["neutral_helm"].value == pytest.approx(0.0, abs=0.02 * DEGREE)
 
 
-@pytest.mark.parametrize("straight", [0.0, HOLD, 3 * HOLD])
-def test_a_straight_course_before_and_after_belongs_to_no_way(straight: float) -> None:
-    """A log that begins long before the first helm, and ends long after the last, holds the same loop."""
-    record = every(stable_spiral(), 0.5)
-    back = record.t >= START + HOLD * 8
-    jump = np.where(back, -1.0, 1.0) * np.where(record.t >= START, 0.2 * DEGREE, 0.0)
-    record = replace(record, r=record.r + jump)
-    idle = np.arange(0.0, straight, 0.5)
-    longer = {
-        name: np.concatenate([np.zeros(len(idle)), getattr(record, name), np.zeros(len(idle))])
-        for name in ("north", "east", "psi", "u", "v", "r", "helm")
-    }
-    t = np.concatenate([idle, record.t + straight, record.t[-1] + 0.5 + straight + idle])
-    measures = spiral_measures(replace(record, t=t, shaft=None, **longer))
-    assert measures["loop_height"].value == pytest.approx(0.4 * DEGREE, rel=1e-2)
-    assert measures["loop_width"].value == pytest.approx(0.4 / GAIN * DEGREE, rel=1e-2)
-
-
-def test_a_ship_that_no_helm_turns_back_has_no_height_of_a_loop() -> None:
-    """Both ways lie on one branch: their rates at helm 0 are equal, which is no sign of a stable ship."""
-    record = every(stable_spiral(), 0.5)
-    one_side = np.where(record.t >= START, 2 * GAIN * np.abs(LEVELS).max() * DEGREE, 0.0)
-    measures = spiral_measures(replace(record, r=record.r + one_side))
-    for name in ("neutral_helm", "loop_width", "loop_height", "levels_apart"):
-        assert np.isnan(measures[name].value)
-        assert measures[name].why
-
-
 @pytest.mark.parametrize(
     ("x", "value"), [([2, 1, -1], 3.5), ([2, 1, 0], 3.0), ([0, 1, 2], 5.0), ([2, 0, -1], 4.0), ([2, 1, 1], np.nan)]
 )

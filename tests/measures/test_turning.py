@@ -16,7 +16,6 @@ from tests.measures.made_records import (
     RATE,
     SPEED,
     START,
-    TIME,
     circle,
     every,
     perfect_circle,
@@ -99,18 +98,3 @@ def test_pull_out_of_a_stable_and_of_an_unstable_ship() -> None:
     assert same["residual_rate"].value == pytest.approx(0.0, abs=1e-4)
     early = pull_out_measures(rows(record, slice(0, 2 * 120)))
     assert "still changes" in early["residual_rate"].why
-
-
-def test_a_helm_that_is_let_go_gradually_is_left_amidships_until_it_moves_again() -> None:
-    """As a steering gear does: while it passes from half of the helm to a quarter it does not move again."""
-    record = every(released(), 0.5)
-    gear = np.clip(
-        record.helm + 20 * DEGREE * (record.t >= 110) - 2.5 * DEGREE * np.maximum(record.t - 110, 0), 0, None
-    )
-    gradual = replace(record, helm=np.where(record.t < 110, record.helm, gear))
-    again = replace(gradual, helm=np.where(record.t > 200, -20 * DEGREE, gradual.helm), r=record.r + (record.t > 200))
-    for one, end in ((gradual, 250.0), (again, 200.0)):
-        measures = pull_out_measures(one)
-        rate, left = GAIN * 20 * DEGREE, np.exp(-(end - 110.0) / TIME)
-        assert measures["heading_change"].value == pytest.approx(rate * TIME * (1 - left), rel=2e-3)
-        assert measures["residual_rate"].value == pytest.approx(0.0, abs=1e-4)

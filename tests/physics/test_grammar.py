@@ -58,26 +58,6 @@ def test_two_names_of_one_monomial_are_refused(first: str, second: str, turned: 
 
 
 @pytest.mark.parametrize(
-    "name", ["", "Y", "Y_", "Q_uv", "Y_ux", "Yuv", "Y_u|v", "Y_u||", "XY_u", "y_v", "Y_v2", "Y_u v"]
-)
-def test_what_is_no_derivative_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="not a coefficient"):
-        hull_derivative(name)
-
-
-@pytest.mark.parametrize("name", ["X_udot", "N_vdot", "Y_dot"])
-def test_acceleration_derivatives_are_sent_to_added_mass(name: str) -> None:
-    with pytest.raises(ValueError, match=r"belongs in \[added_mass\]"):
-        hull_derivative(name)
-
-
-@pytest.mark.parametrize("name", ["Y_delta", "X_deltadelta", "N_vvdelta"])
-def test_rudder_derivatives_are_sent_to_the_rudder(name: str) -> None:
-    with pytest.raises(ValueError, match=r"belongs in a block such as \[thruster.rudder\]"):
-        hull_derivative(name)
-
-
-@pytest.mark.parametrize(
     ("name", "unit"),
     [("X_udot", "kg"), ("Y_rdot", "kg m"), ("N_vdot", "kg m"), ("N_rdot", "kg m^2"), ("K_pdot", "kg m^2")],
 )
@@ -86,23 +66,11 @@ def test_added_mass_units(name: str, unit: str) -> None:
     assert acceleration_unit(name) == ADDED_MASS.unit(name) == unit
 
 
-@pytest.mark.parametrize("name", ["X_u", "X_uudot", "Xudot", "X_xdot", "Q_udot"])
-def test_what_is_no_added_mass_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="not an added-mass derivative"):
-        ADDED_MASS.check([name])
-
-
 @pytest.mark.parametrize(("name", "value"), [("1", 1.0), ("J", 0.4), ("Jyy", 0.4 * 0.09), ("y|y|", -0.09), ("Jt", 0.2)])
 def test_thruster_coefficients(name: str, value: float) -> None:
     symbols = {"J": ca.SX(0.4), "y": ca.SX(-0.3), "t": ca.SX(0.5)}
     assert float(thrust_monomial(name).value(symbols)) == pytest.approx(value, rel=1e-15)
     assert THRUST.unit(name) == "-"
-
-
-@pytest.mark.parametrize("name", ["", "2", "X_J", "Jx", "11", "_J"])
-def test_what_is_no_thruster_coefficient_is_refused(name: str) -> None:
-    with pytest.raises(ValueError, match="not a coefficient"):
-        thrust_monomial(name)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from shipid.engine.rollout import rollout
 from shipid.physics.learned import learned_wrench
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
@@ -35,16 +34,6 @@ def test_the_formula_by_hand() -> None:
 def test_without_output_weights_there_is_exactly_no_force() -> None:
     silent = {name: [0.0] * 3 for name in OUTPUTS}
     assert (force(np.array([6.0, 2.0, 0, 0, 0, 0.2]), **silent) == 0).all()
-
-
-def test_a_silent_network_leaves_the_path_as_it_is() -> None:
-    learns = SHIP.with_values({"hull.learned": WEIGHTS | {name: [0.0] * 3 for name in OUTPUTS}})
-    start = {"north": np.zeros(1), "east": np.zeros(1), "psi": np.zeros(1), "u": np.full(1, 4.0)}
-    start |= {"v": np.full(1, 0.3), "r": np.full(1, 0.02)}
-    commands = {name: np.full(1, 1.5) for name in vessel_dynamics(SHIP).commands}
-    weather = {"V_w": np.full(1, 4.0), "beta_w": np.full(1, 1.0)}
-    paths = [rollout(ship, start, commands, weather, step=1.0, num_steps=10).states for ship in (SHIP, learns)]
-    np.testing.assert_allclose(*paths, rtol=1e-13)
 
 
 def test_two_hundred_weights_are_parameters_by_path_of_one_structure() -> None:

@@ -11,16 +11,12 @@ import pytest
 
 from shipid.physics.propeller import (
     controllable_pitch,
-    controllable_thrust,
     controllable_wash,
     four_quadrant,
-    four_quadrant_shaft_thrust,
     four_quadrant_wash,
-    propeller_thrust,
     propeller_wash,
     propeller_wrench,
     quadratic_propeller_wrench,
-    quadratic_shaft_thrust,
     quadratic_wash,
 )
 
@@ -173,16 +169,6 @@ def test_quadratic_thrust_by_hand() -> None:
     assert astern == pytest.approx(-1.4 * 3.6e-3 * 400 - 4.5e-4 * 20 * u)
 
 
-def test_a_driven_screw_gives_its_share_against_its_sense() -> None:
-    """Between the shaft speeds at which the water drives it, a screw with k_driven = 0 gives nothing."""
-    for u, n in ((1.0, 0.02), (-1.0, -0.02)):
-        driven = quadratic_wrench(u, n)[0]
-        assert driven * n < 0
-        assert quadratic_wrench(u, n, k_driven=0.0)[0] == 0
-        assert quadratic_wrench(u, n, k_driven=0.5)[0] == pytest.approx(driven / 2)
-    assert quadratic_wrench(1.0, 20.0, k_driven=0.0)[0] == quadratic_wrench(1.0, 20.0)[0]
-
-
 def test_race_of_a_quadratic_screw() -> None:
     """Momentum theory, or c^2 = c_un u n + c_nn n^2; a screw astern takes at most all flow of a ship going ahead."""
     u, n = 0.7, 20.0
@@ -213,27 +199,6 @@ def test_race_of_a_controllable_pitch_propeller_is_momentum_theory() -> None:
 FLOW: dict[str, Any] = {**WAKE, "x": -3.36, "y": 0.4, "tau": 0.2, "C_P": 0.3}
 DRIVEN: dict[str, Any] = {"T_nn": 3.6e-3, "T_nu": 1.5e-4, "T_uu": 0.2, "k_astern": 1.4, "dT_nu": 3e-4, "k_driven": 0.3}
 CURVE: dict[str, Any] = {"beta_deg": [-180.0, -60.0, 20.0, 110.0, 180.0], "C_T": [-0.5, -0.7, 0.9, 0.4, -0.5]}
-POLYNOMIAL = {"K_T": SCREW["K_T"], "K_T_astern": ASTERN, "J_min": -0.4, "J_max": 0.8, "k_astern": 0.9, "k_drag": 0.15}
-
-
-@pytest.mark.parametrize(
-    ("force", "shaft", "numbers", "pitch"),
-    [
-        (propeller_wrench, propeller_thrust, {**FLOW, **POLYNOMIAL, "D_p": 0.216, "rho": RHO}, []),
-        (quadratic_propeller_wrench, quadratic_shaft_thrust, {"x": -3.36, "y": 0.4, **DRIVEN, "w_P0": 0.3}, []),
-        (four_quadrant, four_quadrant_shaft_thrust, {**FLOW, **CURVE, "D_p": 0.216, "rho": RHO}, []),
-        (controllable_pitch, controllable_thrust, {**FLOW, **VARIABLE, "k_astern": 0.7, "rho": RHO}, [-0.6]),
-    ],
-)
-def test_thrust_in_the_shaft_is_that_on_the_ship_before_the_deduction(
-    force: Any, shaft: Any, numbers: dict[str, Any], pitch: list[float]
-) -> None:
-    """X = (1 - t_P) T with every number given, ahead, astern and driven by the water, drifting and turning."""
-    for u, n in ((1.2, 9.0), (1.2, -9.0), (-0.8, 9.0), (-0.8, -9.0), (3.0, 2.0), (-3.0, -2.0)):
-        inputs = [ca.SX(np.array([u, 0.2, 0, 0, 0, 0.1])), ca.SX(n), *map(ca.SX, pitch)]
-        X, T = float(ca.evalf(force(*inputs, t_P=0.22, **numbers))[0]), float(ca.evalf(shaft(*inputs, **numbers)))
-        assert pytest.approx(0.78 * T, rel=1e-12) == X
-        assert T != 0
 
 
 @pytest.mark.parametrize("u", [1.0, 0.0, -0.6])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 
-import numpy as np
 import pytest
 
 from shipid.logs.mapping import UNITS
@@ -14,13 +13,9 @@ from shipid.physics.signals import (
     is_steering,
     mirror_sign,
     neutral_value,
-    rows_of_role,
     signal_of,
-    signal_row,
     signal_units,
 )
-
-COMMANDS = tuple(f"port.{name}" for name in rows_of_role("command"))
 
 
 @pytest.mark.parametrize("name", SIGNALS)
@@ -36,17 +31,6 @@ def test_a_row_is_whole(name: str) -> None:
     )
     if row.names:  # the importer reads it in the unit of sailors, too
         assert UNITS[row.unit].get(row.read_in) == pytest.approx(row.factor, rel=1e-15)
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_can_be_drawn_checked_and_guessed(name: str) -> None:
-    row = signal_row(name)
-    assert row is not None
-    assert row.usual[0] < row.usual[1] <= row.reach[1]
-    assert row.plausible is not None
-    assert row.names
-    assert max(np.abs(row.usual)) < row.plausible
-    assert not (is_shaft(name) and is_steering(name))
 
 
 def test_commands_are_recognised_by_their_last_name() -> None:
@@ -76,13 +60,3 @@ def test_commands_are_recognised_by_their_last_name() -> None:
 def test_a_name_in_a_log_is_one_signal_at_most(called: str, signal: str | None) -> None:
     matches = [name for name, row in SIGNALS.items() if row.names and re.fullmatch(row.names, called)]
     assert matches == ([signal] if signal else [])
-
-
-def test_what_nobody_knows_has_no_row() -> None:
-    assert signal_row("port.rocket") is None
-    assert (neutral_value("port.rocket"), mirror_sign("x"), is_steering("x.y"), is_shaft("x.y")) == (
-        0.0,
-        1.0,
-        False,
-        False,
-    )

@@ -111,24 +111,6 @@ def test_an_actuator_keeps_its_limits_and_its_rate(advance: Any, order: float, r
     assert -0.3 <= min(path) <= max(path) <= 0.6
 
 
-def test_a_rate_limit_has_no_lag() -> None:
-    """At its order after order / rate, to the last digit, in any number of steps."""
-    for steps in (1, 7):
-        state = 0.0
-        for _ in range(steps):
-            state = float(thruster.rate_limit_advance(ca.SX(0.5), ca.SX(state), ca.SX(5.0 / steps), rate=ca.SX(0.1)))
-        assert state == pytest.approx(0.5, rel=1e-14)
-
-
-@pytest.mark.parametrize("u", [5.0, -5.0])
-def test_the_over_running_drag_of_an_azimuth_unit_has_a_step_at_zero_revolutions(u: float) -> None:
-    """As its description says: k_T rho D_p^2 k_over2 u^2 for water from ahead, k_astern times as large from astern."""
-    unit = load_vessel("gunnerus-28.9").document["thruster"]["port"]
-    above, below = (numbers(azimuth()([u, 0, 0, 0, 0, 0], n, 0.0))[0] for n in (1e-7, -1e-7))
-    drag = unit["k_T"] * 1025.0 * unit["D_p"] ** 2 * unit["k_over2"] * u**2
-    assert above - below == pytest.approx(-drag if u > 0 else -unit["k_astern"] * drag, rel=1e-3)
-
-
 @pytest.mark.parametrize(("J", "J_y"), [(2.0, 0.1), (1.4, -0.5), (-1.0, 0.2), (0.8, 1.1), (0.5, -0.9), (2.2, 0.8)])
 @pytest.mark.parametrize("sense", [1, -1])
 def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:

@@ -11,7 +11,6 @@ from shipid.simulation.approach import (
     Controls,
     NotStraight,
     balanced_shaft,
-    helm_effect,
     steady_approach,
     straight_acceleration,
 )
@@ -41,13 +40,6 @@ def test_aft_azimuths_turn_against_their_angle_and_forward_ones_with_it() -> Non
 @pytest.mark.parametrize("key", ["kvlcc2-l7", "mariner"])
 def test_a_positive_rudder_angle_turns_the_ship_to_starboard(key: str) -> None:
     assert Controls(load_vessel(key)).helm == {"rudder.delta": 1.0}
-
-
-def test_helm_effect_is_the_yaw_acceleration_to_starboard() -> None:
-    controls = Controls(SHIP)
-    slow, fast = helm_effect(controls, 1.0, 0.0), helm_effect(controls, 2.0, 0.0)
-    assert slow > 0
-    assert fast == pytest.approx(4 * slow)  # thrust goes with n^2 at rest
 
 
 def test_a_vessel_that_nothing_drives_or_turns_is_refused() -> None:

@@ -27,12 +27,6 @@ def test_horizontal_velocities_are_those_of_the_rotation() -> None:
         np.testing.assert_allclose(back[name], body[name], atol=1e-12)
 
 
-def test_a_level_ship_logs_the_velocities_of_its_body() -> None:
-    level = {name: np.array([value]) for name, value in (("u", 2.0), ("v", -0.3), ("r", 0.05))}
-    for turned in (horizontal_velocities(level), body_velocities(level)):
-        assert {name: values[0] for name, values in turned.items()} == {"u": 2.0, "v": -0.3, "r": 0.05}
-
-
 def test_names_sort_as_they_count() -> None:
     assert number_runs(2) == ["M001", "M002"]
     many = number_runs(1200)

@@ -10,11 +10,10 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.measures.recognise import recognise_kinds, record_of
+from shipid.measures.recognise import record_of
 from shipid.measures.zigzag import zigzag_measures
 from shipid.simulation.manoeuvre import (
     KINDS,
-    ConstantOrders,
     CrashStop,
     Excitation,
     Manoeuvre,
@@ -25,7 +24,7 @@ from shipid.simulation.manoeuvre import (
 )
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, check_document, load_vessel
+from shipid.vessel.load import Vessel, load_vessel
 from tests.conftest import LAG
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -145,20 +144,6 @@ def test_steps_hold_levels_in_their_ranges() -> None:
     assert np.abs(other["port.n"] - log["port.n"]).max() > 0.1
 
 
-@pytest.mark.parametrize(
-    ("orders", "path", "message"),
-    [
-        ({"n_rpm": 120}, "manoeuvre.alpha_deg", "give alpha_deg"),
-        ({"n_rpm": 120, "alpha_deg": 5, "delta_deg": 5}, "manoeuvre.delta_deg", "orders no command of R/V Gunnerus"),
-        ({"n_rpm": 120, "alpha_deg": 5, "bow.n_rpm": 5}, "manoeuvre.bow.n_rpm", "orders no command"),
-    ],
-)
-def test_orders_are_those_of_the_vessel(orders: dict[str, float], path: str, message: str) -> None:
-    with pytest.raises(DocumentError, match=message) as caught:
-        one(SHIP, ConstantOrders(orders=orders, duration=20))
-    assert caught.value.path == path
-
-
 def test_the_direct_spiral_jumps_across_the_loop_of_an_unstable_ship() -> None:
     changes = {"N_uv": 0.0, "N_ur": 3e6, "N_uur": 0.0}  # yaw damping turned round
     unstable = SHIP.with_values({f"hull.derivatives.{name}": value for name, value in changes.items()})
@@ -179,23 +164,6 @@ def test_crash_stop_reverses_the_thrust_and_stops(vessel: Vessel) -> None:
     assert 5 < t[stopped] - 3 < 60
     assert (np.diff(u[(t > 3.5) & (t < t[stopped])]) < 0).all()
     assert np.abs(log["r"]).max() < 1e-12
-
-
-def test_a_controllable_pitch_is_reversed_in_a_crash_stop() -> None:
-    """Its gear turns slowly and stops at -0.5; the shaft goes on turning as it did, and the log is known for a stop."""
-    fixed = load_vessel("kvlcc2-l7")
-    screw = {name: fixed.document["thruster"]["propeller"][name] for name in ("x", "D_p", "t_P", "w_P0")}
-    gear = {"pitch": {"kind": "rate_limit", "rate": 0.05, "low": -0.5, "high": 0.9}}
-    screw |= {"kind": "controllable_pitch", "k_P": 0.4063, "k_J": 0.4, "actuator": gear}
-    ship = check_document({**fixed.document, "thruster": {**fixed.document["thruster"], "propeller": screw}}, "CP")
-    log = one(ship, CrashStop(n_rpm=600, astern_rpm=500, execute_at=3, duration=150))
-    before = log["t"].to_numpy() < 2.95
-    np.testing.assert_allclose(log["propeller.n"], np.where(before, 10.0, 500 / 60))
-    np.testing.assert_allclose(log["propeller.pitch"], np.where(before, 0.8, -0.8))
-    reached = log["actual.propeller.pitch"].to_numpy()
-    np.testing.assert_allclose(reached, np.where(before, 0.8, np.maximum(0.8 - 0.05 * (log["t"] - 3), -0.5)), atol=1e-9)
-    assert np.interp(10.0, log["t"], log["u"]) > 0 > log["u"].min()
-    assert recognise_kinds(record_of(log))[0] == ("stop",)
 
 
 @pytest.mark.parametrize("signal", ["multisine", "aprbs"])

@@ -18,7 +18,7 @@ from shipid.simulation.manoeuvre import (
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.units import DEGREE
-from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.load import load_vessel
 from tests.conftest import LAG
 
 SHIP = load_vessel("gunnerus-28.9")
@@ -35,13 +35,6 @@ def test_log_is_a_dataset_without_what_the_actuators_reached() -> None:
     assert list(frame["run"].unique()) == ["M001", "M002"]
     assert "V_w" in frame
     assert not any(str(name).startswith("actual.") for name in perform_manoeuvres(SHIP, [CIRCLE], step=0.1))
-
-
-def test_interval_only_thins_the_log() -> None:
-    zigzag = [Zigzag(n_rpm=145, duration=40)]
-    fine, coarse = perform_manoeuvres(SHIP, zigzag, step=0.1), perform_manoeuvres(SHIP, zigzag, step=0.1, interval=0.5)
-    thinned = fine.iloc[::5].reset_index(drop=True)
-    pd.testing.assert_frame_equal(thinned, coarse, rtol=1e-10)
 
 
 def test_a_helmsman_holds_the_approach_of_a_ship_that_does_not_go_straight() -> None:
@@ -72,20 +65,6 @@ def test_weather_may_change_from_step_to_step() -> None:
     for place, (_, run) in enumerate(blown.groupby("run", sort=False)):
         np.testing.assert_allclose(run["V_w"], rising[::5, place][: len(run)])
     assert np.abs(blown["v"] - held["v"]).max() > 0.01
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("vessel", [SHIP, LAGGED], ids=["ideal", "lagged"])
-def test_helmsmen_lower_like_everything_else(vessel: Vessel) -> None:
-    """CasADi sample by sample, PyTorch as a batch: the same numbers."""
-    short = {"n_rpm": 200, "approach": "rest"}
-    chosen = [
-        Zigzag(**short, angle_deg=35, execute_heading_deg=2, duration=15, side="port"),
-        Zigzag(**short, angle_deg=20, execute_heading_deg=1, duration=15),
-    ]
-    each, batch = (perform_manoeuvres(vessel, chosen, step=0.25, engine=engine) for engine in ("casadi", "torch"))
-    assert (each.groupby("run")["port.alpha"].nunique() > 1).all()
-    pd.testing.assert_frame_equal(each, batch, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

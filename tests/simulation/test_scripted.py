@@ -68,7 +68,7 @@ def test_a_vessel_that_cannot_perform_a_manoeuvre_is_not_a_key_of_the_document(t
         (GIVEN.replace("step = 0.5", "stride = 1"), "stride", "unknown key"),
         (GIVEN.replace("duration = 40", "duration = 4e7"), "manoeuvre", "a run of 4e\\+07 s: at most 1e\\+06 s"),
         ("[truth]\nmanoeuvres = 2", None, "is a study"),
-        (GIVEN.replace("step = 0.5", "step = 1e-12"), "step", "1e-12 s: 2 runs of 60 s take .* GiB of memory"),
+        (GIVEN.replace("step = 0.5", "step = 1e-12"), "step", "2 runs in steps of 1e-12 s take .* GiB of memory"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, message: str, tmp_path: Path) -> None:

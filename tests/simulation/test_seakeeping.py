@@ -19,7 +19,7 @@ from shipid.simulation.truth import Truth, simulate_truth
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.simulation.linear import AXES, EVERY, HEAVE, PITCH, ROLL, SPEEDS, UPRIGHT, linear
+from tests.simulation.linear import EVERY, HEAVE, PITCH, ROLL, UPRIGHT, linear
 
 HULLS = ("gunnerus-28.9-6dof", "gunnerus-33.9-6dof")
 BOTH = pytest.mark.parametrize("name", HULLS)
@@ -235,50 +235,6 @@ def test_first_order_loads_do_not_drift_the_ship(name: str, beta_deg: int) -> No
 
 
 # ---- long waves
-
-
-def low_frequency(name: str) -> Vessel:
-    """The 28.9 m ship with the plane's added mass of the data base at zero frequency in place of the manoeuvring set:
-    a ship whose loads and inertia belong together, so that she must ride long waves."""
-    A = np.diag([3.6534e4, 2.37704e5, 6.76452e5, 9.93991e5, 2.5141043e7, 1.0018574e7])
-    pairs = {"XZ": -3.8641e4, "XM": -8.23718e5, "YK": 1.19391e5, "YN": 6.63702e5, "ZM": 1.59005e6, "KN": -1.910865e6}
-    for pair, value in pairs.items():
-        i, j = AXES.index(pair[0]), AXES.index(pair[1])
-        A[i, j] = A[j, i] = value
-    H = np.eye(6)
-    H[0, 4], H[1, 3] = Z_G[name], -Z_G[name]
-    moved = H.T @ A @ H
-    entries = {f"{AXES[i]}_{SPEEDS[j]}dot": -moved[i, j] for i in range(6) for j in range(6) if moved[i, j]}
-    return ship(name).with_values({f"added_mass.{key}": float(value) for key, value in entries.items()})
-
-
-def long_wave(vessel: Vessel, beta_deg: float) -> tuple[complex, complex, complex]:
-    """Heave over elevation, roll and pitch over slope k a in a regular wave of 0.3 rad/s, 5 cm: simulated, all free."""
-    omega, theory = 0.3, linear(vessel)
-    drawn = {"omega": omega, "amplitude": 0.05, "epsilon": 0.0, "chi": np.radians(beta_deg)}
-    arrays = {key: np.array([[value]]) for key, value in drawn.items()}
-    response = linearised(vessel).response(
-        np.array([omega]), theory.excitation(np.array([omega]), np.radians(beta_deg))
-    )
-    start = {key: 0.05 * value.real for key, value in response.items()}
-    path = run(vessel, start, 84.0, components=first_order(vessel, arrays), keep=tuple(OF.values()))
-    time = path.interval * np.arange(len(path.states))
-    basis = np.stack([np.cos(omega * time), -np.sin(omega * time), np.ones_like(time)], axis=-1)
-    fits = [np.linalg.lstsq(basis, path[key][:, 0, 0], rcond=None)[0] for key in OF.values()]
-    k = omega**2 / GRAVITY
-    return tuple(complex(fit[0], fit[1]) / 0.05 / scale for fit, scale in zip(fits, (1, k, k), strict=True))  # type: ignore[return-value]
-
-
-def test_ship_rides_long_waves() -> None:
-    """Heave = -elevation (z down), pitch and roll = slope: within 1, 2 and 5 % (roll is a twelfth of the way to
-    resonance: 1.036 in the data base). Bow up where the wave rises ahead: +90 deg of phase in a head sea."""
-    vessel = low_frequency(HULLS[0])
-    heave, _, pitch = long_wave(vessel, 180)
-    assert heave == pytest.approx(-1, abs=0.01)
-    assert pitch == pytest.approx(1j, abs=0.03)
-    heave, roll, _ = long_wave(vessel, 90)
-    assert heave == pytest.approx(-1, abs=0.01)
-    assert roll == pytest.approx(1.036j, abs=0.08)
 
 
 # ---- calm water

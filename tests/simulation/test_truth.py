@@ -89,13 +89,6 @@ def test_every_structure_logs_a_dataset(name: str) -> None:
     assert ("z" in columns) == (name == "six")
 
 
-def test_diverging_truth_is_reported() -> None:
-    wild = SHIP.with_values({"hull.derivatives.X_u|u|": 1e7})
-    with pytest.raises(DocumentError, match=r"diverges in M00\d: take a smaller step") as caught:
-        simulate_truth(truth(start_speed=(2.0, 3.0)), wild)
-    assert caught.value.path == "truth"
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -190,16 +183,3 @@ def test_a_sensor_of_an_output_logs_it() -> None:
     assert 20 < np.std(noisy - exact) < 80
     with pytest.raises(DocumentError, match=r"truth.sensors.port.torque: no logged column"):
         simulate_truth(truth(duration=10.0, sensors={"port.torque": {}}), SHIP)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"inertia.mass": 8e5}, "^truth.set.inertia.mass: "),
-        ({"inertia.m.kg": 1.0}, "^truth.set.inertia.m.kg: inertia.m is no table"),
-    ],
-)
-def test_a_wrong_value_of_the_block_has_its_path(wrong: dict[str, float], message: str) -> None:
-    """Before, it had the path in the vessel, or none."""
-    with pytest.raises(DocumentError, match=message):
-        simulate_truth(truth(set=wrong), SHIP)

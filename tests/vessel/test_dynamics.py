@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import wraps
 from typing import Any
 
 import numpy as np
 import pytest
 
 from shipid.engine.rollout import rollout
-from shipid.physics import TERMS, Term
 from shipid.physics.inertia import total_mass
 from shipid.vessel import dynamics as module
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.drawn import seeds
 
 
 def values(vessel: Vessel) -> np.ndarray:
@@ -81,22 +78,6 @@ def test_planar_equations_by_hand() -> None:
     )
 
 
-def test_a_current_carries_the_ship_along() -> None:
-    """Drifting with a steady current, straight and unpowered: no relative motion, so no force (Galilei)."""
-    vessel = load_vessel("gunnerus-28.9").with_values(
-        {"current.kind": "uniform", "wind.off": True, "thruster.port.off": True, "thruster.starboard.off": True}
-    )
-    V_c, beta_c, psi = 0.9, 2.0, 0.5
-    u, v = V_c * np.cos(beta_c - psi), V_c * np.sin(beta_c - psi)
-    moved = rates(vessel, u=u, v=v, psi=psi, V_c=V_c, beta_c=beta_c)
-    np.testing.assert_allclose([moved["u"], moved["v"], moved["r"]], 0, atol=1e-15)
-    turning = rates(vessel, u=u + 3.0, v=v, r=0.05, psi=psi, V_c=V_c, beta_c=beta_c)
-    still = rates(vessel, u=3.0, v=0.0, r=0.05, psi=psi)
-    carried = np.array([0.05 * v, -0.05 * u])  # velocities in turning axes: nu_dot = nu_r_dot + d(nu_c)/dt
-    np.testing.assert_allclose([turning["u"] - still["u"], turning["v"] - still["v"]], carried, rtol=1e-9)
-    assert turning["r"] == pytest.approx(still["r"], rel=1e-9)
-
-
 @pytest.mark.parametrize("coriolis", ["full", "none"])
 @pytest.mark.parametrize("name", ["container-175", "naval-51"])
 def test_a_current_carries_a_ship_that_heels_in_her_turn(name: str, coriolis: str) -> None:
@@ -159,24 +140,6 @@ def test_heave_of_a_pitching_and_rolling_ship_does_not_drive_her(name: str) -> N
     for driven, turned in (("u", "q"), ("v", "p")):
         both, turning = (rates(ship, w=heave, **{turned: angular})[driven] for heave in (w, 0.0))
         assert abs(both - turning - heaving[driven]) < 0.2 * w * angular
-
-
-@pytest.mark.parametrize("seed", seeds(1, 3))
-def test_another_function_under_the_name_of_a_term_is_another_model(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A notebook whose cell of a term runs again got the equations of the function before, without a word."""
-    vessel, plain = load_vessel("gunnerus-28.9"), TERMS["hull.derivatives"].function
-    speed, factor = np.random.default_rng(seed).uniform(1.0, 3.0, 2)
-    before = rates(vessel, u=speed)["u"]
-
-    def scaled(factor: float) -> float:
-        function = wraps(plain)(lambda *args, **kwargs: factor * plain(*args, **kwargs))
-        monkeypatch.setitem(TERMS, "hull.derivatives", Term(function))
-        return rates(vessel, u=speed)["u"]
-
-    rest = scaled(0.0)  # of the other terms
-    assert scaled(factor) - rest == pytest.approx(factor * (before - rest))
-    monkeypatch.undo()
-    assert rates(vessel, u=speed)["u"] == before
 
 
 def mass_matrix(vessel: Vessel) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from shipid.simulation.manoeuvre import TurningCircle, Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.template import PROPULSORS, Particulars, added_mass_values, first_guess, hull_values, inertia_values
+from shipid.vessel.template import Particulars, added_mass_values, first_guess, hull_values
 
 MARINER = Particulars(160.93, 23.17, 7.47, 0.597, 7.7175)
 KVLCC2 = Particulars(320.0, 58.0, 20.8, 0.810, 7.97, ship_type="tanker")
@@ -60,14 +59,6 @@ def test_formulae_near_kvlcc2_as_measured() -> None:
     for name, measured in {"Y_v": -0.315, "Y_r": 0.083, "N_v": -0.137, "N_r": -0.049, "Y_vrr": -0.391}.items():
         assert estimates[name] == pytest.approx(measured, rel=0.25), name
     assert -added_mass_values(KVLCC2)["Y_vdot"].number / (0.5 * 1025 * 320**2 * 20.8) == pytest.approx(0.223, rel=0.1)
-
-
-def test_yaw_of_a_stern_pushed_aside_is_reported_stable_or_not() -> None:
-    """The same hull: azimuth units, which are fins too, hold the course; the rudder's does not."""
-    assert first_guess(GUNNERUS, "g", "g.toml").growth < 0
-    proposal = first_guess(replace(GUNNERUS, propulsor="propeller-rudder"), "g", "g.toml")
-    assert proposal.growth > 0
-    assert "UNSTABLE" in proposal.text
 
 
 def dead_ships() -> list[Vessel]:
@@ -189,24 +180,6 @@ def test_what_the_formulae_do_not_know_is_refused(change: dict[str, object], com
         first_guess(replace(MARINER, **change), "ship", "ship.toml")  # type: ignore[arg-type]
     assert complaint in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_all_that_is_not_refused_loads() -> None:
-    """Corners of the ranges: a document comes out."""
-    corners = itertools.product((5.0, 50.0), (2.0, 3.4, 9.0), (6.0,), (0.4, 0.9), PROPULSORS)
-    for length, slenderness, flatness, block, propulsor in corners:
-        if block / slenderness <= 0.3:
-            beam = length / slenderness
-            first_guess(Particulars(length, beam, beam / flatness, block, propulsor=propulsor), "ship", "ship.toml")
-
-
-def test_a_beamy_ship_has_the_yaw_inertia_of_the_charts() -> None:
-    """R/V Gunnerus before she was lengthened (L / B = 3.0): 0.57 of I_z, by her identified model."""
-    sizes = load_vessel("gunnerus-28.9").document["particulars"]
-    given = Particulars(sizes["L_pp"], sizes["B"], sizes["T"], 0.55)
-    share = -added_mass_values(given)["N_rdot"].number / inertia_values(given)["I_z"].number
-    assert 0.3 < share < 0.6  # Clarke's formula: 0.10
-    assert added_mass_values(MARINER)["N_rdot"].note == "Clarke et al. (1983)"
 
 
 def test_no_motion_of_the_water_has_an_energy_below_0() -> None:
