@@ -388,8 +388,9 @@ def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
         with open_file(file) as stream:
             table = read_arrow(stream)
     except (pyarrow.ArrowException, ValueError, TypeError):
-        hint = f"make one from a log with `shipid data import`{remedy}"
-        raise DataError(f"not a Parquet file: {hint}", file=file) from None
+        raise DataError(
+            f"not a Parquet file: make one from a log with `shipid data import`{remedy}", file=file
+        ) from None
     except FileNotFoundError:
         raise DataError("cannot be read (no such file)", file=file) from None
     except OSError as error:

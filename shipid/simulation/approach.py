@@ -83,8 +83,9 @@ class Controls:
                     ", it steers by its shafts: the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each "
                     f"one ({self.drives[0]}_rpm)"
                 )
-            message = f"no angle command turns {self.vessel.name}{what}"
-            raise DocumentError(message, file=self.vessel.file, path="thruster")
+            raise DocumentError(
+                f"no angle command turns {self.vessel.name}{what}", file=self.vessel.file, path="thruster"
+            )
         return self._turning
 
     @property

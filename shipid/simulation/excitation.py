@@ -46,8 +46,10 @@ def multisine_series(
     """
     fastest, step = max(harmonics), float(np.diff(time).max()) if len(time) > 1 else 0.0
     if 2 * fastest * step >= period:
-        message = f"harmonic {fastest} of {period:g} s is too fast for steps of {step:g} s: less than two a cycle"
-        raise DocumentError(message, path="harmonics")
+        raise DocumentError(
+            f"harmonic {fastest} of {period:g} s is too fast for steps of {step:g} s: less than two a cycle",
+            path="harmonics",
+        )
     h = np.array(harmonics, dtype=np.int64)
     start = -np.pi * np.arange(len(h)) * np.arange(1, len(h) + 1) / len(h)
     phi = _shift_to_zero(h, _optimise_phases(h, start, key))

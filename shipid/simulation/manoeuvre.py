@@ -145,14 +145,18 @@ class OrderedManoeuvre(Manoeuvre):
         unknown = next((key for key in series if key not in valid), None)
         if unknown is not None:
             known = {*valid, *type(self).model_fields} - {"orders"}
-            message = f"orders no command of {controls.vessel.name}: {suggest_name(unknown, known)}"
-            raise DocumentError(message, path=f"manoeuvre.{unknown}")
+            raise DocumentError(
+                f"orders no command of {controls.vessel.name}: {suggest_name(unknown, known)}",
+                path=f"manoeuvre.{unknown}",
+            )
         result = {}
         for name, (single, common) in chosen.items():
             key = single if single in series else common
             if key not in series:
-                message = f"missing: {controls.vessel.name} has the command {name}, give {common} = [low, high]"
-                raise DocumentError(message, path=f"manoeuvre.{common}")
+                raise DocumentError(
+                    f"missing: {controls.vessel.name} has the command {name}, give {common} = [low, high]",
+                    path=f"manoeuvre.{common}",
+                )
             result[name] = series[key] * order_unit(name)
         return result
 
@@ -242,8 +246,10 @@ class ExecutedManoeuvre(ApproachedManoeuvre):
     def check(self, controls: Controls) -> None:
         """Raise DocumentError as for every approach, and where the first order comes after the end of the log."""
         if not self.execute_at < self.length:
-            message = f"{self.execute_at:g} s: the run ends at {self.length:g} s, before the first order: give less"
-            raise DocumentError(message, path="manoeuvre.execute_at")
+            raise DocumentError(
+                f"{self.execute_at:g} s: the run ends at {self.length:g} s, before the first order: give less",
+                path="manoeuvre.execute_at",
+            )
         super().check(controls)
 
 

@@ -62,8 +62,9 @@ def _measure_run(
     step = float(rows["t"].iloc[-1] - rows["t"].iloc[0]) / (len(rows) - 1)
     stride = whole_steps(interval, step)
     if not stride:
-        message = f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s"
-        raise DocumentError(message, path="interval")
+        raise DocumentError(
+            f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s", path="interval"
+        )
     log = rows.iloc[::stride].copy()
     for name, sensor in sensors.items():
         truth = rows[name].to_numpy(dtype=np.float64)

@@ -103,8 +103,9 @@ def define_standard(
     interval = _round_to_125(passing / ROWS) if step is None else step * STEPS
     lead = round_to_rows(LEAD * passing, interval)
     if duration is not None and "duration" in kind.model_fields and duration <= lead:  # else of a level
-        words = f"{duration:g} s is over before the first order, at {lead:g} s of the log"
-        raise ShipidError(f"{words}: give more", path="--duration")
+        raise ShipidError(
+            f"{duration:g} s is over before the first order, at {lead:g} s of the log: give more", path="--duration"
+        )
     course = 90.0 if kind.straight else 0.0  # drawn from left to right
     keys = {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course, "approach": approach}
     if step is not None and step > passing / LEAST_STEPS:
@@ -150,8 +151,9 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     ShipidError : the speed is not positive, or no shaft speed up to 60,000 rpm gives it.
     """
     if not 0 < speed <= SPEED_LIMIT:
-        words = f"the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s"
-        raise ShipidError(f"{speed:g} m/s: {words}", path="--speed")
+        raise ShipidError(
+            f"{speed:g} m/s: the speed of the approach must be above 0 and at most {SPEED_LIMIT:g} m/s", path="--speed"
+        )
     _ = controls.drives  # DocumentError where nothing drives her, at any speed
     n = balanced_shaft(controls, speed)
     if n is None:

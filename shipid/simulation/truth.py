@@ -119,12 +119,16 @@ def _check_environment(truth: Truth, vessel: Vessel) -> None:
     unknown = next((key for key in truth.environment if key not in keys.values()), None)
     if unknown is not None:
         remedy = suggest_name(unknown, keys.values()) if keys else "remove it"
-        message = f"no term of {truth.vessel} takes it, or another key of [truth] gives it: {remedy}"
-        raise DocumentError(message, path=f"{path}.{unknown}")
+        raise DocumentError(
+            f"no term of {truth.vessel} takes it, or another key of [truth] gives it: {remedy}",
+            path=f"{path}.{unknown}",
+        )
     missing = next((name for name, key in keys.items() if key not in truth.environment), None)
     if missing is not None:
-        message = f"missing: {truth.vessel} takes {missing}, give {keys[missing]} = [low, high]"
-        raise DocumentError(message, path=f"{path}.{keys[missing]}")
+        raise DocumentError(
+            f"missing: {truth.vessel} takes {missing}, give {keys[missing]} = [low, high]",
+            path=f"{path}.{keys[missing]}",
+        )
 
 
 def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
@@ -134,8 +138,9 @@ def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
     lost = share_outside(sea, low, high)
     if lost > MOST_LOST:
         message = f"{sea.T_p:g} s: {percent_text(lost)} of the sea's energy lies outside the tables of {truth.vessel}"
-        remedy = f"{low:g} to {high:g} rad/s; at most {percent_text(MOST_LOST)} may"
-        raise DocumentError(f"{message}, {remedy}", path="truth.waves.T_p")
+        raise DocumentError(
+            f"{message}, {low:g} to {high:g} rad/s; at most {percent_text(MOST_LOST)} may", path="truth.waves.T_p"
+        )
 
 
 def _path_in_block(path: str | None, place: int) -> str:

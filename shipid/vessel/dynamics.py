@@ -297,8 +297,10 @@ def _orders_by_command(
     result = {name: given.get(name, given.get(name.rsplit(".", 1)[-1])) for name in ordered}
     missing = [name for name, order in result.items() if order is None]
     if missing or (unknown and not names):
-        message = f"{helmsman.name} gives no order for {', '.join(missing) or suggest_name(unknown[0], ordered)}"
-        raise DocumentError(message, file=vessel.file)
+        raise DocumentError(
+            f"{helmsman.name} gives no order for {', '.join(missing) or suggest_name(unknown[0], ordered)}",
+            file=vessel.file,
+        )
     return {name: SX(order) for name, order in result.items()}
 
 

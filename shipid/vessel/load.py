@@ -138,8 +138,10 @@ class Vessel:
         Raises DocumentError for values that are no mapping by path, and for what the vessel's checks refuse.
         """
         if not hasattr(values, "items") or not all(isinstance(path, str) for path in values.keys()):  # noqa: SIM118
-            message = f"values must be a mapping of dotted paths, such as {{'inertia.m': 4e5}}, not {values!r}"
-            raise DocumentError(message, file=self.file)
+            raise DocumentError(
+                f"values must be a mapping of dotted paths, such as {{'inertia.m': 4e5}}, not {values!r}",
+                file=self.file,
+            )
         values = {path: documents.plain_values(value) for path, value in values.items()}
         least, most = documents.LEAST_NUMBER, documents.MOST_NUMBER
         odd = {
@@ -218,8 +220,11 @@ def _read_table_file(source: Path, columns: tuple[str, ...], file: Path, path: s
         raise DocumentError(f"{source}: cannot be read: {words}", file=file, path=path) from None
     missing = next((name for name in columns if name not in frame), None)
     if missing is not None:
-        message = f"{source}: has no column {missing!r}: {suggest_name(missing, [str(name) for name in frame])}"
-        raise DocumentError(message, file=file, path=path)
+        raise DocumentError(
+            f"{source}: has no column {missing!r}: {suggest_name(missing, [str(name) for name in frame])}",
+            file=file,
+            path=path,
+        )
     numbers = frame[list(columns)].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=float)
     if not np.isfinite(numbers).all():
         row, column = np.argwhere(~np.isfinite(numbers))[0]
@@ -281,8 +286,11 @@ def check_document(document: Document, file: str) -> Vessel:
     for path, key, block in term_blocks(document):
         name = path.rsplit(".", 1)[-1]
         if name in paths:
-            message = f"{paths[name]} ends in the same name, and commands are named by it: choose another"
-            raise DocumentError(message, file=file, path=path)
+            raise DocumentError(
+                f"{paths[name]} ends in the same name, and commands are named by it: choose another",
+                file=file,
+                path=path,
+            )
         paths[name] = path
         _check_lengths(path, block, file)
         if key in TABLES:
@@ -318,8 +326,9 @@ def _check_behind(vessel: Vessel) -> None:
             if block[BEHIND] not in giving:
                 off = [other.rsplit(".", 1)[-1] for other, _, _ in term_blocks(vessel.document, off=True)]
                 remedy = "it is off" if block[BEHIND] in off else suggest_name(block[BEHIND], giving)
-                message = f"{block[BEHIND]!r} gives no {name}: {remedy}"
-                raise DocumentError(message, file=vessel.file, path=f"{path}.{BEHIND}")
+                raise DocumentError(
+                    f"{block[BEHIND]!r} gives no {name}: {remedy}", file=vessel.file, path=f"{path}.{BEHIND}"
+                )
 
 
 def _check_sense(vessel: Vessel) -> None:
@@ -342,11 +351,17 @@ def _check_component(path: str, group: str, block: Any, file: str) -> None:
     """Check a block by the model of its kind, so that errors have the path and names of the file."""
     name = path.partition(".")[2]
     if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
-        remedy = "use letters from a to z, digits, _ and -, a letter first"
-        raise DocumentError(f"{name!r} is no name for a {group}: {remedy}", file=file, path=group)
+        raise DocumentError(
+            f"{name!r} is no name for a {group}: use letters from a to z, digits, _ and -, a letter first",
+            file=file,
+            path=group,
+        )
     if f"{name}." == ACTUAL:
-        message = f"{name!r} is no name for a {group}: with it begin columns of what actuators have reached"
-        raise DocumentError(message, file=file, path=path)
+        raise DocumentError(
+            f"{name!r} is no name for a {group}: with it begin columns of what actuators have reached",
+            file=file,
+            path=path,
+        )
     if not isinstance(block, Mapping):
         raise DocumentError(f"{block!r}: must be a table with a `kind`", file=file, path=path)
     kind, valid = block.get("kind"), kinds_of_group(group)
@@ -366,8 +381,7 @@ def _check_circle(path: str, block: Mapping[str, Any], file: str) -> None:
     """DocumentError for a propeller in four quadrants whose table has a gap at 180 deg."""
     beta, thrust = block["beta_deg"], block["C_T"]
     if (beta[0], beta[-1]) != (-180, 180) or thrust[0] != thrust[-1]:
-        message = "must go from -180 to 180, where C_T must be the same"
-        raise DocumentError(message, file=file, path=f"{path}.beta_deg")
+        raise DocumentError("must go from -180 to 180, where C_T must be the same", file=file, path=f"{path}.beta_deg")
 
 
 def _check_lengths(path: str, block: Mapping[str, Any], file: str) -> None:
@@ -390,10 +404,11 @@ def _check_wave_table(path: str, table: Mapping[str, list[float]], columns: tupl
     whole = len(pairs) == len(table["omega"]) == len(omega) * len(beta)
     even = len(beta) > 1 and np.allclose(beta, np.linspace(0, 180, len(beta)), atol=1e-6)
     if not whole or not even or len(omega) < 4:
-        message = (
-            "is no grid: give four frequencies or more, each at the same equally spaced headings from 0 to 180 deg"
+        raise DocumentError(
+            "is no grid: give four frequencies or more, each at the same equally spaced headings from 0 to 180 deg",
+            file=file,
+            path=path,
         )
-        raise DocumentError(message, file=file, path=path)
 
 
 def _check_units(vessel: Vessel) -> None:
@@ -402,16 +417,20 @@ def _check_units(vessel: Vessel) -> None:
             documents.value_at_path(vessel.document, path)
         except KeyError:
             group, name = path.rsplit(".", 1)
-            message = f"missing: a term needs {name}, here or in the block of the term"
-            raise DocumentError(message, file=vessel.file, path=f"{group}.{name}") from None
+            raise DocumentError(
+                f"missing: a term needs {name}, here or in the block of the term",
+                file=vessel.file,
+                path=f"{group}.{name}",
+            ) from None
 
 
 def _check_inertia(vessel: Vessel) -> None:
     """DocumentError if a moment of inertia is missing, or mass plus added mass is not positive definite."""
     for row, name in ((3, "I_x"), (4, "I_y")):
         if row in vessel.axes and not vessel.document["inertia"].get(name):
-            message = f"missing: {len(vessel.axes)} degrees of freedom need it"
-            raise DocumentError(message, file=vessel.file, path=f"inertia.{name}")
+            raise DocumentError(
+                f"missing: {len(vessel.axes)} degrees of freedom need it", file=vessel.file, path=f"inertia.{name}"
+            )
     if not _is_positive(vessel.mass):
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"

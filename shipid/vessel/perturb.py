@@ -75,8 +75,7 @@ def _checked_values(values: Mapping[str, float], base: Vessel, file: Any, where:
     if unknown is not None:
         switch = unknown.rpartition(".")[2] in ("off", "kind")
         hint = WITHOUT if switch else suggest_name(unknown, base.parameters)
-        message = f"{base.key} has no parameter {unknown!r}: {hint}"
-        raise DocumentError(message, file=file, path=where)
+        raise DocumentError(f"{base.key} has no parameter {unknown!r}: {hint}", file=file, path=where)
     return values
 
 
@@ -347,10 +346,11 @@ def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[S
     check_class("family", family, Family, "such as Family(name=..., perturb=[...])")
     check_class("base", base, Vessel, "as of `load_vessel`")
     if family.extends is not None:
-        message = (
-            f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve_families`"
+        raise DocumentError(
+            f"extends {family.extends!r}, whose perturbations come first: write them out, or use `resolve_families`",
+            file=file,
+            path=f"family.{family.name}.extends",
         )
-        raise DocumentError(message, file=file, path=f"family.{family.name}.extends")
     original, times, result = base.parameters, dict[str, int](), list[Step]()
     for index, block in enumerate(family.perturb, start=-family._inherited):
         place = f"perturb.{index}" if index >= 0 else f"extends.perturb.{index + family._inherited}"
@@ -383,8 +383,11 @@ def select_paths(patterns: Sequence[str], paths: Mapping[str, float], file: Any,
     for pattern in patterns:
         parsed = _CONDITION.fullmatch(pattern)
         if parsed is None:
-            message = f"{pattern!r} is not a selection: write a dotted path with * and, if wanted, [order >= 3]"
-            raise DocumentError(message, file=file, path=where)
+            raise DocumentError(
+                f"{pattern!r} is not a selection: write a dotted path with * and, if wanted, [order >= 3]",
+                file=file,
+                path=where,
+            )
         matching = documents.match_paths(parsed["pattern"], list(paths))
         if parsed["order"] is not None:
             relation, limit = _RELATIONS[parsed["relation"]], int(parsed["order"])

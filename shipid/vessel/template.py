@@ -213,8 +213,9 @@ def _check_particulars(given: Particulars) -> None:
         raise ShipidError(f"ship type {given.ship_type!r}: {suggest_name(given.ship_type, WIND)}")
     for what, value, low, high in _formula_ranges(given):
         if value is not None and not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
-            words = f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}{SIMILAR.get(what, '')}"
-            raise ShipidError(words)
+            raise ShipidError(
+                f"{what} = {value:.3g}: the formulae hold for {low:g} to {high:.3g}{SIMILAR.get(what, '')}"
+            )
 
 
 def _formula_ranges(given: Particulars) -> Iterator[tuple[str, float | None, float, float]]:

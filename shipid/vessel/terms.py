@@ -122,8 +122,9 @@ def term_states(key: str, block: Mapping[str, Any]) -> tuple[str, ...]:
         return ()
     names = call_user_function(f"states of {key}", function, block)
     if not isinstance(names, tuple | list) or not all(isinstance(name, str) for name in names) or not names:
-        message = f"states of {key} must return names, such as ('x', 'y'), not {names!r}"
-        raise ShipidError(f"{message}{definition_location(function)}")
+        raise ShipidError(
+            f"states of {key} must return names, such as ('x', 'y'), not {names!r}{definition_location(function)}"
+        )
     return tuple(names)
 
 
