@@ -123,7 +123,6 @@ def manoeuvre_command(
     ] = None,
     side: Annotated[str, typer.Option(help="starboard or port: side of the first turn")] = "starboard",
     duration: Annotated[float | None, typer.Option(help="of the log, of a spiral that of each level, in s")] = None,
-    step: Annotated[float | None, typer.Option(help="of the integration in s; ten make a row of the log")] = None,
     approach: Annotated[
         str | None,
         typer.Option(
@@ -150,9 +149,7 @@ def manoeuvre_command(
     if csv is not None:
         check_table(csv)
     ship = load_vessel(vessel)
-    done = measure_standard(
-        ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
-    )
+    done = measure_standard(ship, name, angles or (), speed=speed, side=side, duration=duration, approach=approach)
     title, approached_by = done.standard.title, done.standard.manoeuvre
     with open_answer(as_json) as answer:
         answer.say(

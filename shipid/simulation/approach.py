@@ -21,13 +21,12 @@ from shipid.physics.signals import ACTUAL, is_shaft, is_steering, neutral_value
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import bisect_root
+from shipid.vessel.stability import balanced_shaft_speed, bisect_root
 
 Array = NDArray[np.float64]
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
 FROUDE = 0.2  # of the service speed of a ship whose document gives none
-MOST_SHAFT = 1000.0  # rev/s: no screw turns so fast
 NOTHING = 1e-12  # m/s^2, rad/s^2
 CHUNK, LONGEST = 30.0, 3600.0  # s: interval of the check for a steady state, and longest approach of a small ship
 PASSING = 200.0  # ship lengths: the longest approach of a large ship, whose speed settles over some 20
@@ -191,12 +190,7 @@ def balanced_shaft(controls: Controls, speed: float) -> float | None:
     def surplus(n: float) -> float:
         return float(straight_acceleration(controls.vessel, speed, controls.ahead(n))[0])
 
-    low, high = 0.0, 1.0
-    while surplus(high) < 0:
-        if high >= MOST_SHAFT:
-            return None
-        low, high = high, min(2 * high, MOST_SHAFT)
-    return bisect_root(surplus, low, high)
+    return balanced_shaft_speed(surplus)
 
 
 class NotStraight(ShipidError):

@@ -60,7 +60,6 @@ def measure_standard(
     speed: float | None = None,
     side: str = "starboard",
     duration: float | None = None,
-    step: float | None = None,
     approach: str | None = None,
     engine: str = "auto",
 ) -> MeasuredManoeuvre:
@@ -71,7 +70,7 @@ def measure_standard(
 
     Raises ShipidError as `define_standard` and `perform_manoeuvres` do.
     """
-    how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step, "approach": approach}
+    how: dict[str, Any] = {"speed": speed, "duration": duration, "approach": approach}
     return measure_all(vessel, [(name, angles, side)], engine=engine, **how)[0]
 
 
@@ -81,12 +80,11 @@ def measure_all(
     *,
     speed: float | None = None,
     duration: float | None = None,
-    step: float | None = None,
     approach: str | None = None,
     engine: str = "auto",
 ) -> list[MeasuredManoeuvre]:
     """Simulate standard manoeuvres from one approach, each a name, angles [deg] and side; see `measure_standard`."""
-    how: dict[str, Any] = {"speed": speed, "duration": duration, "step": step}
+    how: dict[str, Any] = {"speed": speed, "duration": duration}
     for given in (approach,) if approach else ("steady", "helmsman"):
         chosen = list[Standard]()
         for name, angles, side in wanted:

@@ -20,7 +20,7 @@ from shipid.vessel.load import Vessel
 
 log = logging.getLogger(__name__)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
-LEAST_STEPS, MOST_STEPS = 10, 1e7  # steps for a ship length, and of a manoeuvre
+MOST_STEPS = 1e7  # of a manoeuvre
 APPROACHES = ("steady", "helmsman", "rest")
 LEAD = 1.0  # ship lengths in the log before the execute
 CALLED = {"turning_circle": "turning", "crash_stop": "stop"}
@@ -58,11 +58,10 @@ def define_standard(
     speed: float | None = None,
     side: str = "starboard",
     duration: float | None = None,
-    step: float | None = None,
     approach: str = "steady",
     n: float | None = None,
 ) -> Standard:
-    """Define a standard manoeuvre for a vessel.
+    """Define a standard manoeuvre for a vessel; the time for one ship length has about 500 steps, a row has ten.
 
     Parameters
     ----------
@@ -73,7 +72,6 @@ def define_standard(
     duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
         for a zigzag, 80 for a stop, 40 for a level of a spiral. A level of a direct spiral, and a pull-out after its
         turn of 30 lengths, take up to 200, see `Request.settling`.
-    step : of the integration [s]; default: about 1/500 of the time for one ship length. A row has ten steps.
     approach : `steady` with the helm amidships, held on course by a `helmsman`, or from `rest`.
     n : shaft speed [rev/s] of the approach; default: that which gives the speed.
 
@@ -92,7 +90,6 @@ def define_standard(
     check_choice("side", side, get_args(Side))
     check_choice("approach", approach, APPROACHES)
     duration = None if duration is None else check_positive("duration", duration)
-    step = None if step is None else check_positive("step", step)
     length = vessel.length
     if length is None:
         raise ShipidError("particulars.L_pp is missing: manoeuvres are timed in ship lengths", file=vessel.file)
@@ -100,7 +97,7 @@ def define_standard(
     controls = Controls(vessel)
     n_rpm = (shaft_speed(controls, asked) if n is None else check_number("n", n)) / RPM
     passing = length / asked  # s for one length
-    interval = _round_to_125(passing / ROWS) if step is None else step * STEPS
+    interval = _round_to_125(passing / ROWS)
     lead = round_to_rows(LEAD * passing, interval)
     if duration is not None and "duration" in kind.model_fields and duration <= lead:  # else of a level
         raise ShipidError(
@@ -108,9 +105,6 @@ def define_standard(
         )
     course = 90.0 if kind.straight else 0.0  # drawn from left to right
     keys = {"n_rpm": n_rpm, "execute_at": lead, "course_deg": course, "approach": approach}
-    if step is not None and step > passing / LEAST_STEPS:
-        words = f"{step:g} s is too long for this ship, which runs a length in {passing:.3g} s"
-        raise ShipidError(f"{words}: give {passing / LEAST_STEPS:.3g} s or less", path="--step")
     request = Request(
         controls,
         n_rpm * RPM,
@@ -126,9 +120,8 @@ def define_standard(
     manoeuvre.check(controls)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
-        option = "--duration" if step is None else "--step"
-        remedy = f"at most {MOST_STEPS:.0e}: give a {'shorter duration' if step is None else 'longer step'}"
-        raise ShipidError(f"{steps:.2g} steps of {interval / STEPS:g} s, {remedy}", path=option)
+        words = f"{steps:.2g} steps of {interval / STEPS:g} s, at most {MOST_STEPS:.0e}: give a shorter duration"
+        raise ShipidError(words, path="--duration")
     return Standard(name, manoeuvre.title(name.replace("-", " ")), manoeuvre, float(asked), interval / STEPS, interval)
 
 

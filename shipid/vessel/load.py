@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,10 +28,7 @@ from shipid.vessel.schema import (
     BEHIND,
     DOFS,
     TABLE,
-    kind_blocks,
-    kinds_of_group,
     term_blocks,
-    term_model,
     upstream_signals,
     vessel_model,
 )
@@ -278,13 +274,13 @@ def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Ves
 
 def check_document(document: Document, file: str) -> Vessel:
     """Check a complete document; DocumentError with file, dotted path and remedy for the first problem."""
-    for path, group, block in kind_blocks(document):
-        _check_component(path, group, block, file)
     documents.parse_model(vessel_model(), document, file)
     vessel = Vessel(document, file)
     paths: dict[str, str] = {}
     for path, key, block in term_blocks(document):
         name = path.rsplit(".", 1)[-1]
+        if f"{name}." == ACTUAL:
+            raise DocumentError("columns of what actuators have reached begin with it: rename it", file=file, path=path)
         if name in paths:
             raise DocumentError(
                 f"{paths[name]} ends in the same name, and commands are named by it: choose another",
@@ -345,30 +341,6 @@ def _check_sense(vessel: Vessel) -> None:
             fault = f"{value:g}: must be ahead of x_aft"
         if fault:
             raise DocumentError(fault, file=vessel.file, path=path)
-
-
-def _check_component(path: str, group: str, block: Any, file: str) -> None:
-    """Check a block by the model of its kind, so that errors have the path and names of the file."""
-    name = path.partition(".")[2]
-    if name and not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
-        raise DocumentError(
-            f"{name!r} is no name for a {group}: use letters from a to z, digits, _ and -, a letter first",
-            file=file,
-            path=group,
-        )
-    if f"{name}." == ACTUAL:
-        raise DocumentError(
-            f"{name!r} is no name for a {group}: with it begin columns of what actuators have reached",
-            file=file,
-            path=path,
-        )
-    if not isinstance(block, Mapping):
-        raise DocumentError(f"{block!r}: must be a table with a `kind`", file=file, path=path)
-    kind, valid = block.get("kind"), kinds_of_group(group)
-    if kind not in valid:
-        message = "missing" if kind is None else f"{kind!r} is no kind of {group}"
-        raise DocumentError(f"{message}: {suggest_name(kind, valid)}", file=file, path=f"{path}.kind")
-    documents.parse_model(term_model(f"{group}.{kind}"), block, file, path)
 
 
 def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:

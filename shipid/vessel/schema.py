@@ -18,7 +18,7 @@ from shipid.physics.inertia import added_mass_entries, rigid_body_entries
 from shipid.physics.signals import rows_of_role
 from shipid.physics.symbols import argument_types
 from shipid.vessel.ranges import UNUSUAL
-from shipid.vessel.terms import FIXED, POSITIONAL, check_term, split_keys
+from shipid.vessel.terms import FIXED, NAME, POSITIONAL, check_term, split_keys
 
 DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
 
@@ -243,11 +243,6 @@ def _union_by_kind(models: list[type[VesselBlock]]) -> Any:
     return Annotated[reduce(or_, models), Field(discriminator="kind")] if len(models) > 1 else models[0]
 
 
-def kinds_of_group(group: str) -> list[str]:
-    """Kinds of term in a group."""
-    return [key.split(".")[1] for key in _keys_of_group(group)]
-
-
 def _keys_of_group(group: str) -> list[str]:
     return [key for key, (of, _) in zip(TERMS, split_keys(tuple(TERMS)), strict=True) if of == group]
 
@@ -281,19 +276,10 @@ def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseM
         ),
         **{group: (create_model(group, __base__=VesselBlock, **fixed[group]) | None, None) for group in FIXED},
         "wind": (wind | None, None),
-        "thruster": (GenericAlias(dict, (str, thruster)), {}),
+        "thruster": (GenericAlias(dict, (Annotated[str, Field(pattern=f"^{NAME}$")], thruster)), {}),
         "current": (create_model("current", __base__=VesselBlock, **current) | None, None),
     }
     return create_model("vessel", __base__=VesselBlock, **fields)
-
-
-def kind_blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
-    """Dotted path, group and entry of every block that must name its `kind`, whatever it holds."""
-    if "wind" in document:
-        yield "wind", "wind", document["wind"]
-    thrusters = document.get("thruster")
-    for name, entry in thrusters.items() if isinstance(thrusters, Mapping) else ():
-        yield f"thruster.{name}", "thruster", entry
 
 
 @cache

@@ -13,6 +13,7 @@ from shipid.vessel.load import Vessel
 HELD = ("north", "east", "psi", "u")  # states that no transverse force depends on in calm water, and the speed
 WATER = "waves."  # prefix of states of the water, which no motion changes: time, and where the current carries it
 STEP, FINE = 1e-4, 1e-2  # size of a small yaw over the speed; of differences about it over that size
+MOST_SHAFT = 1000.0  # rev/s: no screw turns so fast
 SHARE = 0.1  # of sway or yaw in a motion: a motion with less, such as roll or heave, is no yaw
 TURNS = 2  # of the search for the motion that grows most to one side
 
@@ -23,6 +24,16 @@ def bisect_root(function: Callable[[float], float], low: float, high: float, hal
         middle = (low + high) / 2
         low, high = (middle, high) if function(middle) < 0 else (low, middle)
     return high
+
+
+def balanced_shaft_speed(surplus: Callable[[float], float]) -> float | None:
+    """Shaft speed [rev/s] at which a surplus of thrust, which grows with it, is 0; None if there is none."""
+    low, high = 0.0, 1.0
+    while surplus(high) < 0:
+        if high >= MOST_SHAFT:
+            return None
+        low, high = high, min(2 * high, MOST_SHAFT)
+    return bisect_root(surplus, low, high)
 
 
 def yaw_growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:

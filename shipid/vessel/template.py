@@ -34,7 +34,7 @@ from shipid.vessel.regressions import (
     thrust_polynomial,
     wave_resistance,
 )
-from shipid.vessel.stability import bisect_root, yaw_growth
+from shipid.vessel.stability import balanced_shaft_speed, bisect_root, yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -370,20 +370,6 @@ def wind_values(given: Particulars) -> Values:
     }
 
 
-@dataclass(frozen=True)
-class Screw:
-    """A screw that drives the ship at its service speed.
-
-    D : diameter [m]. n : shaft speed [rev/s]. pitch : P / D [-]. K_T : polynomial in J. notes : how each was estimated.
-    """
-
-    D: float
-    n: float
-    pitch: float
-    K_T: tuple[float, float, float]
-    notes: Mapping[str, str]
-
-
 def _wake_fraction(given: Particulars) -> tuple[float, str]:
     """Wake fraction of Taylor."""
     if given.units == 2:
@@ -399,18 +385,18 @@ def _thrust_deduction(given: Particulars, D: float) -> tuple[float, str]:
     return 0.6 * _wake_fraction(given)[0], "0.6 w_P0: a rule of thumb"
 
 
-def guess_screw(given: Particulars) -> Screw:
-    """Screw whose thrust at the service speed is the resistance; ShipidError where none of the series does that.
+def guess_screw(given: Particulars) -> tuple[float, tuple[float, float, float], str, str]:
+    """Diameter [m] and K_T polynomial of a screw whose thrust at the service speed is the resistance, and their notes.
 
     What is given of diameter and shaft speed is kept. Of the others the pitch gives way first, then the diameter.
+    ShipidError where no screw of the series does that.
     """
     share = 0.5 if given.block > FULL else 0.65 if given.units == 1 else 0.55
     usual = min(share * given.draught, LARGEST_SCREW)
     D = given.propeller_diameter or usual
     words = "given" if given.propeller_diameter else f"{share:g} T, at most {LARGEST_SCREW:g} m: a guess"
     if given.rpm is None:
-        n = _shaft_speed_of_screw(given, D, PITCH)
-        return Screw(D, n, PITCH, thrust_polynomial(PITCH), {"D_p": words, "K_T": f"P / D = {PITCH:g}: a guess"})
+        return D, thrust_polynomial(PITCH), words, f"P / D = {PITCH:g}: a guess"
     n = given.rpm / 60
     if given.propeller_diameter is None and not _is_pitch_between(given, D, n, (PITCHES[0], STRONG_PITCH)):
         least, most = (share * given.draught for share in DIAMETERS)
@@ -426,7 +412,7 @@ def guess_screw(given: Particulars) -> Screw:
         )
     pitch = bisect_root(lambda ratio: _thrust_surplus(given, D, n, ratio), *PITCHES)
     balance = f"P / D = {pitch:.3g} balances the resistance at {given.service:.3g} m/s and {60 * n:.4g} rpm"
-    return Screw(D, n, pitch, thrust_polynomial(pitch), {"D_p": words, "K_T": balance})
+    return D, thrust_polynomial(pitch), words, balance
 
 
 def _is_pitch_between(given: Particulars, D: float, n: float, pitches: tuple[float, float]) -> bool:
@@ -451,23 +437,22 @@ def _thrust_surplus(given: Particulars, D: float, n: float, pitch: float) -> flo
 def propeller_values(given: Particulars, side: int = 0) -> Values:
     """One screw behind the hull; side -1 is that to port of two."""
     L, B, T = given.length, given.beam, given.draught
-    chosen, (w_P0, wake), drift = guess_screw(given), _wake_fraction(given), "KVLCC2, mean of both sides"
-    t_P, deduction = _thrust_deduction(given, chosen.D)
-    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {chosen.notes['K_T']}"
+    (D, K_T, size, balance), (w_P0, wake) = guess_screw(given), _wake_fraction(given)
+    drift = "KVLCC2, mean of both sides"
+    t_P, deduction = _thrust_deduction(given, D)
+    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {balance}"
     return {
         "x": TemplateValue(-0.48 * L, "m", "-0.48 L"),
         **({"y": TemplateValue(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
         "z": TemplateValue(0.65 * T, "m", "0.65 T below the waterline: a guess"),
-        "D_p": TemplateValue(chosen.D, "m", chosen.notes["D_p"]),
+        "D_p": TemplateValue(D, "m", size),
         "k_astern": TemplateValue(0.7, "-", "thrust astern over ahead of a fixed screw: a guess"),
         "t_P": TemplateValue(t_P, "-", deduction),
         "w_P0": TemplateValue(w_P0, "-", wake),
         "C_1": TemplateValue(2.0, "-", "KVLCC2, Yasukawa and Yoshimura (2015)"),
         "C_2_plus": TemplateValue(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
         "C_2_minus": TemplateValue(1.35 if given.units == 1 else 1.0, "-", drift if given.units == 1 else "a guess"),
-        **{
-            f'K_T."{name}"': TemplateValue(k, "-", series) for name, k in zip(("1", "J", "JJ"), chosen.K_T, strict=True)
-        },
+        **{f'K_T."{name}"': TemplateValue(k, "-", series) for name, k in zip(("1", "J", "JJ"), K_T, strict=True)},
     }
 
 
@@ -656,9 +641,7 @@ def _service_shaft(vessel: Vessel, speed: float) -> float:
         rates: Any = model.rates(state, memory, list(orders.values()), calm, values, np.zeros(3))
         return float(rates[3])
 
-    low, high = 0.0, 1.0
-    while surge(high) < 0 and high < 1e3:
-        low, high = high, 2 * high
-    if high >= 1e3:
+    n = balanced_shaft_speed(surge)
+    if n is None:
         raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
-    return bisect_root(surge, low, high)
+    return n
