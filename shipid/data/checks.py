@@ -198,13 +198,8 @@ def _check_heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:
     sentence = f"changes of psi leave the integral of r by {off:.2g} deg (RMS), {by_noise:.2g} by noise"
     yield _check_row("heading error", root_mean_square(error), "rad", HEADING_ERROR * change + chance, sentence)
     seen = [np.unwrap(rows["psi"]).astype(complex) for rows in stretches]
-    yield from _check_latency(
-        "heading latency", "heading", "yaw rate", stretches, seen, [_integrated_rate(one) for one in stretches]
-    )
-
-
-def _integrated_rate(rows: pd.DataFrame) -> Plane:
-    return cumulative_integral(rows["t"].to_numpy(), rows["r"].to_numpy()).astype(complex)
+    total = [cumulative_integral(rows["t"].to_numpy(), rows["r"].to_numpy()).astype(complex) for rows in stretches]
+    yield from _check_latency("heading latency", "heading", "yaw rate", stretches, seen, total)
 
 
 def travelled_path(rows: pd.DataFrame) -> Plane:

@@ -119,15 +119,11 @@ def _is_fast(name: str, values: Array, zero: CommandFault, most: float, noise: b
 
     Among noise, some rows of exactly 0 say more, also where an angle is another one afterwards.
     """
-    long, back = noise and zero.end - zero.first > 1, _is_back(values, zero)
+    long = noise and zero.end - zero.first > 1
+    back = bool(abs(values[zero.end] - values[zero.first - 1]) < AGREEMENT_SHARE * zero.size)
     return zero.size > (NOISY_STEP_RATIO if long and back else ZERO_STEP_RATIO) * most and (
         back or (long and is_steering(name))
     )
-
-
-def _is_back(values: Array, lapse: CommandFault) -> bool:
-    """Whether the values before and after a lapse agree."""
-    return bool(abs(values[lapse.end] - values[lapse.first - 1]) < AGREEMENT_SHARE * lapse.size)
 
 
 def _is_no_kick(name: str, values: Array, spike: CommandFault, step: float) -> bool:

@@ -57,10 +57,6 @@ class _CollectedSum:
         return len(self.terms) > 1 and all(_is_unit(value) for value in self.late.values())
 
 
-def _is_one(value: ca.SX) -> bool:
-    return bool(value.is_constant() and float(value) == 1)
-
-
 def _is_unit(value: ca.SX) -> bool:
     return bool(value.is_constant() and abs(float(value)) == 1)
 
@@ -173,7 +169,7 @@ class _Collector:
     def is_atom(self, k: int) -> bool:
         """Whether an instruction gives one atom as it is."""
         terms = self.sums[k].terms
-        return len(terms) == 1 and all(len(monomial) == 1 and _is_one(value) for monomial, value in terms.items())
+        return len(terms) == 1 and all(len(monomial) == 1 and value.is_one() for monomial, value in terms.items())
 
     def value(self, k: int) -> ca.SX:
         """What an instruction gives as an expression, written once."""

@@ -105,7 +105,8 @@ def rollout(
     num_steps, every = check_whole_number("num_steps", num_steps, 1), check_whole_number("every", every, 1)
     if num_steps % every:
         raise ShipidError(f"num_steps must be a multiple of every, not {num_steps} and {every}")
-    check_step_count(num_steps)
+    if num_steps > MOST_STEPS:
+        raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
     given = start, commands, {} if environment is None else environment, {} if components is None else components
     model, batch = prepare_batch(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     _check_channel_names("environment", environment, model.environment, vessel)
@@ -127,12 +128,6 @@ def _with_divergence(way: Engine, batch: RolloutBatch, *results: Array) -> tuple
     *kept, worst = results
     slow = worst <= SPEED_LIMIT
     return *kept, ~(slow if way.checks else slow & finite_samples(batch))
-
-
-def check_step_count(num_steps: int) -> None:
-    """Raise ShipidError for more steps than any computer does."""
-    if num_steps > MOST_STEPS:
-        raise ShipidError(f"{num_steps:.2g} steps, at most {MOST_STEPS:.0e}: give a longer step, or a shorter time")
 
 
 def _check_channel_names(what: str, given: object, names: Sequence[str], vessel: Vessel) -> None:

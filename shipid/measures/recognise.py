@@ -43,7 +43,11 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
         raise DataError("missing column", path=missing)
     states = {name: np.asarray(columns[name], dtype=float) for name in RECORD_STATES}
     angles = _commands_that(columns, is_steering)
-    known = {name: _sense_of_angle(angle, states["r"]) for name, angle in angles.items()} if helm is None else helm
+    known = (
+        {name: float(np.sign(angle[:-1] @ np.diff(states["r"]))) for name, angle in angles.items()}
+        if helm is None
+        else helm
+    )
     moved = {name: float(np.ptp(angle)) for name, angle in angles.items() if known.get(name, 0.0) and angle.any()}
     least = MIDSHIPS * max(moved.values(), default=0.0)
     helms = [known[name] * angles[name] for name, size in moved.items() if size >= least]
@@ -84,11 +88,6 @@ def _commands_that(columns: Mapping[str, Array], wanted: Callable[[str], bool]) 
     return {
         name: np.asarray(values, dtype=float) for name, values in columns.items() if is_command(name) and wanted(name)
     }
-
-
-def _sense_of_angle(angle: Array, r: Array) -> float:
-    """+1 or -1, the sign with which an angle turns the ship to starboard; 0 for an angle without effect."""
-    return float(np.sign(angle[:-1] @ np.diff(r)))
 
 
 def recognise_kinds(record: Record) -> tuple[tuple[str, ...], str]:

@@ -249,7 +249,7 @@ def first_execute(record: Record) -> FirstExecute:
     size, rate = np.abs(record.helm), np.abs(record.r)
     if not size.max() > 0:
         return FirstExecute(NAN, 0, 0.0, 1.0)
-    angle = _helm_angle(size)
+    angle = float(np.median(size[size >= size.max() / 2]))
     over = size >= angle / 2
     if over[0] and rate[0] > STEADY_CHANGE * rate.max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
@@ -259,11 +259,6 @@ def first_execute(record: Record) -> FirstExecute:
     row = int(np.argmax(over))
     start = start_of_change(record.t, record.helm, row) if row else float(record.t[0])
     return FirstExecute(start, row, angle, float(np.sign(record.helm[row])))
-
-
-def _helm_angle(size: Array) -> float:
-    """Helm angle [rad] of a manoeuvre: the median of the sizes above half of the largest."""
-    return float(np.median(size[size >= size.max() / 2]))
 
 
 def row_of_release(record: Record, over: FirstExecute) -> int:

@@ -76,7 +76,8 @@ def course_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """
 
     def error(signals: Named, inputs: Named) -> SX:
-        return _wrap_heading(inputs["course"] - signals["psi"])
+        off = inputs["course"] - signals["psi"]
+        return ca.SX(ca.atan2(ca.sin(off), ca.cos(off)))
 
     def orders(signals: Named, inputs: Named, memory: Named) -> Named:
         omega = inputs["omega"]
@@ -93,11 +94,6 @@ def course_helmsman(commands: tuple[str, ...]) -> Helmsman:
 
 def _limit_share(share: SX) -> SX:
     return ca.fmin(ca.fmax(share, -1), 1)
-
-
-def _wrap_heading(angle: SX) -> SX:
-    """The angle [rad] within half a turn to either side."""
-    return ca.SX(ca.atan2(ca.sin(angle), ca.cos(angle)))
 
 
 def _steer_commands(commands: Iterable[str], inputs: Named, share: SX) -> Named:

@@ -17,7 +17,6 @@ At = Callable[[str], float]
 """Name of a quantity -> where in its range it lies, in [0, 1)."""
 
 SHARED = ("name", "duration")  # keys of a kind that [truth] sets for all runs
-UNITS = ("_rpm", "_deg")
 SEEDS = 2**31  # number of different seeds that may be drawn
 COURSE = "course_deg"
 
@@ -74,7 +73,7 @@ class ManoeuvreDraw(CheckedModel, BaseModel):
             given.setdefault("seed", int(at("seed") * SEEDS))
         if "duration" in kind.model_fields:
             given["duration"] = duration
-        given.setdefault(COURSE, _value_in_range(0.0, 360.0, at("psi")))
+        given.setdefault(COURSE, 360.0 * at("psi"))
         try:
             manoeuvre: Manoeuvre = kind.__pydantic_validator__.validate_python(given)
         except ValidationError as error:
@@ -112,16 +111,8 @@ def _draw_value(key: str, value: Any, at: At) -> Any:
     if value and all(isinstance(one, str) for one in value):
         return value[min(int(at(key) * len(value)), len(value) - 1)]
     low, high = range_limits(key, value)
-    return _value_in_range(low, high, at("psi" if key == COURSE else _without_unit_suffix(key)))
-
-
-def _without_unit_suffix(key: str) -> str:
-    """Key without its unit suffix (`_rpm`, `_deg`)."""
-    return next((key.removesuffix(unit) for unit in UNITS if key.endswith(unit)), key)
-
-
-def _value_in_range(low: float, high: float, place: float) -> float:
-    return low + (high - low) * place
+    quantity = "psi" if key == COURSE else key.removesuffix("_rpm").removesuffix("_deg")
+    return low + (high - low) * at(quantity)
 
 
 def range_limits(key: str, value: Any) -> tuple[float, float]:

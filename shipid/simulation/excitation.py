@@ -54,7 +54,8 @@ def multisine_series(
     start = -np.pi * np.arange(len(h)) * np.arange(1, len(h) + 1) / len(h)
     phi = _shift_to_zero(h, _optimise_phases(h, start, key))
     shape = np.sin(2 * np.pi * np.outer(time, h) / period + phi).sum(axis=1)
-    return np.asarray(amplitude / _peak_bound(h, phi) * shape)
+    peak = np.abs(_one_period(h, phi)).max() / np.cos(np.pi / SAMPLES)  # at all times at most: Ehlich and Zeller 1964
+    return np.asarray(amplitude / float(peak) * shape)
 
 
 def deal_harmonics(harmonics: Sequence[int], count: int) -> tuple[tuple[int, ...], ...]:
@@ -100,11 +101,6 @@ def _one_period(harmonics: NDArray[np.int64], phi: Array) -> Array:
     lines = np.zeros((*phi.shape[:-1], count // 2 + 1), dtype=complex)
     lines[..., harmonics] = -0.5j * count * np.exp(1j * phi)
     return np.fft.irfft(lines, count)
-
-
-def _peak_bound(harmonics: NDArray[np.int64], phi: Array) -> float:
-    """Upper bound of |x| at all times: greatest sample divided by cos(pi / SAMPLES) (Ehlich and Zeller 1964)."""
-    return float(np.abs(_one_period(harmonics, phi)).max() / np.cos(np.pi / SAMPLES))
 
 
 def _optimise_phases(harmonics: NDArray[np.int64], schroeder: Array, key: tuple[object, ...]) -> Array:

@@ -76,7 +76,10 @@ def perform_manoeuvres(
     if not every:
         raise ShipidError(f"interval {between:g} s must be a multiple of step {step:g} s")
     names = _run_names(manoeuvres)
-    rows = [_count_rows(one.length if duration is None else duration, between) for one in manoeuvres]
+    rows = [
+        max(whole_steps(length, between) or int(length / between), 1) + 1
+        for length in (one.length if duration is None else duration for one in manoeuvres)
+    ]
     environment = {} if environment is None else environment
     check_mapping("environment", environment, "a name to a number or an array")
     weather = _environment_series(vessel, environment, len(manoeuvres), every * (max(rows) - 1) + 1)
@@ -170,10 +173,11 @@ def _perform_batch(
         for name, values in memory.items():
             values[ready] = commands[name][0, ready]
     weather = {name: values[: num_steps + 1] for name, values in batch.weather.items()}
+    constant = all((values == values[0]).all() for values in commands.values())  # which is faster in the engines
     path = rollout(
         vessel,
         start,
-        _reduce_constant(commands),
+        {name: values[0] for name, values in commands.items()} if constant else commands,
         {name: values[0] if len(values) == 1 else values[:-1] for name, values in weather.items()},
         num_steps=num_steps,
         every=every,
@@ -202,18 +206,6 @@ def _perform_batch(
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"{ACTUAL}{name}": path[f"{ACTUAL}{name}"][:, 0] for name in lagged}
     return log | {name: felt[name] for name in measurable_signals(felt)}
-
-
-def _reduce_constant(commands: Mapping[str, Array]) -> dict[str, Array]:
-    """Commands (T, num_samples); reduced to (num_samples,) if all are constant, which is faster in the engines."""
-    if all((values == values[0]).all() for values in commands.values()):
-        return {name: values[0] for name, values in commands.items()}
-    return dict(commands)
-
-
-def _count_rows(length: float, interval: float) -> int:
-    """Number of rows of a log of `length` [s] with rows every `interval` [s], first row included; at least 2."""
-    return max(whole_steps(length, interval) or int(length / interval), 1) + 1
 
 
 def _environment_series(

@@ -104,21 +104,16 @@ class Vessel:
             if not documents.is_valid_for(model, documents.replace_values(self.document, {path: 0.0}))
         )
 
-    @property
+    @cached_property
     def mass(self) -> NDArray[np.float64]:
-        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; a copy."""
+        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; not to be changed."""
         import numpy as np
 
-        return np.array(self._mass)
-
-    @cached_property
-    def _mass(self) -> list[list[float]]:
         numbers: list[dict[str, Any]] = [
             {name: self.parameters[target] if isinstance(target, str) else target for name, target in block.items()}
             for block in (self.bound["inertia"], self.bound["added_mass"])
         ]
-        M = total_mass(*numbers)
-        return [[M[row][column] for column in self.axes] for row in self.axes]
+        return np.array(total_mass(*numbers))[np.ix_(self.axes, self.axes)]
 
     @cached_property
     def structure(self) -> str:

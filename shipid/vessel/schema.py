@@ -124,10 +124,6 @@ def _number_type(parameter: Parameter) -> Any:
     return Annotated[FiniteFloat, Field(gt=0)] if parameter.positive else FiniteFloat
 
 
-def _unit_note(parameter: Parameter) -> str:
-    return parameter.unit if isinstance(parameter.unit, str) else "by name"
-
-
 def _table_type(grammar: Grammar) -> Any:
     def check(table: dict[str, float]) -> dict[str, float]:
         grammar.check(table)
@@ -156,7 +152,7 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
             validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
             continue
-        note = Field(description=_unit_note(parameter))
+        note = Field(description=parameter.unit if isinstance(parameter.unit, str) else "by name")
         if parameter.kind == "list":
             fields[parameter.name] = (
                 Annotated[GenericAlias(list, (_number_type(parameter),)), Field(min_length=2), note],
