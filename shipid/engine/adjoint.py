@@ -22,7 +22,7 @@ from shipid.engine.native import (
     StagedSource,
     TapeLine,
     as_c_longs,
-    compile_or_explain,
+    compile_source,
     compiler_target,
     count_parts,
     forward_statement,
@@ -226,7 +226,7 @@ for (long g = groups * number / parts; g < groups * (number + 1) / parts; ++g) {
 @lru_cache(maxsize=32)
 def _compile_adjoint(model: Dynamics, wanted: tuple[int, ...], step: float, method: Method) -> Any:
     """The compiled function `run` of a sweep, from the cache if possible."""
-    return compile_or_explain(lambda: _AdjointSource(model, wanted, step, method).text(compiler_target()))
+    return compile_source(_AdjointSource(model, wanted, step, method).text(compiler_target()))
 
 
 def gradient_native(

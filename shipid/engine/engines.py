@@ -10,13 +10,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from shipid.arguments import check_choice
 from shipid.engine.adjoint import Adjoint, Loss, gradient_native
 from shipid.engine.casadi import run_casadi
 from shipid.engine.integrate import Array, RolloutBatch, RolloutJob
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import find_compiler, measure_native, refuse_compiling, run_native
 from shipid.engine.vectors import SINGLE
-from shipid.errors import ShipidError, suggest_name
+from shipid.errors import ShipidError
 from shipid.vessel.dynamics import Dynamics
 
 AUTO, REPEATED = "auto", "repeated"  # `repeated`: as `auto`, where so many calls follow that compiling pays
@@ -96,8 +97,7 @@ def check_device(device: str) -> None:
 
 def engine_by_name(name: str, device: str) -> Engine | None:
     """The engine with a name; None for `auto`, `repeated`. ShipidError for an unknown name or an unsupported device."""
-    if not isinstance(name, str) or name not in (AUTO, REPEATED, *ENGINES):
-        raise ShipidError(f"there is no engine {name!r}: {suggest_name(name, [AUTO, *ENGINES])}")
+    check_choice("engine", name, (AUTO, *ENGINES, REPEATED))
     engine = ENGINES.get(name)
     if device != "cpu" and engine is not None and not engine.any_device:
         raise ShipidError(f"engine {name!r} runs on the CPU: use 'torch' on {device!r}")

@@ -13,7 +13,7 @@ import os
 import platform
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
@@ -445,19 +445,7 @@ def _compile_rollout(
 ) -> Any:
     """The compiled function `run` of a model, from the cache if possible; some of its tables are looked up."""
     tables = {k: find_tables(_collected_rates(model))[k] for k in looked_up}
-    return compile_or_explain(lambda: _RolloutSource(model, step, method, compiler_target(precision), tables).text())
-
-
-def compile_or_explain(source: Callable[[], str]) -> Any:
-    """The compiled function `run` of C source; NoLibrary, with what to do, if there is no compiler or it fails."""
-    if find_compiler() is None:
-        raise NoLibrary(
-            "engines 'native' and 'single' need a C compiler, and there is none: install gcc, or use 'torch'"
-        )
-    try:
-        return compile_source(source())
-    except NoLibrary as error:
-        raise NoLibrary(f"{error.message}: use engine 'torch'") from None
+    return compile_source(_RolloutSource(model, step, method, compiler_target(precision), tables).text())
 
 
 def compile_source(source: str, further: Sequence[str] = ()) -> Any:
@@ -467,7 +455,7 @@ def compile_source(source: str, further: Sequence[str] = ()) -> Any:
     """
     command = find_compiler()
     if command is None:
-        raise NoLibrary("there is no C compiler")
+        raise NoLibrary("engines 'native' and 'single' need a C compiler: install gcc, or use engine 'torch'")
     options, processor = (*OPTIONS, *further), (platform.machine(), *sorted(_processor_flags()))
     words = [source, *options, command, compiler_version(command), *processor]
     name = f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from shipid.arguments import as_float_array, as_names, check_class, check_mapping, check_whole_number
+from shipid.arguments import as_float_array, as_names, check_choice, check_class, check_mapping, check_whole_number
 from shipid.engine.engines import REPEATED, Engine, choose_engine, engine_by_name, run_with_fallback
 from shipid.engine.integrate import Array, Method, RolloutBatch, RolloutJob
 from shipid.errors import DataError, ShipidError, suggest_name
@@ -257,9 +257,8 @@ def channel_names(model: Dynamics) -> tuple[str, ...]:
 
 def channel_places(kept: Sequence[str], names: Sequence[str], vessel: Vessel) -> tuple[int, ...]:
     """Indices of the channels to keep in `names`; ShipidError for an unknown channel."""
-    unknown = next((name for name in kept if name not in names), None)
-    if unknown is not None:
-        raise ShipidError(f"keep: {vessel.name} has no channel {unknown!r}: {suggest_name(unknown, names)}")
+    for name in kept:
+        check_choice(f"keep, of {vessel.name}:", name, names)
     return tuple(names.index(name) for name in kept)
 
 

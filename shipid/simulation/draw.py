@@ -87,12 +87,11 @@ class ManoeuvreDraw(CheckedModel, BaseModel):
 
 def _flatten_keys(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
     """Pairs of key and value; a key in a table becomes `table.key`, because `bow.n_rpm = 0` is a table in TOML."""
-    result: list[tuple[str, Any]] = []
-    for key, value in given.items():
-        result += (
-            [(f"{key}.{inner}", one) for inner, one in value.items()] if isinstance(value, Mapping) else [(key, value)]
-        )
-    return result
+    return [
+        (f"{key}.{inner}" if inner else key, one)
+        for key, value in given.items()
+        for inner, one in (value.items() if isinstance(value, Mapping) else [("", value)])
+    ]
 
 
 def is_collection_type(annotation: Any) -> bool:

@@ -10,10 +10,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
 
 from shipid.checked import CheckedModel
-from shipid.vessel.perturb import uniform_draw
+from shipid.vessel.perturb import check_rising, uniform_draw
 
 Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
@@ -28,16 +28,11 @@ class Gusts(CheckedModel, BaseModel):
     kind: Literal["npd"]
     height: Annotated[Positive, Field(description="m above the sea")] = 10.0
     frequencies: Annotated[
-        tuple[Positive, Positive], Field(description="Hz, lowest and highest frequency of the gusts")
+        tuple[Positive, Positive],
+        AfterValidator(check_rising),
+        Field(description="Hz, lowest and highest frequency of the gusts"),
     ] = (1 / 600, 0.5)
     harmonics: Annotated[int, Field(ge=2, le=10000)] = 100
-
-    @model_validator(mode="after")
-    def _fits(self) -> Gusts:
-        low, high = self.frequencies
-        if low >= high:
-            raise ValueError(f"frequencies must be [low, high], not [{low:g}, {high:g}] Hz")
-        return self
 
 
 def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:

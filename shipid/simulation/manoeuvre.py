@@ -28,6 +28,7 @@ from shipid.simulation.approach import Controls
 from shipid.simulation.excitation import aprbs_series, deal_harmonics, limit_rate, multisine_series
 from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import DEGREE, RPM
+from shipid.vessel.perturb import check_rising
 from shipid.vessel.schema import term_blocks
 
 Array = NDArray[np.float64]
@@ -42,15 +43,7 @@ SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
 ZIGZAG, TURN, LEVEL, STOP = 30.0, 60.0, 40.0, 80.0  # ship lengths of standard manoeuvres
 
 
-def _check_rising(limits: tuple[float, float]) -> tuple[float, float]:
-    """The pair itself; ValueError if the first is above the second."""
-    low, high = limits
-    if low > high:
-        raise ValueError(f"low > high: give [low, high], not [{low:g}, {high:g}]")
-    return limits
-
-
-Hold = Annotated[tuple[Positive, Positive], AfterValidator(_check_rising)]
+Hold = Annotated[tuple[Positive, Positive], AfterValidator(check_rising)]
 
 
 @dataclass(frozen=True)
@@ -191,13 +184,14 @@ class StepManoeuvre(OrderedManoeuvre):
 
 
 class ApproachedManoeuvre(Manoeuvre):
-    """A manoeuvre by helm angle and shaft speed after an approach; the log begins with t = 0 at the end of it."""
+    """A manoeuvre by helm and shaft speed after an approach; t = 0 is the end of it, straight until the first order."""
 
     n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
     approach: Annotated[
         Literal["steady", "helmsman", "rest"],
         Field(description="in calm water at n_rpm until steady, helm amidships or by a helmsman; or at rest"),
     ] = "steady"
+    execute_at: Annotated[NotNegative, Field(description="s of the log that go by before the first order")] = 0.0
 
     @property
     def start(self) -> StartState:
@@ -205,10 +199,6 @@ class ApproachedManoeuvre(Manoeuvre):
         if self.approach == "rest":
             return StartState()
         return StartState(shaft=self.n_rpm * RPM, held=self.approach == "helmsman")
-
-    def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:  # noqa: ARG002
-        """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
-        return inputs
 
     @property
     def greatest_orders(self) -> tuple[float, float]:
@@ -227,33 +217,23 @@ class ApproachedManoeuvre(Manoeuvre):
         """Name -> (T,): the commands [SI] at times t (T,) [s], or the inputs of the helmsman."""
         return controls.orders(self.shaft(t), self.helm(t))
 
-    def check(self, controls: Controls) -> None:
-        """Raise DocumentError for a vessel that no command drives ahead, or none turns where the manoeuvre moves it."""
-        controls.orders(np.zeros(1), np.full(1, self.greatest_orders[0] * DEGREE))
-        self.helmsman(controls)
-
-
-class ExecutedManoeuvre(ApproachedManoeuvre):
-    """A manoeuvre with straight motion until its first order is executed."""
-
-    execute_at: Annotated[NotNegative, Field(description="s of the log that go by before the first order")] = 0.0
-
     def held(self, inputs: dict[str, Array], t: Array, helm: Mapping[str, float]) -> dict[str, Array]:
         """The inputs with the helm that holds the course of the approach [rad], by command, until the first order."""
         before = ~_is_after(self.execute_at, t)
         return inputs | {name: np.where(before, angle, inputs[name]) for name, angle in helm.items()}
 
     def check(self, controls: Controls) -> None:
-        """Raise DocumentError as for every approach, and where the first order comes after the end of the log."""
+        """Raise DocumentError for a vessel without drive or helm for it, and where the log ends before the order."""
         if not self.execute_at < self.length:
             raise DocumentError(
                 f"{self.execute_at:g} s: the run ends at {self.length:g} s, before the first order: give less",
                 path="manoeuvre.execute_at",
             )
-        super().check(controls)
+        controls.orders(np.zeros(1), np.full(1, self.greatest_orders[0] * DEGREE))
+        self.helmsman(controls)
 
 
-class TimedManoeuvre(ExecutedManoeuvre):
+class TimedManoeuvre(ApproachedManoeuvre):
     """A manoeuvre of a given duration."""
 
     duration: Annotated[Positive, Field(description="s")]
@@ -264,7 +244,7 @@ class TimedManoeuvre(ExecutedManoeuvre):
         return self.duration
 
 
-class Trial(ExecutedManoeuvre):
+class Trial(ApproachedManoeuvre):
     """A standard manoeuvre: `shipid manoeuvre` performs it at the scale of a ship, and runs of it are measured.
 
     angles : what the angles on the command line are, in their order; a `helm` is in deg.
@@ -500,7 +480,7 @@ class Excitation(TimedManoeuvre):
     period: Annotated[Positive, Field(description="s, of the multisine")] = 200.0
     harmonics: Annotated[
         tuple[PositiveInt, PositiveInt],
-        AfterValidator(_check_rising),
+        AfterValidator(check_rising),
         Field(description="lowest and highest of the multisine; assigned alternately to helm and shaft"),
     ] = (1, 20)
     hold: Annotated[Hold, Field(description="s, least and most of an APRBS level")] = (5.0, 20.0)

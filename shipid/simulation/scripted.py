@@ -15,7 +15,7 @@ from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import Controls
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.truth import LONGEST
+from shipid.simulation.truth import LONGEST, path_in_block
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -72,8 +72,6 @@ def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
         try:
             one.check(controls)
         except DocumentError as error:
-            group, _, key = (error.path or "").partition(".")
-            path = f"{where}.{key}" if key and group == "manoeuvre" else where  # else of the vessel, which is named
-            raise DocumentError(error.message, path=path) from None
+            raise DocumentError(error.message, path=path_in_block(error.path, where)) from None
         manoeuvres.append(one)
     return manoeuvres

@@ -11,7 +11,7 @@ import numpy as np
 
 from shipid.arguments import as_float_array, check_choice, check_class, check_number, check_positive
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import ShipidError, suggest_name
+from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls, balanced_shaft, vessel_service_speed
 from shipid.simulation.manoeuvre import KINDS, MOST_HEADING, MOST_HELM, Trial
 from shipid.simulation.request import Request, Side, round_to_rows
@@ -82,8 +82,7 @@ def define_standard(
     """
     check_class("vessel", vessel, Vessel, "as of `load_vessel`")
     kinds = standard_manoeuvres()
-    if not isinstance(name, str) or name not in kinds:
-        raise ShipidError(f"no manoeuvre is called {name!r}: {suggest_name(name, kinds)}", path="NAME")
+    check_choice("manoeuvre", name, kinds)
     kind = kinds[name]
     angles = as_float_array("angles", angles).ravel().tolist()
     _check_angles(name, angles, len(kind.angles))

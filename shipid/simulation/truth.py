@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import check_class, whole_steps
 from shipid.checked import CheckedModel
@@ -25,10 +25,12 @@ from shipid.simulation.sensors import Sensor, measure_record
 from shipid.units import DEGREE, percent_text
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import uniform_draw
+from shipid.vessel.perturb import check_rising, uniform_draw
 
 Array = np.ndarray
-NotNegative = tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]]
+NotNegative = Annotated[
+    tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]], AfterValidator(check_rising)
+]
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
@@ -72,8 +74,6 @@ class Truth(CheckedModel, BaseModel):
             raise ValueError(f"interval {self.interval:g} s must be a multiple of step {self.step:g} s")
         if self.duration < self.interval:
             raise ValueError(f"duration {self.duration:g} s holds no interval of {self.interval:g} s")
-        for name in ("wind_speed", "current_speed"):
-            range_limits(name, getattr(self, name))
         for name, value in self.environment.items():
             range_limits(f"environment.{name}", value)
         return self
@@ -103,7 +103,7 @@ def check_truth(truth: Truth, vessel: Vessel) -> None:
             for end in (0.0, 1.0):  # of every range
                 block.manoeuvre(truth.length, lambda _, end=end: end).check(controls)  # type: ignore[misc]
         except DocumentError as error:
-            raise DocumentError(error.message, path=_path_in_block(error.path, place)) from None
+            raise DocumentError(error.message, path=path_in_block(error.path, f"truth.manoeuvre.{place}")) from None
     if unknown is not None:
         raise DocumentError(f"no logged column: {suggest_name(unknown, columns)}", path=f"truth.sensors.{unknown}")
 
@@ -143,10 +143,10 @@ def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
         )
 
 
-def _path_in_block(path: str | None, place: int) -> str:
-    """Path in the study document of an error in a manoeuvre: `manoeuvre.n_rpm` -> `truth.manoeuvre.0.n_rpm`."""
-    inside = f".{path.removeprefix('manoeuvre.')}" if path is not None and path.startswith("manoeuvre.") else ""
-    return f"truth.manoeuvre.{place}{inside}"
+def path_in_block(path: str | None, block: str) -> str:
+    """Path in a document of an error in one of its manoeuvres; one of the vessel, which is named, gets the block's."""
+    group, _, key = (path or "").partition(".")
+    return f"{block}.{key}" if key and group == "manoeuvre" else block
 
 
 def truth_vessel(truth: Truth, vessel: Vessel) -> Vessel:

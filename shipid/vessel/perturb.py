@@ -86,9 +86,10 @@ def _scale_number(number: float, factor: float | tuple[float, float], u: float) 
     return number * (low + (high - low) * u)
 
 
-def _check_range(value: Any) -> Any:
+def check_rising(value: Any) -> Any:
+    """A number as it is, or a pair [low, high]; ValueError if the first is above the second."""
     if isinstance(value, tuple) and value[0] > value[1]:
-        raise ValueError(f"the range {list(value)} has low above high: give [low, high]")
+        raise ValueError(f"low > high: give [low, high], not {list(value)}")
     return value
 
 
@@ -103,7 +104,7 @@ RULES: dict[str, PerturbationRule] = {
         dict[str, FiniteFloat], lambda _number, value, _u: value, places=_checked_values, note="path -> new value"
     ),
     "factor": PerturbationRule(
-        Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(_check_range)],
+        Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
         _scale_number,
         drawn=lambda factor: isinstance(factor, tuple),
         note="a number is fixed, a pair is a range drawn from uniformly",

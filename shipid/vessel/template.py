@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from shipid.arguments import check_choice
 from shipid.document import bundled_documents, read_document, value_at_path
-from shipid.errors import ShipidError, suggest_name
+from shipid.errors import ShipidError
 from shipid.physics.signals import is_shaft, neutral_value
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
@@ -201,16 +202,14 @@ def _guess_remarks(given: Particulars) -> Iterator[str]:
 
 def _check_particulars(given: Particulars) -> None:
     """ShipidError for particulars outside the range of the formulae."""
-    if given.propulsor not in PROPULSORS:
-        raise ShipidError(f"propulsor {given.propulsor!r}: {suggest_name(given.propulsor, PROPULSORS)}")
+    check_choice("propulsor", given.propulsor, PROPULSORS)
+    check_choice("ship type", given.ship_type, WIND)
     if given.propulsor == "differential" and given.units != 2:
         raise ShipidError(
             "two screws steer by their difference: leave it out, or take another propulsor", path="--shafts"
         )
     if given.rudder_area is not None and given.propulsor != "propeller-rudder":
         raise ShipidError(f"there is none with {given.propulsor}: leave it out", path="--rudder-area")
-    if given.ship_type not in WIND:
-        raise ShipidError(f"ship type {given.ship_type!r}: {suggest_name(given.ship_type, WIND)}")
     for what, value, low, high in _formula_ranges(given):
         if value is not None and not low * (1 - ROUNDING) <= value <= high * (1 + ROUNDING):
             raise ShipidError(

@@ -34,7 +34,7 @@ def test_manoeuvre_measures_what_it_writes(tmp_path: Path, monkeypatch: pytest.M
 
 def test_manoeuvres_that_cannot_be() -> None:
     for arguments, expected in (
-        (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: NAME: no manoeuvre is called 'zigzak'"),
+        (("manoeuvre", "gunnerus-28.9", "zigzak"), "error: manoeuvre 'zigzak' is not known"),
         (("manoeuvre", "gunnerus-28.9", "turning", "--log", "x.csv"), "error: x.csv: a dataset is a Parquet file"),
     ):
         status, _, err = ended(*arguments)

@@ -180,7 +180,7 @@ def test_a_place_that_runs_no_programs(
     assert all("Operation not permitted" in line for line in lines)
     assert ["not used" in line for line in lines] == ([False, True] if everywhere else [False])
     if everywhere:
-        with pytest.raises(ShipidError, match="use 'torch'"):
+        with pytest.raises(ShipidError, match="use engine 'torch'"):
             numbers("native")
 
 

@@ -63,7 +63,7 @@ def test_all_is_measured_and_sides_mirror(name: str, angles: tuple[float, ...]) 
 @pytest.mark.parametrize(
     ("name", "angles", "how", "message"),
     [
-        ("zigzak", (), {}, "NAME: no manoeuvre is called 'zigzak': did you mean 'zigzag'?"),
+        ("zigzak", (), {}, "manoeuvre 'zigzak' is not known: did you mean 'zigzag'?"),
         ("zigzag", (1, 2, 3), {}, "ANGLES: zigzag takes 2 angles"),
         ("stop", (1,), {}, "ANGLES: stop takes no angles"),
         ("turning", (-35,), {}, "ANGLES: -35 deg: angles are above 0 and at most 90 deg"),

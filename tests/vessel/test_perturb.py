@@ -181,7 +181,7 @@ def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, An
         ({"parameters": ["inertia.m"]}, "are needed together"),
         ({"factor": 1.1}, "are needed together"),
         ({}, "has no rule"),
-        ({"parameters": ["inertia.m"], "factor": (1.4, 0.6)}, "low above high"),
+        ({"parameters": ["inertia.m"], "factor": (1.4, 0.6)}, "low > high"),
         ({"parameters": ["inertia.m"], "factor": (0.5, float("nan"))}, "finite"),
         ({"parameters": ["inertia.m"], "factor": 1.1, "factors": 2}, "unknown key"),
     ],
