@@ -134,13 +134,9 @@ class Perturbation(CheckedModel, BaseModel):
     @model_validator(mode="after")
     def _one_meaning(self) -> Perturbation:
         selecting = [key for key, rule in RULES.items() if rule.places is None]
-        if bool(self.parameters) != any(key in self.given for key in selecting):
-            raise ValueError(
-                f"`parameters` and {_join_alternatives(selecting)} are needed together: which numbers, and by how much"
-            )
-        if not (self.parameters or any(self.given.values())):
-            others = ", or ".join(f"`{key}`" for key in RULES if key not in selecting)
-            raise ValueError(f"has no rule: give `parameters` with {_join_alternatives(selecting)}, or {others}")
+        if bool(self.parameters) != any(key in self.given for key in selecting) or not any(self.given.values()):
+            others = ", ".join(key for key in RULES if key not in selecting)
+            raise ValueError(f"give `parameters` together with {' or '.join(selecting)}, or one of {others}")
         return self
 
     @classmethod
@@ -158,10 +154,6 @@ class Perturbation(CheckedModel, BaseModel):
     def drawn(self) -> bool:
         """Whether members differ by this block."""
         return any(RULES[key].drawn(argument) for key, argument in self.given.items())
-
-
-def _join_alternatives(keys: Iterable[str]) -> str:
-    return " or ".join(f"`{key}`" for key in keys)
 
 
 def perturbation_model() -> type[BaseModel]:

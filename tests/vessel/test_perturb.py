@@ -178,9 +178,9 @@ def test_a_member_that_is_no_vessel_is_refused(base: Vessel, block: dict[str, An
 @pytest.mark.parametrize(
     ("block", "remedy"),
     [
-        ({"parameters": ["inertia.m"]}, "are needed together"),
-        ({"factor": 1.1}, "are needed together"),
-        ({}, "has no rule"),
+        ({"parameters": ["inertia.m"]}, "together with factor"),
+        ({"factor": 1.1}, "together with factor"),
+        ({}, "or one of remove, set"),
         ({"parameters": ["inertia.m"], "factor": (1.4, 0.6)}, "low > high"),
         ({"parameters": ["inertia.m"], "factor": (0.5, float("nan"))}, "finite"),
         ({"parameters": ["inertia.m"], "factor": 1.1, "factors": 2}, "unknown key"),
