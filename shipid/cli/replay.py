@@ -9,8 +9,8 @@ import typer
 
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName, command_line, document_stem
-from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import motion_errors, text_table
+from shipid.cli.outputs import check_output
+from shipid.cli.terminal import MOTION, MOTION_FORMATS
 from shipid.errors import ShipidError
 
 
@@ -33,7 +33,6 @@ def replay_command(
     """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
     from shipid.data.dataset import read_dataset
     from shipid.data.windows import gaps_in_words
-    from shipid.files import check_table, write_table
     from shipid.identification.free_run import missing_inputs, simulate_free_runs
     from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
@@ -43,13 +42,9 @@ def replay_command(
     from shipid.version import __version__
     from shipid.vessel.load import load_vessel
 
-    file = out or Path(f"{document_stem(vessel)}-replay.html")
-    check_ending(file, ".html")
-    check_output(file, [], "--out")
+    file = check_output(out or Path(f"{document_stem(vessel)}-replay.html"), endings=(".html",))
     if not step > 0:
         raise ShipidError(f"{step:g} s must be positive", path="--step")
-    if csv is not None:
-        check_table(csv)
     ship, log = load_vessel(vessel), read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
     short = too_short(log, chosen, step, ahead)
@@ -59,13 +54,13 @@ def replay_command(
     zero = missing_inputs(ship, log, settings, chosen)
     holes = gaps_in_words(log.select(chosen), step)
     late = late_commands(ship, log, chosen) if commands == "held" else None
-    rows = [[row["run"], *motion_errors(row)] for row in replayed.errors.to_dict("records")]
+    errors = replayed.errors.drop(columns="model")
     timing = "; commands change between rows" if commands == "between" else ""
     content = ReplayContent(
         title=f"{ship.name}: recorded runs, replayed",
         name=ship.key,
         series=replayed.series,
-        errors=replayed.errors.drop(columns="model"),
+        errors=errors,
         ahead=ahead,
         provenance={
             "Vessel": f"{ship.name}, digest {ship.digest}",
@@ -77,21 +72,17 @@ def replay_command(
     )
     with open_answer(as_json) as answer:
         answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
-        heads = ["run", "u [m/s]", "v [m/s]", "r [deg/s]", "position [m]"]
-        answer.say(assumed=zero, late=None if late is None else late.words)
-        if zero:
-            answer.say(f"not in the log, taken as 0: {', '.join(zero)}")
         left_out = [run for run in short if run not in chosen]
-        answer.say(left_out=left_out, gaps=holes)
-        if left_out:
-            answer.say(f"too short, left out: {', '.join(left_out)}")
-        if holes:
-            answer.say(f"{holes}: orders are held there")
-        if late is not None:
-            answer.say(f"{late.words}: the turns are late; compare with --commands between")
-        answer.rows("errors", replayed.errors.drop(columns="model"), text_table(heads, rows))
-        if csv is not None:
-            write_table(csv, replayed.series)
-            answer.say(f"motions -> {csv}", csv=csv)
+        notes = [
+            f"not in the log, taken as 0: {', '.join(zero)}" * bool(zero),
+            f"too short, left out: {', '.join(left_out)}" * bool(left_out),
+            f"{holes}: orders are held there" * bool(holes),
+            "" if late is None else f"{late.words}: the turns are late; compare with --commands between",
+        ]
+        answer.say(
+            "\n".join(filter(None, notes)), assumed=zero, left_out=left_out, gaps=holes, late=late and late.words
+        )
+        answer.records("errors", errors, {"run": "run"} | MOTION, MOTION_FORMATS)
+        answer.save("motions", csv, replayed.series)
         page = write_replay(content, file)
         answer.say(f"page -> {page}", page=page)
