@@ -66,7 +66,7 @@ def study_new(
     with open_answer(as_json) as answer:
         choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
         answer.records("choices", choices, shown=[])
-        answer.say("\n".join(f"{one['path']} = {one['value']}  # {one['why']}" for one in choices))
+        answer.say("\n".join(f"{one['path']} = {one['value']}  # {one['why']}".removesuffix('  # ') for one in choices))
         answer.warn(draft.warnings)
         answer.say("\n".join(look.sentence for look in draft.looks.values() if not look.wrong))
         models = [model.name for model in draft.plan.foundations]
@@ -308,7 +308,7 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
         f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
-    lengths = {"first": first, "other": "other", "difference": "difference", "low": "from", "high": "to"}
+    lengths = {"first": first, "other": "other", "difference": "difference", "low": "95 % from", "high": "to"}
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
     banded = bool(errors[list(bands)].notna().any(axis=None))
     heads |= {"cells": "cells"} | lengths | (bands if banded else {}) | {"verdict": "verdict"}

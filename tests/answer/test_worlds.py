@@ -126,7 +126,7 @@ def test_the_command_prints_both_tables(made: Any, monkeypatch: pytest.MonkeyPat
     assert result.exit_code == 0, result.output
     lines = [" ".join(line.split()) for line in result.output.splitlines()]
     assert "finding in 3 worlds number mean over worlds 95 % from to" in lines
-    assert "R1 3 confirmed H / A, accurate 0.625 0.3144 0.9356" in lines
+    assert "R1 3 confirmed H / A, accurate 0.625 0.3145 0.9355" in lines
     assert "family method N_D H [m] least greatest worlds" in lines
     assert any(line.startswith("good ") and line.endswith(" 30 1.25 1 1.5 3") for line in lines)
 
