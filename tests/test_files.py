@@ -179,8 +179,8 @@ def test_a_new_document_is_never_written_over(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="is not written over"):
         files.write_new("x = 2\n", file)
     assert file.read_text() == "x = 1\n"
-    with pytest.raises(DataError, match=r"a study is a TOML file: let the name end in \.toml"):
-        files.write_new("x = 2\n", tmp_path / "a.txt", "study")
+    with pytest.raises(DataError, match=r"let the name end in \.toml"):
+        files.write_new("x = 2\n", tmp_path / "a.txt")
 
 
 def killed_while_it_writes(file: Path) -> int:
@@ -232,20 +232,12 @@ def test_a_link_stays_and_leads_to_the_new_file(tmp_path: Path) -> None:
     assert real.read_text() == "new"
 
 
-def test_devices_pipes_and_circles_are_refused(tmp_path: Path) -> None:
+def test_devices_and_pipes_are_neither_written_nor_waited_for(tmp_path: Path) -> None:
     """As root, a file would replace a device for every program of the machine."""
     os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "circle").symlink_to(tmp_path / "circle")
-    for place, why in ((tmp_path / "pipe", "a device or a pipe"), (tmp_path / "circle", "leads to itself")):
-        with pytest.raises(OSError, match=why):
-            files.write_text(place, "new")
-        assert not place.is_file()
-
-
-def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.npz")
-    with pytest.raises(OSError, match="a device or a pipe"):
-        files.read_arrays(tmp_path / "pipe.npz")
+    for use in (lambda: files.write_text(tmp_path / "pipe", "new"), lambda: files.read_arrays(tmp_path / "pipe")):
+        with pytest.raises(OSError, match="a device or a pipe"):
+            use()
 
 
 @pytest.mark.parametrize(
