@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import MappingName
 from shipid.cli.outputs import check_output
@@ -69,17 +70,14 @@ def data_import(
         raise ShipidError("is for drafts: give it with --guess LOG", path="--names, --vessel or --frame")
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
-    from shipid.data.dataset import write_dataset
     from shipid.logs.catalogue import fetch_log
-    from shipid.logs.importing import import_log
-    from shipid.logs.mapping import read_mapping
 
-    declared = read_mapping(mapping)
+    declared = shipid.read_mapping(mapping)
     file = check_output(out or Path(f"{Path(mapping).stem}.parquet"), [Path(mapping)], (".parquet",))
     source = log or fetch_log(mapping)
     check_output(file, [source, *source.glob("*")])
     with show_steps() as say:
-        dataset = import_log(
+        dataset = shipid.import_log(
             declared,
             source,
             without=without or (),
@@ -87,7 +85,7 @@ def data_import(
         )
     with open_answer(as_json) as answer:
         answer.records("repairs", dataset.metadata.get("repairs", []))
-        _say_dataset_size(answer, dataset, write_dataset(dataset, file))
+        _say_dataset_size(answer, dataset, shipid.write_dataset(dataset, file))
 
 
 def _say_dataset_size(answer: Answer, dataset: Dataset, file: Path) -> None:
@@ -99,13 +97,11 @@ def _draft_mapping(
     log: Path, names: tuple[str, ...], vessel: str | None, frame: Frame | None, out: Path | None, answer: Answer
 ) -> None:
     from shipid.files import write_new
-    from shipid.logs.guess.columns import guess
     from shipid.logs.guess.draft import NOT_YET, draft_mapping
-    from shipid.vessel.load import load_vessel
 
     if out is not None:
         check_output(out, endings=(".toml",))
-    guessed = guess(log, names, load_vessel(vessel) if vessel else None, frame)
+    guessed = shipid.guess(log, names, shipid.load_vessel(vessel) if vessel else None, frame)
     file = check_output(out or Path(f"{guessed.file.resolve().stem}.toml"), endings=(".toml",))
     text = draft_mapping(guessed)
     write_new(text, file)
@@ -117,16 +113,25 @@ def _draft_mapping(
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
     answer.records("findings", findings, formats={"sure": percent_text})
     source = guessed.source
-    if source.pattern is not None:
-        count = f"{source.held} runs" if source.parts else "as many runs"
-        sentence = f"{len(source.files)} files {source.pattern!r}: one source of {count}"
-        answer.say(sentence, files=len(source.files), pattern=source.pattern)
-    answer.records("left_out", [{"left out": name, "because": why} for name, why in source.skipped.items()])
-    answer.records("unused", [{"not used": name, "because": why} for name, why in guessed.unused.items()])
     questions = [question.sentence for question in guessed.questions]
     faults = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(NOT_YET)]
-    notes = [*(f"note: {note}" for note in guessed.sniffed.notes), *(f"? {question}" for question in questions)]
-    answer.say("\n".join([*notes, *faults]), notes=guessed.sniffed.notes, questions=questions, faults=faults)
+    lines = [
+        f"{len(source.files)} files {source.pattern!r} are one source" if source.pattern is not None else "",
+        *(f"left out: {name}: {why}" for name, why in source.skipped.items()),
+        *(f"not used: {name}: {why}" for name, why in guessed.unused.items()),
+        *(f"note: {note}" for note in guessed.sniffed.notes),
+        *(f"? {question}" for question in questions),
+        *faults,
+    ]
+    answer.say(
+        "\n".join(filter(None, lines)),
+        files=len(source.files),
+        left_out=source.skipped,
+        unused=guessed.unused,
+        notes=guessed.sniffed.notes,
+        questions=questions,
+        faults=faults,
+    )
     answer.say(f"draft -> {file}: read it before you import with it", file=file)
 
 
@@ -141,9 +146,8 @@ def data_segment(
     from shipid.files import write_new
     from shipid.logs.catalogue import fetch_log
     from shipid.logs.guess.draft import clock_moment, segment_log, segments_text
-    from shipid.logs.mapping import read_mapping
 
-    declared = read_mapping(mapping)
+    declared = shipid.read_mapping(mapping)
     if declared.source.runs is not None or declared.parts is not None:
         raise ShipidError("says where runs begin ([source] runs or [parts]): nothing is to be cut", file=mapping)
     file = check_output(out or Path(f"{Path(mapping).stem}-segments.toml"), endings=(".toml",))
@@ -163,7 +167,6 @@ def data_join(
     as_json: Json = False,
 ) -> None:
     """Join datasets of one vessel, such as those of several days or recorders."""
-    from shipid.data.dataset import read_dataset, write_dataset
     from shipid.logs.joining import join_datasets
 
     check_output(out, endings=(".parquet",))
@@ -171,8 +174,8 @@ def data_join(
     twice = next((file for file, place in zip(datasets, places, strict=True) if places.count(place) > 1), None)
     if twice is not None:
         raise ShipidError("is named twice: name each dataset once", file=twice)
-    joined, notes = join_datasets({file: read_dataset(file) for file in datasets})
-    file = write_dataset(joined, out)
+    joined, notes = join_datasets({file: shipid.read_dataset(file) for file in datasets})
+    file = shipid.write_dataset(joined, out)
     with open_answer(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
         _say_dataset_size(answer, joined, file)
@@ -185,12 +188,10 @@ def data_check(
     as_json: Json = False,
 ) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position."""
-    from shipid.data.checks import check_dataset
-    from shipid.data.dataset import read_dataset
     from shipid.data.held import warn_of_constant_commands
 
-    log = read_dataset(dataset)
-    checks = check_dataset(log)
+    log = shipid.read_dataset(dataset)
+    checks = shipid.check_dataset(log)
     failed = checks[~checks["ok"].astype(bool)]
     counts = checks.assign(failed=checks.index.isin(failed.index)).groupby("check", sort=False)
     with open_answer(as_json) as answer:
@@ -222,10 +223,9 @@ def data_measures(
     as_json: Json = False,
 ) -> None:
     """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
-    from shipid.data.dataset import read_dataset
     from shipid.logs.measuring import measure_dataset
 
-    result = measure_dataset(read_dataset(dataset), manoeuvre, length)
+    result = measure_dataset(shipid.read_dataset(dataset), manoeuvre, length)
     left = [{"run": run, "because": why} for run, why in result.left.items()]
     run = {"run": "run"}
     with open_answer(as_json) as answer:

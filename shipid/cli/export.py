@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+import shipid
 from shipid.cli.options import Adaptive, Kind, check_band, command_line
 from shipid.cli.outputs import check_output
 
@@ -29,7 +30,6 @@ def export_command(
     from shipid.export.casadi import listing_of
     from shipid.export.write import EXAMPLE_FILE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
-    from shipid.vessel.load import load_vessel
 
     if to == "casadi" and out.name:
         for file in (out, listing_of(out)):
@@ -39,7 +39,7 @@ def export_command(
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
         written = export_predictor(read_predictor(Path(what)), to, out, single=single, name=name)
     else:
-        vessel = load_vessel(what)
+        vessel = shipid.load_vessel(what)
         written = export_vessel(vessel, to, out, integrator=integrator or "rk4", single=single, name=name)
     for file in written:
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
@@ -74,7 +74,6 @@ def aboard_command(
         typer.echo(f"{len(played.points)} points -> {out}")
     if html is not None:
         from shipid.report.aboard import AboardContent, write_aboard
-        from shipid.version import __version__
 
         content = AboardContent(
             title=f"{log.stem}, played as if at sea",
@@ -83,7 +82,7 @@ def aboard_command(
             instants=played.instants,
             points=played.points,
             track=played.track,
-            provenance={"Log": str(log), "Predictor": str(predictor), "shipid": __version__},
+            provenance={"Log": str(log), "Predictor": str(predictor), "shipid": shipid.__version__},
             command=command_line(),
         )
         typer.echo(f"page -> {write_aboard(content, html)}")

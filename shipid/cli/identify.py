@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import VesselName, command_line, document_stem, parse_assignments, parse_changes
 from shipid.cli.outputs import check_output
@@ -95,10 +96,8 @@ def identify_command(
 
     With --structures, hulls of several structures are fitted to the same runs and compared on runs held out.
     """
-    from shipid.data.dataset import read_dataset
-    from shipid.identification.outcome import check_identification, read_settings, run_identification, write_patch
+    from shipid.identification.outcome import check_identification, read_settings, write_patch
     from shipid.study.structures import check_comparison
-    from shipid.vessel.load import load_vessel
 
     if structures is None and folds is not None:
         raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
@@ -119,7 +118,7 @@ def identify_command(
     if structures is not None and settings is None and parameters is None:
         options["parameters"] = ["hull.*"]
     declared = read_settings(settings, options | parse_changes(changes))
-    ship, log = load_vessel(vessel), read_dataset(dataset)
+    ship, log = shipid.load_vessel(vessel), shipid.read_dataset(dataset)
     names = [] if structures is None else _structure_names(structures)
     how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
     how |= {} if folds is None else {"folds": folds}
@@ -138,7 +137,7 @@ def identify_command(
             _compare_structures(ship, log, declared, names, how, band, file, html, dataset, answer)
             return
         with end_on_interrupt(), show_steps("cutting runs") as say:
-            outcome = run_identification(
+            outcome = shipid.run_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or (),
                 programme=design, band=band,
                 progress=lambda count, objective: say(f"iteration {count}, objective {objective:.6g}"),

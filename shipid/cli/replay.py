@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+import shipid
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName, command_line, document_stem
 from shipid.cli.outputs import check_output
@@ -31,25 +32,21 @@ def replay_command(
     as_json: Json = False,
 ) -> None:
     """Replay recorded runs on a vessel: from the measured state, with the recorded orders; errors, and a page."""
-    from shipid.data.dataset import read_dataset
     from shipid.data.windows import gaps_in_words
     from shipid.identification.free_run import missing_inputs, simulate_free_runs
     from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
     from shipid.identification.segments import too_short
-    from shipid.identification.settings import Identify
     from shipid.report.replay import REPLAYED, ReplayContent, write_replay
-    from shipid.version import __version__
-    from shipid.vessel.load import load_vessel
 
     file = check_output(out or Path(f"{document_stem(vessel)}-replay.html"), endings=(".html",))
     if not step > 0:
         raise ShipidError(f"{step:g} s must be positive", path="--step")
-    ship, log = load_vessel(vessel), read_dataset(dataset)
+    ship, log = shipid.load_vessel(vessel), shipid.read_dataset(dataset)
     chosen, _ = pick_runs(log, runs or ())
     short = too_short(log, chosen, step, ahead)
     chosen = tuple(run for run in chosen if run not in short) or chosen
-    settings = Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0, commands=commands)
+    settings = shipid.Identify(parameters=[next(iter(ship.parameters))], step=step, horizon=0.0, commands=commands)
     replayed = simulate_free_runs({REPLAYED: ship}, log, chosen, settings, ahead)
     zero = missing_inputs(ship, log, settings, chosen)
     holes = gaps_in_words(log.select(chosen), step)
@@ -66,7 +63,7 @@ def replay_command(
             "Vessel": f"{ship.name}, digest {ship.digest}",
             "Dataset": f"{dataset}, digest {log.digest}",
             "Simulation": f"rk4, steps of {step:g} s{timing}" + (f"; {', '.join(zero)} taken as 0" if zero else ""),
-            "shipid": __version__,
+            "shipid": shipid.__version__,
         },
         command=command_line(),
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_output
@@ -49,18 +50,16 @@ def simulate_command(
 
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
     """A log of a vessel: manoeuvres by a document."""
-    from shipid.data.dataset import Dataset, write_dataset
     from shipid.files import write_table
     from shipid.simulation.scripted import simulate_script
-    from shipid.vessel.load import load_vessel
 
     check_output(out, endings=TABLES)
-    ship = load_vessel(vessel)
-    dataset = Dataset(
+    ship = shipid.load_vessel(vessel)
+    dataset = shipid.Dataset(
         simulate_script(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
     )
     if out.suffix == ".parquet":
-        write_dataset(dataset, out)
+        shipid.write_dataset(dataset, out)
     else:
         write_table(out, dataset.frame)
     with open_answer(as_json) as answer:
@@ -74,12 +73,11 @@ def _say_size(answer: Answer, dataset: Dataset, file: Path) -> None:
 
 def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
     """The dataset of a study, and its envelope beside the published one."""
-    from shipid.data.dataset import write_dataset
     from shipid.study.envelope import envelope_table, input_envelope
-    from shipid.study.plan import input_files, read_plan
+    from shipid.study.plan import input_files
     from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
-    plan = read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes))
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
     file = check_output(out or Path(f"{plan.name}.parquet"), input_files(plan), (".parquet",))
@@ -87,7 +85,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     pool, test, _ = partition(plan, dataset)
     rows_of_sets = input_envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
     ranges = envelope_table(rows_of_sets, plan.study.published)
-    write_dataset(dataset, file)
+    shipid.write_dataset(dataset, file)
     with open_answer(as_json) as answer:
         _say_size(answer, dataset, file)
         answer.say("at the instants of prediction:")
@@ -126,14 +124,12 @@ def manoeuvre_command(
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
     from pandas import DataFrame
 
-    from shipid.data.dataset import Dataset, write_dataset
     from shipid.report.manoeuvre import write_manoeuvre
-    from shipid.simulation.measured import approach_words, manoeuvre_content, measure_standard
-    from shipid.vessel.load import load_vessel
+    from shipid.simulation.measured import approach_words, manoeuvre_content
 
     out = check_output(out or Path(f"{document_stem(vessel)}-{name}.html"), endings=(".html",))
-    ship = load_vessel(vessel)
-    done = measure_standard(
+    ship = shipid.load_vessel(vessel)
+    done = shipid.measure_standard(
         ship, name, angles or (), speed=speed, side=side, duration=duration, step=step, approach=approach
     )
     title, approached_by = done.standard.title, done.standard.manoeuvre
@@ -150,6 +146,6 @@ def manoeuvre_command(
         answer.save("measures", csv, DataFrame(done.measures))
         if log is not None:
             source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
-            answer.say(f"log -> {write_dataset(Dataset(done.frame, source), log)}", log=log)
+            answer.say(f"log -> {shipid.write_dataset(shipid.Dataset(done.frame, source), log)}", log=log)
         page = write_manoeuvre(manoeuvre_content(done, command_line()), out)
         answer.say(f"page -> {page}", page=page)

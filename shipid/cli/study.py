@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, document_stem, parse_changes
 from shipid.cli.outputs import check_output
@@ -66,7 +67,7 @@ def study_new(
     with open_answer(as_json) as answer:
         choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
         answer.records("choices", choices, shown=[])
-        answer.say("\n".join(f"{one['path']} = {one['value']}  # {one['why']}".removesuffix('  # ') for one in choices))
+        answer.say("\n".join(f"{one['path']} = {one['value']}  # {one['why']}".removesuffix("  # ") for one in choices))
         answer.warn(draft.warnings)
         answer.say("\n".join(look.sentence for look in draft.looks.values() if not look.wrong))
         models = [model.name for model in draft.plan.foundations]
@@ -199,12 +200,12 @@ def study_run(
 
     if scheduler is None:
         import_for_workers()  # before this process imports for itself
-    from shipid.study.plan import default_folder, read_plan
+    from shipid.study.plan import default_folder
 
     part = re.fullmatch(r"(\d+)/(\d+)", shard or "")
     if shard is not None and part is None:
         raise ShipidError(f"{shard!r}: write i/n, such as 3/20", path="--shard")
-    plan = read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes))
     _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, part and (int(part[1]), int(part[2])))
 
 
@@ -216,10 +217,10 @@ def study_prepare(
     device: Device = "cpu",
 ) -> None:
     """Make the folder of a study with its runs, so that the tasks of a job array can work there with --shard."""
-    from shipid.study.plan import default_folder, read_plan
+    from shipid.study.plan import default_folder
     from shipid.study.run import prepare_study
 
-    plan = read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes))
     for event in prepare_study(plan, out or default_folder(plan), device=device):
         typer.echo(event.text)
 
@@ -240,10 +241,8 @@ def study_resume(
 @app.command("report")
 def study_report(folder: Folder) -> None:
     """Write report.html, summary.md and results.parquet from what is stored."""
-    from shipid.answer.pages import write_pages
-
     with show_steps() as say:
-        report = write_pages(folder, say)
+        report = shipid.write_pages(folder, say)
     typer.echo(str(report))
 
 
@@ -338,10 +337,10 @@ def _prepare_command(
 ) -> tuple[Plan, Path]:
     """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
     from shipid.engine.engines import check_device
-    from shipid.study.plan import input_files, read_plan
+    from shipid.study.plan import input_files
 
     check_device(device)
-    plan = read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes))
     return plan, check_output(out or Path(f"{plan.name}-{command}.csv"), input_files(plan), TABLES)
 
 
@@ -353,7 +352,7 @@ def _run_to_report(
     device: str,
     shard: tuple[int, int] | None = None,
 ) -> None:
-    from shipid.answer.pages import ANSWER, write_pages
+    from shipid.answer.pages import ANSWER
     from shipid.answer.start import event_line
     from shipid.files import quote_argument
     from shipid.study import run, store
@@ -373,7 +372,7 @@ def _run_to_report(
         typer.echo(f"shard {shard[0]} of {shard[1]} is finished. When all are: {resume}")
         return
     with store.in_place(folder, plan), show_steps() as say:
-        report = write_pages(folder, say)
+        report = shipid.write_pages(folder, say)
     for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
         typer.echo(f"  {line}")
     typer.echo(f"report: {report}")

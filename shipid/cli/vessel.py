@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+import shipid
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
 from shipid.cli.outputs import check_output
@@ -31,10 +32,9 @@ def vessel_show(
     as_json: Json = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
-    from shipid.vessel.load import load_vessel
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
-    ship = load_vessel(vessel)
+    ship = shipid.load_vessel(vessel)
     document, particulars = ship.document, ship.document.get("particulars", {})
     known = {key: particulars[key] for key in PARTICULARS if key in particulars}
     terms: list[dict[str, Any]] = [

@@ -109,4 +109,4 @@ def test_an_argument_that_is_not_utf_8_is_refused_before_any_work() -> None:
     """Documents, pages and tables would have to name the file."""
     code, _, error = ended("study", "run", os.fsdecode(b"caf\xe9.toml"))
     assert code == 1
-    assert error == "error: caf\\udce9.toml: is not UTF-8: rename the file or folder, or write the text in UTF-8\n"
+    assert error == "error: caf\\udce9.toml: is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8\n"

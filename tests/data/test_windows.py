@@ -479,7 +479,7 @@ def test_folds_of_windows_with_a_past_share_no_moment() -> None:
         ({"past": 2.5}, "past must be a whole number, 0 or more, not 2.5"),
         ({"past": -3}, "past must be a whole number, 0 or more, not -3"),
         ({"path": "speed"}, "path 'speed' is not known: valid: position, velocity"),
-        ({"step": "1"}, "step must be a number above 0"),
+        ({"step": "1"}, "step must be a number"),
         ({"step": np.nan}, "step must be a number above 0 and finite, not nan"),
         ({"interval": 0.0}, "interval must be a number above 0 and finite, not 0"),
         ({"horizon": 200}, "no run is as long as the horizon of 200 s"),
