@@ -27,12 +27,6 @@ def test_every_leaf_is_got_by_its_path() -> None:
         assert documents.value_at_path(NESTED, path) == value
 
 
-@pytest.mark.parametrize(("path", "part"), [("a.x", "x"), ("a.c.2", "2"), ("a.b.c", "c"), ("a.c.x", "x"), ("", "")])
-def test_get_names_what_is_missing(path: str, part: str) -> None:
-    with pytest.raises(KeyError, match=f"there is no '{part}'"):
-        documents.value_at_path(NESTED, path)
-
-
 @pytest.mark.parametrize("seed", seeds(5, 40))
 def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
     """Paths of a few keys, in which a later change may take the place of a table that an earlier one changed."""
@@ -146,12 +140,6 @@ def test_find_prefers_the_folder_of_the_document(tmp_path: Path, monkeypatch: py
     assert documents.read_document(documents.find_document("./x.toml", "models", tmp_path / "here")) == {"a": 1}
     assert documents.read_document(documents.find_document("./x.toml", "models")) == {"a": 2}
     assert documents.find_document("gunnerus-28.9", "models").name == "gunnerus-28.9.toml"
-
-
-@pytest.mark.parametrize("kind", ["models", "studies"])
-def test_find_corrects_names(kind: str) -> None:
-    with pytest.raises(DocumentError, match="a path to another file needs a slash"):
-        documents.find_document("nothing-like-it", kind)
 
 
 class Inner(BaseModel):

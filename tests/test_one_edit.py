@@ -24,8 +24,7 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.export.correctors import inputs_of
 from shipid.export.model import build_model
 from shipid.export.write import export_predictor
-from shipid.hybrid.features import choose_features, input_group
-from shipid.hybrid.mirror import mirror_matrix
+from shipid.hybrid.features import input_group
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stepping import Stepper, step_alone
@@ -94,26 +93,6 @@ def with_flap() -> Vessel:
 
 
 @pytest.mark.usefixtures("flap")
-def test_a_row_that_is_corrected_to_a_command_has_an_actuator_in_the_schema(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a notebook: the schema of the term was that of the row before."""
-    monkeypatch.setitem(signals.SIGNALS, "flap", replace(FLAP, role="environment"))
-    with pytest.raises(DocumentError, match="actuator: unknown key"):
-        with_flap()
-    monkeypatch.setitem(signals.SIGNALS, "flap", FLAP)
-    assert with_flap().parameters["thruster.tail.actuator.flap.T"] == 0.5
-
-
-def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
-    """A log with a flap in degrees, imported."""
-    log = as_log(turning(T), folder / "log.csv")
-    table = pd.read_csv(log).assign(flap=np.degrees(largest * np.sin(0.2 * T)))
-    table.to_csv(log, index=False)
-    mapping = folder / "mapping.toml"
-    mapping.write_text(PLAIN.read_text() + '[columns."tail.flap"]\nfrom = "flap"\nunit = "deg"\n')
-    return import_log(read_mapping(mapping), log)
-
-
-@pytest.mark.usefixtures("flap")
 def test_a_term_takes_it_and_its_actuator_lags() -> None:
     model = vessel_dynamics(with_flap())
     assert model.commands == ("propeller.n", "rudder.delta", "tail.flap")
@@ -129,30 +108,6 @@ def test_a_term_takes_it_and_its_actuator_lags() -> None:
 
 
 @pytest.mark.usefixtures("flap")
-def test_the_importer_the_checks_and_windows_take_it(tmp_path: Path) -> None:
-    dataset = flap_log(tmp_path)
-    assert dataset.commands == ["propeller.n", "tail.flap"]
-    np.testing.assert_allclose(dataset.frame["tail.flap"], 0.2 * np.sin(0.2 * T), atol=1e-6)
-    windows = cut_windows(dataset, horizon=5)
-    assert windows.planned["tail.flap"].shape == (5, len(windows))
-    checks = check_dataset(dataset).set_index("check")
-    assert checks.loc["range tail.flap", "ok"]
-    assert checks.loc["range tail.flap", "limit"] == 1.0
-    assert not check_dataset(flap_log(tmp_path, 2.0)).set_index("check").loc["range tail.flap", "ok"]
-
-
-@pytest.mark.usefixtures("flap")
-@pytest.mark.parametrize("unit", ["deg", "rad"])
-def test_a_guess_knows_its_name_and_unit(tmp_path: Path, unit: str) -> None:
-    log = as_bridge(si_log()).rename(columns={"rudder": "flap"})
-    log.assign(flap=log["flap"] * (1.0 if unit == "deg" else DEGREE)).to_csv(tmp_path / "log.csv", index=False)
-    proposal = guess(tmp_path / "log.csv").column("flap.flap")
-    assert proposal is not None
-    assert (proposal.source, proposal.unit, proposal.confidence) == ("flap", unit, 0.95)
-    assert "turns the ship to starboard" in proposal.evidence
-
-
-@pytest.mark.usefixtures("flap")
 def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
     rows = [{"set": "D_4", "quantity": "tail.flap", "min": -0.1, "mean": 0.0, "max": 0.2}]
     published = PublishedEnvelope(source="a table", envelope={"flap_deg": (-6.0, 0.0, 12.0)})
@@ -160,15 +115,6 @@ def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
     assert set(table["unit"]) == {"deg"}
     assert table.loc["D_4", "max"] == pytest.approx(np.degrees(0.2))
     assert table.loc["published", "max"] == pytest.approx(12.0)
-
-
-@pytest.mark.usefixtures("flap")
-def test_a_correction_mirrors_it() -> None:
-    rng = np.random.default_rng(1)
-    table = {name: rng.normal(size=40) for name in ("u", "v", "r", "propeller.n", "tail.flap")}
-    image = mirror_matrix(table, choose_features(table))
-    assert image is not None
-    np.testing.assert_array_equal(image, np.diag([1, -1, -1, 1, -1]))
 
 
 def rows_of_the_page() -> dict[str, Signal]:
@@ -387,13 +333,6 @@ def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert len(shifts) == 2
         assert all(least - 1e-12 <= shift <= most + 1e-12 for shift in shifts)
         assert (shifts[0] == shifts[1]) == (least == most)
-
-
-def test_a_rule_refuses_a_value_at_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
-    with pytest.raises(DocumentError) as caught:
-        shifted(tmp_path, {"shift": "far"})
-    assert str(caught.value.path).startswith("family.wrong.perturb.0.shift")
 
 
 @pytest.fixture

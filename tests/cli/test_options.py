@@ -239,7 +239,7 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Logs, folders and devices as if they were there."""
     monkeypatch.chdir(tmp_path)
     Path("begin.toml").write_text("[identify]\nstep = 0.25\n")
-    for module in ("cli", "study"):  # what is imported later would keep a stand-in for good
+    for module in ("answer", "cli", "study"):  # what is imported later would keep a stand-in for good
         for found in iter_modules([str(Path(shipid.__file__).parent / module)], f"shipid.{module}."):
             import_module(found.name)
     stand_ins: dict[str, Callable[..., Any]] = {
