@@ -264,7 +264,7 @@ def _replace_value(node: Any, parts: Sequence[str], value: Any) -> Any:
     if not isinstance(node, Mapping | list) or key is None:
         hint = suggest_name(parts[0], names if isinstance(node, list) else ())
         raise KeyError(f"there is no {parts[0]!r}: {hint}")
-    result = copy.copy(node)
+    result: Any = copy.copy(node)
     if len(parts) > 1:
         below = node[key] if isinstance(node, list) else node.get(key, {})
         value = _replace_value(below, parts[1:], value)

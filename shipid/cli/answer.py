@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shipid.cli.terminal import four_digits, print_table
+from shipid.units import plural_word
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+    from shipid.data.dataset import Dataset
 
     Rows = DataFrame | Sequence[Mapping[Any, Any]]
 
@@ -58,7 +61,7 @@ class Answer:
         if self.as_json:
             self.contents[name] = records
         elif records:
-            heads, formats = heads or dict(zip(records[0], records[0], strict=True)), formats or {}
+            heads, formats = heads or {key: str(key) for key in records[0]}, formats or {}
             cells = [[formats.get(key, _format_cell)(record[key]) for key in heads] for record in records]
             print_table(list(heads.values()), cells)
 
@@ -68,7 +71,12 @@ class Answer:
             from shipid.files import write_table
 
             write_table(file, rows)
-            self.say(f"{what} -> {file}", csv=file)
+            self.say(f"{what} -> {file}", file=file)
+
+    def say_dataset(self, dataset: Dataset, file: Path) -> None:
+        """Say how large a dataset is that was written."""
+        runs, rows = len(dataset.runs), len(dataset.frame)
+        self.say(f"{rows} rows in {runs} {plural_word(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
 
 
 def _as_dicts(rows: Any) -> list[dict[str, Any]]:

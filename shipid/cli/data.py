@@ -17,7 +17,6 @@ from shipid.errors import ShipidError
 from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
-    from shipid.data.dataset import Dataset
     from shipid.logs.guess.pose import Frame
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
@@ -85,12 +84,7 @@ def data_import(
         )
     with open_answer(as_json) as answer:
         answer.records("repairs", dataset.metadata.get("repairs", []))
-        _say_dataset_size(answer, dataset, shipid.write_dataset(dataset, file))
-
-
-def _say_dataset_size(answer: Answer, dataset: Dataset, file: Path) -> None:
-    rows, runs = len(dataset.frame), len(dataset.runs)
-    answer.say(f"{rows} rows in {runs} {plural_word(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
+        answer.say_dataset(dataset, shipid.write_dataset(dataset, file))
 
 
 def _draft_mapping(
@@ -175,10 +169,9 @@ def data_join(
     if twice is not None:
         raise ShipidError("is named twice: name each dataset once", file=twice)
     joined, notes = join_datasets({file: shipid.read_dataset(file) for file in datasets})
-    file = shipid.write_dataset(joined, out)
     with open_answer(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-        _say_dataset_size(answer, joined, file)
+        answer.say_dataset(joined, shipid.write_dataset(joined, out))
 
 
 @app.command("check")

@@ -49,7 +49,7 @@ def identify_command(
     bounds: Annotated[list[str] | None, typer.Option(help="paths=[0.5, 2]: least and greatest factor")] = None,
     nuisance: Annotated[
         list[str] | None,
-        typer.Option(help="unknown of each run, with =WIDTH if wanted: initial_state, current, heading_bias, ..."),
+        typer.Option(help="unknown of each run, all with =WIDTH or none: initial_state, current, heading_bias, ..."),
     ] = None,
     horizon: Annotated[
         float | None, typer.Option(help="s of each prediction that is fitted; 0: whole runs; default: 30")
@@ -169,6 +169,11 @@ def _split_paths(given: Sequence[str]) -> list[str]:
     return [path.strip() for words in given for path in words.split(",")]
 
 
+def _nuisance_widths(given: list[str]) -> list[str] | dict[str, Any]:
+    """Return the names; or name -> width, where widths are given."""
+    return parse_assignments(given, "--nuisance", "current=0.3") if "=" in "".join(given) else given
+
+
 def _structure_names(given: str) -> list[str]:
     """Names of the structures of `--structures`."""
     from shipid.identification.structures import PRESENT, STRUCTURES
@@ -258,16 +263,6 @@ def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[
     else:
         answer.say(look.sentence)
     answer.say(first_look=look.sentence)
-
-
-def _nuisance_widths(given: list[str]) -> list[str] | dict[str, Any]:
-    """Return the names; or name -> width if any has one, with the default width for the others."""
-    if not any("=" in name for name in given):
-        return given
-    from shipid.identification.settings import WIDE
-
-    named = {name: WIDE.get(name, 1.0) for name in given if "=" not in name}
-    return named | parse_assignments([name for name in given if "=" in name], "--nuisance", "current=0.3")
 
 
 def _show_identified(outcome: Identification, answer: Answer) -> None:

@@ -27,7 +27,8 @@ class GuardedCommand(typer.core.TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an error of compiled code that Ctrl-C became is KeyboardInterrupt again."""
-        read, written = [], {}
+        read: list[Path] = []
+        written: dict[str, Path] = {}
         for one in self.params:
             value = ctx.params.get(one.name)
             values = value if isinstance(value, list | tuple) else [value]

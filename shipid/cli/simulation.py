@@ -8,16 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import shipid
-from shipid.cli.answer import Answer, Json, open_answer
+from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES
 from shipid.errors import DocumentError, ShipidError
 from shipid.files import TABLES
-from shipid.units import plural_word
 
 if TYPE_CHECKING:
-    from shipid.data.dataset import Dataset
+    pass
 
 
 def simulate_command(
@@ -63,12 +62,7 @@ def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> 
     else:
         write_table(out, dataset.frame)
     with open_answer(as_json) as answer:
-        _say_size(answer, dataset, out)
-
-
-def _say_size(answer: Answer, dataset: Dataset, file: Path) -> None:
-    runs, rows = len(dataset.runs), len(dataset.frame)
-    answer.say(f"{runs} {plural_word(runs, 'run')}, {rows} rows -> {file}", file=file, runs=runs, rows=rows)
+        answer.say_dataset(dataset, out)
 
 
 def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
@@ -87,7 +81,7 @@ def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_
     ranges = envelope_table(rows_of_sets, plan.study.published)
     shipid.write_dataset(dataset, file)
     with open_answer(as_json) as answer:
-        _say_size(answer, dataset, file)
+        answer.say_dataset(dataset, file)
         answer.say("at the instants of prediction:")
         heads = {"min": "least", "mean": "mean", "max": "greatest"}
         answer.records("envelope", ranges, {"set": "set", "quantity": "quantity", "unit": "unit"} | heads)

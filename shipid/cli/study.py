@@ -16,7 +16,7 @@ from shipid.cli.outputs import check_output
 from shipid.cli.terminal import count_blocks, end_on_interrupt, share_text, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES
-from shipid.units import level_text, percent_text
+from shipid.units import level_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -93,7 +93,6 @@ def study_screen(
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
     from shipid.engine.engines import ENGINES, REPEATED, engine_by_name
-    from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain_runs, partition
 
@@ -108,22 +107,15 @@ def study_screen(
         typer.echo(note, err=True)
     blocks = count_blocks(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
     frame = screen.join_blocks(list(blocks))
-    write_table(file, frame)
-    spread = screen.accuracy_quantiles(frame)
     correlations = screen.drivers_of_accuracy(frame)
-    quantiles = {
-        name: percent_text(share) for name, share in zip(spread.columns[3:], screen.QUANTILES_OF_A, strict=True)
-    }
-    heads = {"family": "family", "members": "members", "diverged": "diverged"}
     with open_answer(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
-        answer.records("accuracy", spread, heads | quantiles)
+        answer.records("accuracy", screen.accuracy_quantiles(frame))
         if len(correlations):
             answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
         signs = dict.fromkeys(("factor", "away"), "{:+.2f}".format)
-        heads = {"family": "family", "paths": "parameter", "factor": "factor", "away": "distance"}
-        answer.records("drivers", correlations, heads, signs)
-        answer.say(f"{len(frame)} members -> {file}", file=file)
+        answer.records("drivers", correlations, formats=signs)
+        answer.save(f"{len(frame)} members", file, frame)
 
 
 @app.command("rotate")
@@ -142,7 +134,6 @@ def study_rotate(
     import pandas as pd
 
     from shipid.answer import rotate
-    from shipid.files import write_table
     from shipid.study.plan import families_set_from, grid_seeds
     from shipid.study.prepare import obtain_runs
 
@@ -154,23 +145,13 @@ def study_rotate(
     cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
     sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
     frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
-    write_table(file, frame)
-    rotate.remove_kept(kept)
-    numbers = {
-        "A": "A",
-        "H": "H",
-        "least": "least H",
-        "greatest": "greatest H",
-        "H_90": "H_90",
-        "width": "radius of band",
-    }
-    band = {"coverage": f"in band of {level_text(plan.study.bands.level)}", "better": "turns with H below A"}
     naive = frame.groupby("test")["naive"].first().mean()
     verdicts = rotate.turn_findings(frame, plan)
     with open_answer(as_json) as answer:
-        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
-        heads = {"foundation": "foundation", "method": "method"} | numbers | band
-        answer.records("turns", rotate.turns_table(frame), heads, {"coverage": share_text})
+        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train", tests=wanted)
+        level = level_text(plan.study.bands.level)
+        answer.say(f"width, coverage: radius [m] of bands of {level}, share of paths inside; better: turns with H < A:")
+        answer.records("turns", rotate.turns_table(frame), formats={"coverage": share_text})
         answer.say(f"constant u, v, r: {naive:.4g} m", naive=naive)
         if saw := families_set_from(plan, wanted):
             answer.say(
@@ -180,7 +161,8 @@ def study_rotate(
             answer.say("findings over the turns, in brackets 95 % intervals:")
         heads = {"id": "finding", "claim": "claim", "verdict": "verdict", "evidence": "evidence"}
         answer.records("findings", verdicts, heads)
-        answer.say(f"{len(frame)} cells -> {file}", file=file)
+        answer.save(f"{len(frame)} cells", file, frame)
+    rotate.remove_kept(kept)
 
 
 @app.command("run")
@@ -277,7 +259,6 @@ def study_compare(
     errors over the worlds.
     """
     from shipid.answer import compare
-    from shipid.files import write_table
 
     if out is not None:
         check_output(out, endings=TABLES)
@@ -289,9 +270,7 @@ def study_compare(
             errors = _show_worlds(compare.read_worlds(folders), answer)
         else:
             errors = _show_matched(compare.compare(folders, {first: other for first, _, other in matched}), answer)
-        if out is not None:
-            write_table(out, errors)
-            answer.say(f"{len(errors)} rows -> {out}", file=out)
+        answer.save(f"{len(errors)} rows", out, errors)
 
 
 def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
