@@ -319,7 +319,8 @@ def _show_estimates(outcome: Identification, answer: Answer) -> None:
         "factor": "factor",
     }
     heads |= {"factor_error": "std error", "factor_low": "95 % from", "factor_high": "to", "identified": "identified"}
-    answer.records("estimates", outcome.estimates, heads, {"identified": lambda known: "yes" if known else "no"})
+    formats: dict[str, Any] = dict.fromkeys(("base", "value"), "{:.4g}".format)
+    answer.records("estimates", outcome.estimates, heads, formats | {"identified": lambda one: "yes" if one else "no"})
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}
     none = outcome.estimates.loc[outcome.estimates["base"] == 0, "name"].tolist()
     answer.say(

@@ -98,8 +98,9 @@ def vessel_new(
         count = len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)
         answer.say(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s", n=guessed.n, speed=given.service)
-        grows = "UNSTABLE" if guessed.growth >= 0 else "stable"
-        answer.say(f"course-{grows} by these formulae", growth=guessed.growth)
+        grows = "" if guessed.growth < 0 else f": a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
+        answer.say(f"course-{'UNSTABLE' if grows else 'stable'} by these formulae{grows}", growth=guessed.growth)
         judged, notes = measure_trials(guessed.vessel, given.service)
+        answer.say("\n".join(guessed.remarks), remarks=guessed.remarks)
         answer.records("criteria", judged, CRITERIA)
-        answer.say("\n".join([*guessed.remarks, *notes]), remarks=guessed.remarks, notes=notes)
+        answer.say("\n".join(notes), notes=notes)
