@@ -89,15 +89,10 @@ def _format_cell(value: Any) -> str:
 
 @contextmanager
 def open_answer(as_json: bool) -> Iterator[Answer]:
-    """Give an `Answer`, and print it as JSON at the end of the block, also where that ends with an exit status."""
-    answer, end = Answer(as_json), None
-    try:
-        yield answer
-    except typer.Exit as error:
-        end = error
+    """Give an `Answer`, and print it as JSON at the end of the block."""
+    answer = Answer(as_json)
+    yield answer
     if as_json:
         from shipid.files import json_text
 
         sys.stdout.write(json_text(answer.contents) + "\n")
-    if end is not None:
-        raise end

@@ -9,7 +9,6 @@ import typer
 
 import shipid
 from shipid.cli.options import Adaptive, Kind, check_band, command_line
-from shipid.cli.outputs import check_output
 
 
 def export_command(
@@ -27,13 +26,9 @@ def export_command(
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
     from shipid.document import bundled_documents
     from shipid.errors import DocumentError
-    from shipid.export.casadi import listing_of
     from shipid.export.write import EXAMPLE_FILE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
 
-    if to == "casadi" and out.name:
-        for file in (out, listing_of(out)):
-            check_output(file, [Path(what)])
     if what.endswith(".npz") or (what not in bundled_documents("models") and Path(what).is_dir()):
         if integrator is not None:
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")

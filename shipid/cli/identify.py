@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +14,7 @@ from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import VesselName, command_line, document_stem, parse_assignments, parse_changes
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import MOTION, MOTION_FORMATS, end_on_interrupt, show_steps
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.units import join_names, plural_word
 
 if TYPE_CHECKING:
@@ -246,23 +246,19 @@ def _show_groups(groups: DataFrame, whose: str, answer: Answer) -> None:
 
 def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
     """Say before anything is fitted whether the vessel predicts the log better than constant u, v, r."""
-    from shipid.errors import DataError
     from shipid.identification.outcome import pick_runs, without_shared
     from shipid.study.first_look import first_look
     from shipid.study.new import proposed_horizon
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
-    try:
-        with show_steps("comparing the vessel as it is with the runs, before the fit"):
-            ahead, step = proposed_horizon(ship, log)
-            look = first_look(ship, log, fitted, ahead=ahead, step=step)
-    except DataError:
-        return  # the fit says what is missing
-    if look.wrong:
-        typer.echo(f"warning: {look.sentence}", err=True)
-    else:
-        answer.say(look.sentence)
-    answer.say(first_look=look.sentence)
+    with suppress(DataError), show_steps("comparing the vessel as it is with the runs, before the fit"):
+        ahead, step = proposed_horizon(ship, log)  # where it cannot, the fit says what is missing
+        look = first_look(ship, log, fitted, ahead=ahead, step=step)
+        if look.wrong:
+            typer.echo(f"warning: {look.sentence}", err=True)
+        else:
+            answer.say(look.sentence)
+        answer.say(first_look=look.sentence)
 
 
 def _show_identified(outcome: Identification, answer: Answer) -> None:

@@ -236,8 +236,8 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
     report = check_folder(folder)
     with open_answer(as_json) as answer:
         answer.say("\n".join(report.lines), lines=report.lines, faults=report.faults)
-        if report.faults:
-            raise typer.Exit(1)
+    if report.faults:
+        raise typer.Exit(1)
 
 
 @app.command("compare")
