@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.benchmarks.__main__ import THREADS, verdict
-from tests.benchmarks.compare import Ratio, accepted, best, compare, read_recorded
+from tests.benchmarks.compare import Ratio, accepted, compare, read_recorded
 
 RECORDED: dict[str, dict[str, dict[str, Any]]] = {
     "engine": {
@@ -52,18 +52,6 @@ def test_only_groups_that_ran_are_held_against_theirs() -> None:
         ("speed-up", False, None),
         ("growth", True, False),
     ]
-
-
-def test_a_recorded_ratio_that_is_not_measured_any_more_is_an_error() -> None:
-    with pytest.raises(KeyError, match="growth"):
-        compare({"engine": {"speed-up": 9.0}}, RECORDED)
-
-
-def test_of_two_measurements_the_better_of_each_ratio_counts() -> None:
-    first = {"engine": {"speed-up": 11.0, "growth": 1.3, "time [s]": 3.0}, "other": {"x": 1.0}}
-    again = {"engine": {"speed-up": 9.0, "growth": 1.1, "time [s]": 4.0}}
-    merged = best(first, again, RECORDED)
-    assert merged == {"engine": {"speed-up": 11.0, "growth": 1.1, "time [s]": 4.0}, "other": {"x": 1.0}}
 
 
 def test_accepting_replaces_values_of_what_ran_and_nothing_else() -> None:

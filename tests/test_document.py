@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-import copy
 import random
-import re
 import shutil
 from decimal import Decimal
 from pathlib import Path
@@ -17,7 +15,6 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.logs.mapping import read_mapping
 from shipid.study.plan import read_plan
 from shipid.vessel.load import load_vessel
-from tests.drawn import seeds
 
 NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 
@@ -25,31 +22,6 @@ NESTED: dict[str, Any] = {"a": {"b": 1, "c": [10, {"d": 2}]}, "e": "x"}
 def test_every_leaf_is_got_by_its_path() -> None:
     for path, value in documents.document_leaves(NESTED):
         assert documents.value_at_path(NESTED, path) == value
-
-
-@pytest.mark.parametrize("seed", seeds(5, 40))
-def test_changes_at_once_are_those_one_by_one(seed: int) -> None:
-    """Paths of a few keys, in which a later change may take the place of a table that an earlier one changed."""
-    rng = random.Random(seed)
-    document = {"a": {"b": {"x": 1, "p.q": {"x": 2}}, "l": [{"x": 3}, {"name": "n", "x": 4}]}, "x": 5}
-    heads = ["", "a.", "a.b.", "a.c.", "a.c.d.", 'a.b."p.q".', "a.l.0.", "a.l.n."]
-    tails = ["x", "y", '"p.q"', "b", "l", "c"]
-    changes: dict[str, Any] = {}
-    for _ in range(8):
-        path = rng.choice(heads) + rng.choice(tails)
-        value = {"x": 6, "b": {}, "d": {}} if path.rpartition(".")[2] in ("b", "c") else rng.randint(7, 99)
-        changes[path] = [{"x": value}, {"name": "n"}] if path == "a.l" else value
-    expected: Any = document
-    try:
-        for path, value in copy.deepcopy(changes).items():
-            expected = documents.replace_values(expected, {path: value})
-    except DocumentError as error:
-        with pytest.raises(DocumentError, match=re.escape(str(error))):
-            documents.replace_values(document, changes)
-        return
-    before = copy.deepcopy(document)
-    assert documents.replace_values(document, changes) == expected
-    assert document == before
 
 
 def test_entries_of_a_list_are_selected_by_name() -> None:

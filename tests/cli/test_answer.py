@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
 from shipid.cli.answer import Answer, open_answer
 from shipid.document import bundled_documents
-from shipid.study.store import DATASET
 
 
 def answered(*arguments: object, code: int = 0) -> dict[str, Any]:
@@ -42,26 +40,6 @@ def test_studies(study: Path, tiny_run: Path) -> None:
     made = answered("simulate", study)
     assert made["runs"] == 12
     assert {row["set"] for row in made["envelope"]} >= {"test"}
-
-
-@pytest.mark.slow
-def test_data(tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    frame = pd.read_parquet(tiny_run / DATASET)
-    checks = answered(
-        "data",
-        "check",
-        tiny_run / DATASET,
-        code=CliRunner().invoke(app, ["data", "check", str(tiny_run / DATASET)]).exit_code,
-    )
-    assert len(checks["checks"]) >= frame["run"].nunique()
-    assert "left" in answered("data", "measures", tiny_run / DATASET)
-    errors = answered("replay", "gunnerus-28.9", tiny_run / DATASET, "--run", "M00*")
-    assert len(errors["errors"]) == 9 + 1, "and all together"
-    one = frame[frame["run"] == frame["run"].iloc[0]]
-    one[["t", "north", "east", "psi", "u", "v", "r"]].to_csv("log.csv", index=False)
-    guess = answered("data", "import", "--guess", "log.csv")
-    assert {row["column"] for row in guess["columns"]} >= {"u", "v", "r"}
 
 
 def test_numbers_and_files_of_an_answer_are_json(capsys: pytest.CaptureFixture[str]) -> None:
