@@ -18,7 +18,6 @@ from shipid.files import open_file
 
 Document = dict[str, Any]
 
-LARGEST = 20_000_000  # bytes of a document
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
 DRAFTS = {
     "models": ("vessel", "vessel new"),
@@ -97,14 +96,11 @@ def read_document(file: Path | str) -> Document:
     """Read a TOML document; DocumentError for invalid syntax, a wrong encoding, and what `check_values` refuses."""
     try:
         with open_file(file) as stream:
-            content = stream.read(LARGEST + 1)
-        text = content.decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
+            text = stream.read().decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
     except UnicodeDecodeError as error:
         raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
     except OSError as error:
         raise DocumentError(f"cannot be read ({error.strerror})", file=file) from None
-    if len(content) > LARGEST:
-        raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
     document = parse_toml(text, file)
     check_values(document, file)
     return document
@@ -386,10 +382,6 @@ def _location_in_data(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
         if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
-        elif isinstance(part, str) and part in dict(
-            document_leaves(data, lists=False)
-        ):  # nested tables, taken by their paths
-            data = value_at_path(data, part)
         elif problem["type"] != "missing" or position < len(location) - 1:
             continue
         yield str(part)

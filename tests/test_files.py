@@ -31,11 +31,6 @@ def full(*_: Any, **__: Any) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def forbidden(*_: Any) -> None:
-    """A group that this user is not in."""
-    raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
-
-
 @pytest.mark.parametrize("name", WRITERS)
 def test_only_the_file_is_left(name: str, tmp_path: Path) -> None:
     file = tmp_path / "deep" / "er" / name
