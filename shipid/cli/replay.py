@@ -71,10 +71,10 @@ def replay_command(
         answer.say(f"{ship.name}: root mean square errors, {f'{ahead:g} s' if ahead else 'whole runs'}")
         left_out = [run for run in short if run not in chosen]
         notes = [
-            f"not in the log, taken as 0: {', '.join(zero)}" * bool(zero),
-            f"too short, left out: {', '.join(left_out)}" * bool(left_out),
-            f"{holes}: orders are held there" * bool(holes),
-            "" if late is None else f"{late.words}: the turns are late; compare with --commands between",
+            f"not in the log, taken as 0: {', '.join(zero)}" if zero else "",
+            f"too short, left out: {', '.join(left_out)}" if left_out else "",
+            f"{holes}: orders are held there" if holes else "",
+            f"{late.words}: the turns are late; compare with --commands between" if late is not None else "",
         ]
         answer.say(
             "\n".join(filter(None, notes)), assumed=zero, left_out=left_out, gaps=holes, late=late and late.words

@@ -48,10 +48,9 @@ def vessel_show(
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
         answer.say(f"particulars: {sentence}", particulars=known)
         answer.records("terms", terms)
-        parameters = [
-            {"parameter": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()
-        ]
-        answer.records("parameters", parameters, formats={"value": "{:.10g}".format})
+        rows = [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()]
+        heads = {"path": "parameter", "value": "value", "unit": "unit"}
+        answer.records("parameters", rows, heads, {"value": "{:.10g}".format})
 
 
 @app.command("new")
