@@ -122,16 +122,16 @@ def identify_command(
     names = [] if structures is None else _structure_names(structures)
     how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
     how |= {} if folds is None else {"folds": folds}
-    if structures is None:
-        with _errors_of_settings(settings):
+    needless = [name for name, value in {"--profile": profile, "--design": design}.items() if value and structures]
+    if needless:
+        raise ShipidError("does not go with --structures: identify the structure chosen", path=needless[0])
+    with open_answer(as_json) as answer, _errors_of_settings(settings):
+        if structures is not None:
+            check_comparison(log, declared, names, **how)
+        else:
             check_identification(
                 ship, log, declared, runs or (), test or (), ahead=ahead or 0.0, profiles=profile or ()
             )
-    elif needless := next((name for name, value in {"--profile": profile, "--design": design}.items() if value), None):
-        raise ShipidError("does not go with --structures: identify the structure chosen", path=needless)
-    else:
-        check_comparison(log, declared, names, **how)
-    with open_answer(as_json) as answer, _errors_of_settings(settings):
         _look_first(ship, log, runs or (), test or (), answer)
         if structures is not None:
             _compare_structures(ship, log, declared, names, how, band, file, html, dataset, answer)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from contextlib import closing
 from pathlib import Path
+from textwrap import indent
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -352,6 +353,5 @@ def _run_to_report(
         return
     with store.in_place(folder, plan), show_steps() as say:
         report = shipid.write_pages(folder, say)
-    for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
-        typer.echo(f"  {line}")
+    typer.echo(indent((folder / ANSWER).read_text(encoding="utf-8", errors="replace").rstrip("\n"), "  "))
     typer.echo(f"report: {report}")

@@ -27,11 +27,11 @@ def print_table(columns: Sequence[str], rows: Iterable[Iterable[str]]) -> None:
     typer.echo("\n".join(["", *lines, ""]))
 
 
-def four_digits(value: float) -> str:
-    """Write a number with four digits; a dash where it is NaN."""
+def four_digits(value: float, missing: str = "-") -> str:
+    """Write a number with four digits; a dash, or another word, where it is NaN."""
     if abs(value) >= 1e6:  # a moment on a clock of dates
         return f"{value:.1f}"
-    return "-" if math.isnan(value) else f"{round(value, 4) + 0.0:.4g}"
+    return missing if math.isnan(value) else f"{round(value, 4) + 0.0:.4g}"
 
 
 def share_text(share: float) -> str:
@@ -39,16 +39,11 @@ def share_text(share: float) -> str:
     return "-" if math.isnan(share) else percent_text(share)
 
 
-def format_error(value: float) -> str:
-    """Write an error of a free run; one that is NaN diverges."""
-    return "diverges" if math.isnan(value) else four_digits(value)
-
-
 MOTION = {"u": "u [m/s]", "v": "v [m/s]", "r": "r [deg/s]", "position": "position [m]"}
 """Column of errors of free runs -> heading."""
-MOTION_FORMATS: dict[str, Callable[[float], str]] = dict.fromkeys(MOTION, format_error) | {
-    "r": lambda error: format_error(math.degrees(error))
-}
+MOTION_FORMATS: dict[str, Callable[[float], str]] = dict.fromkeys(
+    MOTION, lambda error: four_digits(error, "diverges")
+) | {"r": lambda error: four_digits(math.degrees(error), "diverges")}
 MEASURES = {
     "measure": "measure", "value": "value", "unit": "unit", "lengths": "ship lengths", "note": "why missing"
 }  # fmt: skip
