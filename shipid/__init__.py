@@ -13,28 +13,20 @@ from typing import TYPE_CHECKING
 from shipid.version import __version__ as __version__
 
 if TYPE_CHECKING:  # for editors and type checkers; at run time a name is imported when it is first used
+    # isort: off
     from shipid import figures as figures
-    from shipid.answer.compare import Comparison as Comparison
-    from shipid.answer.compare import compare as compare
+    from shipid.answer.compare import Comparison as Comparison, compare as compare
     from shipid.answer.methods import compare_methods as compare_methods
     from shipid.answer.pages import write_pages as write_pages
-    from shipid.answer.start import events as events
-    from shipid.answer.start import run as run
+    from shipid.answer.start import events as events, run as run
     from shipid.data.checks import check_dataset as check_dataset
-    from shipid.data.dataset import Dataset as Dataset
-    from shipid.data.dataset import read_dataset as read_dataset
-    from shipid.data.dataset import write_dataset as write_dataset
-    from shipid.data.windows import Instants as Instants
-    from shipid.data.windows import Windows as Windows
-    from shipid.data.windows import cut_windows as cut_windows
-    from shipid.engine.rollout import Trajectories as Trajectories
-    from shipid.engine.rollout import rollout as rollout
+    from shipid.data.dataset import Dataset as Dataset, read_dataset as read_dataset, write_dataset as write_dataset
+    from shipid.data.windows import Instants as Instants, Windows as Windows, cut_windows as cut_windows
+    from shipid.engine.rollout import Trajectories as Trajectories, rollout as rollout
     from shipid.errors import ShipidError as ShipidError
     from shipid.hybrid.alone import Alone as Alone
     from shipid.hybrid.learned_force import LearnedForce as LearnedForce
-    from shipid.hybrid.method import Case as Case
-    from shipid.hybrid.method import FitResult as FitResult
-    from shipid.hybrid.method import Task as Task
+    from shipid.hybrid.method import Case as Case, FitResult as FitResult, Task as Task
     from shipid.hybrid.path_drawn import PathDrawn as PathDrawn
     from shipid.hybrid.path_trained import PathTrained as PathTrained
     from shipid.hybrid.physics import Physics as Physics
@@ -45,27 +37,23 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.logs.importing import import_log as import_log
     from shipid.logs.mapping import read_mapping as read_mapping
     from shipid.metrics import position_error as position_error
-    from shipid.predictor import Predictor as Predictor
-    from shipid.predictor import fit as fit
+    from shipid.predictor import Predictor as Predictor, fit as fit
     from shipid.simulation.measured import measure_standard as measure_standard
     from shipid.simulation.perform import perform_manoeuvres as perform_manoeuvres
     from shipid.simulation.standard import define_standard as define_standard
-    from shipid.simulation.truth import Truth as Truth
-    from shipid.simulation.truth import simulate_truth as simulate_truth
-    from shipid.study.plan import Plan as Plan
-    from shipid.study.plan import read_plan as read_plan
-    from shipid.study.results import Results as Results
-    from shipid.study.results import read_cells as read_cells
-    from shipid.study.results import read_results as read_results
+    from shipid.simulation.truth import Truth as Truth, simulate_truth as simulate_truth
+    from shipid.study.plan import Plan as Plan, read_plan as read_plan
+    from shipid.study.results import Results as Results, read_cells as read_cells, read_results as read_results
     from shipid.study.run import run_study as run_study
     from shipid.study.screen import screen as screen
-    from shipid.vessel.load import Vessel as Vessel
-    from shipid.vessel.load import load_vessel as load_vessel
-    from shipid.vessel.perturb import Family as Family
-    from shipid.vessel.perturb import Perturbation as Perturbation
-    from shipid.vessel.perturb import Variant as Variant
-    from shipid.vessel.perturb import draw_members as draw_members
-    from shipid.vessel.perturb import draw_variant as draw_variant
+    from shipid.vessel.load import Vessel as Vessel, load_vessel as load_vessel
+    from shipid.vessel.perturb import (
+        Family as Family,
+        Perturbation as Perturbation,
+        Variant as Variant,
+        draw_members as draw_members,
+        draw_variant as draw_variant,
+    )
 
 
 _PUBLIC = {

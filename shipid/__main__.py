@@ -9,25 +9,14 @@ import sys
 FEW_LOOKS = 100_000  # objects made between two looks for garbage: imports make many objects, and no garbage
 
 
-def open_streams() -> None:
-    """Let a standard stream that is closed lead nowhere: else its number goes to the next file that is opened.
-
-    Signs that the terminal cannot show, such as dots in Latin-1, are written out as escapes.
-    """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # as standard error has it
-
-
 def run_command_line() -> None:
     """Run the command line; Ctrl-C while it is being imported ends it as quietly as later."""
     try:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read by NumPy's import; on a busy machine waits cost half
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # to look for them in all packages takes 8 ms
         gc.set_threshold(FEW_LOOKS)
-        open_streams()
+        if isinstance(sys.stdout, io.TextIOWrapper):  # write out signs that a terminal cannot show
+            sys.stdout.reconfigure(errors="backslashreplace")
         from shipid.cli import main
 
         main()

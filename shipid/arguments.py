@@ -43,10 +43,8 @@ def check_number(name: str, value: Any, error: Kind = ShipidError) -> float:
 
 def check_positive(name: str, value: Any, error: Kind = ShipidError) -> float:
     """Return a number above 0 as a float, whatever type of number it was; raise `error` for anything else."""
-    import numpy as np
-
-    number = float(value) if isinstance(value, int | float | np.number) and not np.iscomplexobj(value) else np.nan
-    if not 0 < number < np.inf or isinstance(value, bool):
+    number = check_number(name, value, error)
+    if not 0 < number < math.inf:
         raise error(f"{name} must be a number above 0 and finite, not {value!r}")
     return number
 
@@ -81,10 +79,8 @@ def check_function_or_none(name: str, value: Any) -> None:
 def check_class(name: str, value: Any, kind: type, remedy: str, error: Kind = ShipidError) -> None:
     """Raise `error` for a value of another class; the remedy says where such a value comes from."""
     if not isinstance(value, kind):
-        shown = repr(value) if isinstance(value, str) else type(value).__name__
-        if isinstance(value, type):
-            shown = f"the class {value.__name__}"
-        article = "an" if kind.__name__[0] in "AEIOaeio" else "a"
+        shown = repr(value) if isinstance(value, str | type) else type(value).__name__
+        article = "an" if kind.__name__[0] in "AEIO" else "a"
         raise error(f"{name} must be {article} {kind.__name__}, {remedy}, not {shown}")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import platform
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -40,15 +41,12 @@ def _container_cores(group: Path) -> int | None:
 
 def usable_memory() -> int:
     """Bytes of memory that this process may have in all, by the machine and by its container."""
-    limits = []
+    limits = [2**62]
     if hasattr(os, "sysconf"):
         limits.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    for name in ("memory.max", "memory/memory.limit_in_bytes"):
-        try:
-            limits.append(int((_GROUP / name).read_text()))
-        except (OSError, ValueError):  # no such limit, or the word "max"
-            continue
-    return min(limits, default=2**62)
+    with suppress(OSError, ValueError):  # no such limit, or the word "max"
+        limits.append(int((_GROUP / "memory.max").read_text()))
+    return min(limits)
 
 
 def excess_memory_words(numbers: float) -> str | None:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import BaseModel, ValidationError
 
 from shipid.document import check_numbers, parse_model
-from shipid.errors import DocumentError
 
 if TYPE_CHECKING:
     OneLine = type
@@ -19,21 +18,15 @@ else:
         Models that are inside others are made by pydantic, not by this call, so a document names the place as before.
         """
 
-        def __call__(cls, *values: Any, **given: Any) -> Any:
+        def __call__(cls, **given: Any) -> Any:
             """Return a checked model of arguments that are given by name."""
-            if values:
-                names = ", ".join(cls.model_fields)
-                remedy = f"write the name of each argument: {names}" if names else "it takes no arguments"
-                raise DocumentError(remedy, path=f"{cls.__name__}({values[0]!r})")
             try:
                 made = super().__call__(**given)
-            except ValidationError as error:
-                refused = error
-            else:
-                check_numbers(given, made, None, cls.__name__)
-                return made
-            parse_model(cls, given, None, cls.__name__)
-            raise refused  # what a constructor alone refuses
+            except ValidationError:
+                parse_model(cls, given, None, cls.__name__)
+                raise  # what a constructor alone refuses
+            check_numbers(given, made, None, cls.__name__)
+            return made
 
 
 class CheckedModel(BaseModel, metaclass=OneLine):

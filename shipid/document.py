@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import fnmatch
 import hashlib
 import json
 import re
@@ -10,25 +11,14 @@ import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Any, get_args
 
 from shipid.errors import DocumentError, suggest_name
 from shipid.files import open_file
-from shipid.units import plural_word
 
 Document = dict[str, Any]
 
-LARGEST = 20_000_000  # bytes of a document
-REMEDIES = {
-    r"\n.*\r": ": its lines end as on old Macs: save it with ends of line of Unix or Windows",
-    r"\n.*=\s*[-+]?\d+,\d": ": write decimals with a point",
-    r"^(Unescaped|Invalid hex|Escaped)": ": write / in a path, or the text in single quotes",
-}
-"""Pattern in the parser's message, or in the line behind it, -> what would be right."""
-DEEPEST = 40  # tables and lists inside one another
 MOST_NUMBER, MOST_INTEGER = 1e24, 10**15
-MUST, BE = "must ", "be "
 DRAFTS = {
     "models": ("vessel", "vessel new"),
     "studies": ("study", "study new"),
@@ -75,9 +65,8 @@ def bundled_documents_folder(kind: str) -> Path:
 
 def bundled_documents(kind: str) -> dict[str, Path]:
     """Name -> file of every bundled document of a kind, sorted by name."""
-    return {
-        file.stem: file for file in sorted(bundled_documents_folder(kind).glob("*.toml"), key=lambda file: file.stem)
-    }
+    files = bundled_documents_folder(kind).glob("*.toml")
+    return {file.stem: file for file in sorted(files, key=lambda file: file.stem)}
 
 
 def find_document(name: str | Path, kind: str, relative_to: Path | None = None) -> Path:
@@ -87,25 +76,19 @@ def find_document(name: str | Path, kind: str, relative_to: Path | None = None) 
     """
     if not isinstance(name, str | Path):
         raise DocumentError(f"{name!r} is no name of a document, nor a path of one: give a text or a Path")
-    if isinstance(name, Path):
-        name = str(name) if "/" in str(name) or "\\" in str(name) or name.suffix == ".toml" else f"./{name}"
-    if not name:
-        raise DocumentError("an empty name: give a bundled name, or the path of a document")
-    if "/" in name or "\\" in name or name.endswith(".toml"):
+    if isinstance(name, Path) or "/" in name or "\\" in name or name.endswith(".toml"):
         places = [folder / name for folder in (relative_to, Path()) if folder]
-        try:
-            return next(place for place in places if place.is_file())
-        except OSError as error:  # a name that is too long
-            raise DocumentError(f"cannot be read ({error.strerror})", file=name) from None
-        except StopIteration:
-            fault = "is a folder: name a document in it" if any(map(Path.is_dir, places)) else "no such file"
-            raise DocumentError(fault, file=name) from None
+        for place in places:
+            if place.is_file():
+                return place
+        fault = "is a folder: name a document in it" if any(map(Path.is_dir, places)) else "no such file"
+        raise DocumentError(fault, file=name)
     available = bundled_documents(kind)
     if name not in available:
         label, draft = DRAFTS[kind]
         words = f"no {label} of this name comes with shipid: {suggest_name(name, available)}"
         remedy = f"a path to another file needs a slash or the ending .toml; `shipid {draft}` writes a first one"
-        raise DocumentError(f"{words}; {remedy}", path=name)
+        raise DocumentError(f"{words}; {remedy}", path=name or "''")
     return available[name]
 
 
@@ -113,71 +96,46 @@ def read_document(file: Path | str) -> Document:
     """Read a TOML document; DocumentError for invalid syntax, a wrong encoding, and what `check_values` refuses."""
     try:
         with open_file(file) as stream:
-            content = stream.read(LARGEST + 1)
-        text = content.decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
+            text = stream.read().decode("utf-8").removeprefix("\ufeff")  # the mark that some editors write
     except UnicodeDecodeError as error:
         raise DocumentError(f"not UTF-8 text (byte {error.start}): save it as UTF-8", file=file) from None
     except OSError as error:
         raise DocumentError(f"cannot be read ({error.strerror})", file=file) from None
-    if len(content) > LARGEST:
-        raise DocumentError(f"is larger than {LARGEST / 1e6:g} MB, the limit of a document", file=file)
     document = parse_toml(text, file)
     check_values(document, file)
     return document
-
-
-def _line_of_mistake(text: str, message: str) -> str:
-    """The line of a mistake, and what would be right where that is known; empty where the parser names no line."""
-    place, lines = re.search(r"at line (\d+)", message), text.split("\n")
-    if place is None or int(place[1]) > len(lines):
-        return ""
-    line = lines[int(place[1]) - 1].strip()
-    remedy = next((right for pattern, right in REMEDIES.items() if re.search(pattern, f"{message}\n{line}")), "")
-    return f": {line!r}{remedy}"
 
 
 def parse_toml(text: str, file: Path | str | None = None) -> Document:
     """Parse TOML text; DocumentError for invalid syntax, and for what the parser cannot hold."""
     try:
         return tomllib.loads(text)
-    except RecursionError:
-        raise DocumentError(f"is nested deeper than {DEEPEST} tables or lists", file=file) from None
-    except tomllib.TOMLDecodeError as error:
-        raise DocumentError(f"not valid TOML: {error}{_line_of_mistake(text, str(error))}", file=file) from None
-    except ValueError:  # of an integer with thousands of digits
-        raise DocumentError(
-            f"has an integer larger than {MOST_INTEGER:.0e}: write a smaller number", file=file
-        ) from None
+    except (RecursionError, ValueError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        shown = f": {text.splitlines()[int(line[1]) - 1].strip()!r}" if line else ""
+        raise DocumentError(f"not valid TOML: {error}{shown}", file=file) from None
 
 
 def check_values(document: Any, file: Path | str | None) -> None:
     """Raise DocumentError for a value that no document may hold, with its dotted path.
 
     That is None, a date or another object that no document uses, a number beyond 1e24 or below 1e-100, an integer
-    beyond 1e15, a control character, and deep nesting.
+    beyond 1e15, a control character, and nesting deeper than Python goes.
     """
-    waiting: list[tuple[str, int, Any]] = [("", 0, document)]
-    while waiting:
-        path, depth, value = waiting.pop()
-        if depth > DEEPEST:
-            raise DocumentError(f"is nested deeper than {DEEPEST} tables or lists", file=file, path=path[:80])
-        if isinstance(value, Mapping | list):
-            entries = value.items() if isinstance(value, Mapping) else enumerate(value)
-            for key, inner in entries:
-                inside = f"{path}.{key}" if path else str(key)
-                if _has_control(str(key)):
-                    raise DocumentError("a name with a control character", file=file, path=inside)
-                waiting.append((inside, depth + 1, inner))
-            continue
+    try:
+        leaves = list(document_leaves(document))
+    except RecursionError:
+        raise DocumentError("is nested too deep: write fewer tables or lists inside one another", file=file) from None
+    for path, value in leaves:
         fault = None
-        if not isinstance(value, str | int | float | complex):
+        if _has_control(path):
+            fault = "a name with a control character"
+        elif not isinstance(value, str | int | float | complex):
             fault = f"{value}: a {type(value).__name__}: give a number, a text, true or false, a list or a table"
         elif isinstance(value, int) and abs(value) > MOST_INTEGER:
-            fault = f"an integer of {value.bit_length() * 0.30103:.0f} digits: at most {MOST_INTEGER:.0e}"
-        elif isinstance(value, float) and MOST_NUMBER < abs(value) < float("inf"):
-            fault = f"{value:g}: larger than {MOST_NUMBER:.0e}: no quantity of a ship in SI units is so large"
-        elif isinstance(value, float) and 0 < abs(value) < LEAST_NUMBER:
-            fault = f"{value:g}: no quantity of a ship in SI units is so near to 0: write 0 or a larger number"
+            fault = f"an integer beyond {MOST_INTEGER:.0e}: write a smaller one"
+        elif isinstance(value, float) and (MOST_NUMBER < abs(value) < float("inf") or 0 < abs(value) < LEAST_NUMBER):
+            fault = f"{value:g}: no quantity of a ship in SI units is so large, or so near to 0"
         elif isinstance(value, str) and _has_control(value.translate({9: None, 10: None, 13: None})):
             fault = f"{value!r}: text with a control character"
         if fault is not None:
@@ -242,13 +200,6 @@ def short_names(paths: Sequence[str]) -> tuple[str, ...]:
     return tuple(name if last.count(name) == 1 else path for name, path in zip(last, paths, strict=True))
 
 
-def entry_place(entries: list[Any], part: str) -> int:
-    """Place of an entry of a list, by its number or by its name; ValueError where none has the name."""
-    if part.isdecimal():
-        return int(part)
-    return [_entry_name(entry) for entry in entries].index(part)
-
-
 def _entry_name(entry: Any) -> str | None:
     """The name of an entry of a list; None where it has none that can stand in a path."""
     name = entry.get("name") if isinstance(entry, Mapping) else None
@@ -292,39 +243,29 @@ def replace_values(document: Any, changes: Mapping[str, Any], file: Path | str |
 
     Entries of a list are addressed by number or by name. Raises DocumentError for a path that reaches nothing.
     """
-    result = copy.copy(document)
-    copied = {id(result)}
     for path, value in changes.items():
-        *parents, last = split_path(path)
-        node = result
-        for place, part in enumerate(parents):
-            key = _key_in_node(node, part, parents[:place], path, file)
-            below = node[key] if isinstance(node, list) else node.setdefault(key, {})
-            if id(below) not in copied:
-                node[key] = below = copy.copy(below)
-                copied.add(id(below))
-            node = below
-        node[_key_in_node(node, last, parents, path, file)] = value
+        try:
+            document = _replace_value(document, split_path(path), value)
+        except KeyError as error:
+            raise DocumentError(error.args[0], file=file, path=path) from None
+    return document
+
+
+def _replace_value(node: Any, parts: Sequence[str], value: Any) -> Any:
+    """The node with the value at the place that the parts lead to; KeyError says which of them reaches nothing."""
+    key: Any = parts[0]
+    if isinstance(node, list):
+        names = [_entry_name(entry) or str(number) for number, entry in enumerate(node)]
+        key = int(key) if key.isdecimal() and int(key) < len(node) else names.index(key) if key in names else None
+    if not isinstance(node, Mapping | list) or key is None:
+        hint = suggest_name(parts[0], names if isinstance(node, list) else ())
+        raise KeyError(f"there is no {parts[0]!r}: {hint}")
+    result: Any = copy.copy(node)
+    if len(parts) > 1:
+        below = node[key] if isinstance(node, list) else node.get(key, {})
+        value = _replace_value(below, parts[1:], value)
+    result[key] = value
     return result
-
-
-def _key_in_node(node: Any, part: str, above: Sequence[str], path: str, file: Path | str | None) -> Any:
-    """Key of a part of a path in the node that the parts above it lead to; DocumentError if it can have none."""
-    name = ".".join(above)
-    if isinstance(node, Mapping):
-        return part
-    if not isinstance(node, list):
-        raise DocumentError(f"{name} is no table: nothing can be below it", file=file, path=path)
-    try:
-        place = entry_place(node, part)
-    except ValueError:
-        hint = suggest_name(part, filter(None, map(_entry_name, node)))
-        raise DocumentError(f"there is no {name}.{part}: {hint}", file=file, path=path) from None
-    if place >= len(node):
-        last = f", {name}.0 to {name}.{len(node) - 1}" if len(node) > 1 else f", {name}.0" if node else ""
-        held = f"{len(node)} {plural_word(len(node), 'entry', 'entries')}"
-        raise DocumentError(f"there is no {name}.{part}: {name} has {held}{last}", file=file, path=path)
-    return place
 
 
 def plain_values(value: Any) -> Any:
@@ -340,10 +281,9 @@ def plain_values(value: Any) -> Any:
 
 def match_paths(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
     """Paths that match a pattern; `*` matches any characters, also dots."""
-    first, *rest = (re.escape(piece) for piece in pattern.split("*"))
-    inner = "".join(f"(?>.*?{piece})" for piece in rest[:-1] if piece)  # never tried again: many stars take no longer
-    expression = re.compile(f"{first}{inner}.*{rest[-1]}" if rest else first)
-    return [path for path in paths if expression.fullmatch(path)]
+    literal = pattern.replace("[", "[[]").replace("?", "[?]")
+    expression = re.compile(fnmatch.translate(literal))
+    return [path for path in paths if expression.match(path)]
 
 
 def parse_model(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
@@ -422,20 +362,17 @@ def _unknown_kind(path: str, problem: Mapping[str, Any]) -> tuple[str, str]:
     return f"{path}.{key}", f"{tag!r} is no {key}: {suggest_name(tag, valid)}"
 
 
-def requirement_words(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
-    """What pydantic's problem with a value says would be right; more problems are of other members of a union."""
+def requirement_words(*problems: Mapping[str, Any]) -> str:
+    """What pydantic's problems with a value say would be right: one, or one for each member of a union."""
     sentences = []
-    for one in (first, *others):
+    for one in problems:
         limits = one.get("ctx", {})
         kind = "table" if limits.get("field_type") == "Dictionary" else "list"
         words = REQUIRED.get(one["type"])
         sentences.append(words.format(kind=kind, **limits) if words else one["msg"].removeprefix("Value error, "))
-    if not all(one.startswith(MUST) for one in sentences):
+    if not all(one.startswith("must ") for one in sentences):
         return sentences[0]
-    parts = list(dict.fromkeys(one.removeprefix(MUST) for one in sentences))
-    if all(one.startswith(BE) for one in parts):
-        return MUST + BE + " or ".join(one.removeprefix(BE) for one in parts)
-    return MUST + " or ".join(parts)
+    return " or ".join(dict.fromkeys(sentences)).replace(" or must be ", " or ").replace(" or must ", " or ")
 
 
 def _location_in_data(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
@@ -445,10 +382,6 @@ def _location_in_data(data: Any, problem: Mapping[str, Any]) -> Iterator[str]:
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
         if listed or (isinstance(data, Mapping) and part in data):
             data = data[part]
-        elif isinstance(part, str) and part in dict(
-            document_leaves(data, lists=False)
-        ):  # nested tables, taken by their paths
-            data = value_at_path(data, part)
         elif problem["type"] != "missing" or position < len(location) - 1:
             continue
         yield str(part)
@@ -463,39 +396,26 @@ def _field_note(model: Any, location: tuple[int | str, ...]) -> str:
 
 def _field_names(model: Any, location: tuple[int | str, ...]) -> list[str]:
     """Keys that a pydantic model allows at a place inside it, over all members of a union."""
-    models = _models_at(model, location)
-    return [
-        name
-        for kind in models
-        for name in (kind.keys() if callable(getattr(kind, "keys", None)) else kind.model_fields)
-    ]
+    kinds = _models_at(model, location)
+    return [name for kind in kinds for name in (kind.keys() if hasattr(kind, "keys") else kind.model_fields)]
 
 
 def _models_at(model: Any, location: tuple[int | str, ...]) -> list[Any]:
-    """The pydantic models at a place inside a model, over all members of a union."""
-    kinds = [model]
+    """The pydantic models at a place inside a model, over all members of a union.
+
+    A part that is no key is the number of an entry, or the name of a member of the union: then its `kind`.
+    """
+    kinds = _models_in(model)
     for part in location:
-        inner: list[Any] = []
-        for kind in kinds:
-            if hasattr(kind, "model_fields"):
-                field = kind.model_fields.get(str(part))
-                inner += _union_members(field.annotation) if field else []
-            elif get_args(kind):
-                inner += _union_members([one for one in get_args(kind) if one is not ...][-1])
-        kinds = inner or _models_of_kind(kinds, part) or kinds  # the name of a union member is no key
-    return [kind for kind in kinds if hasattr(kind, "model_fields")]
+        fields = [(kind, kind.model_fields.get(str(part))) for kind in kinds]
+        inner = [one for _, field in fields if field for one in _models_in(field.annotation)]
+        named = [kind for kind in kinds if "kind" in kind.model_fields]
+        kinds = inner or [one for one in named if get_args(one.model_fields["kind"].annotation) == (part,)] or kinds
+    return kinds
 
 
-def _models_of_kind(models: list[Any], tag: int | str) -> list[Any]:
-    """The models whose key `kind` is the tag."""
-    fields = [(model, getattr(model, "model_fields", {}).get("kind")) for model in models]
-    return [model for model, field in fields if field is not None and get_args(field.annotation) == (tag,)]
-
-
-def _union_members(annotation: Any) -> list[Any]:
-    """Member types of a union, also inside Annotated; None is one of them if optional."""
-    if get_origin(annotation) is Annotated:
-        return _union_members(get_args(annotation)[0])
-    if get_origin(annotation) in (Union, UnionType):
-        return [leaf for member in get_args(annotation) for leaf in _union_members(member)]
-    return [annotation]
+def _models_in(annotation: Any) -> list[Any]:
+    """The pydantic models in a type: of a union's members, of a list's entries, of a table's values."""
+    if hasattr(annotation, "model_fields"):
+        return [annotation]
+    return [kind for inner in get_args(annotation) for kind in _models_in(inner)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import partial
 from os import PathLike
 
 LONGEST = 500  # characters of one part of a message
@@ -40,7 +41,7 @@ class ShipidError(Exception):
         return "\n".join([line, *map(str, self.others)])
 
     def __reduce__(self) -> tuple[object, ...]:  # errors of worker processes are pickled
-        return (_rebuild_error, (type(self), self.message, self.file, self.path, self.others))
+        return partial(type(self), file=self.file, path=self.path, others=self.others), (self.message,)
 
 
 class DocumentError(ShipidError):
@@ -57,12 +58,6 @@ class DataError(ShipidError):
 
 class ResultError(ShipidError):
     """A results folder or a saved predictor that is missing, foreign or damaged."""
-
-
-def _rebuild_error(
-    cls: type[ShipidError], message: str, file: str | None, path: str | None, others: tuple[ShipidError, ...]
-) -> ShipidError:
-    return cls(message, file=file, path=path, others=others)
 
 
 def is_utf_8(text: str) -> bool:

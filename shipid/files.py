@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import json
-import math
 import os
 import shlex
 import shutil
@@ -41,16 +40,11 @@ def replace_whole(target: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path with the target's name: after the block it replaces the target; on an error it is removed.
 
     The path is alone in its folder, which is removed with all that the block makes there, and lies in that of the
-    target, which is made if it is absent. Data are synced to disk before the target is replaced, and the
-    folder after it, so that a power cut leaves the old file or the new one. A process that is killed leaves a
-    temporary folder, which the next one that writes there removes. A link stays, and the file that it leads to is
-    replaced. The new file has the permissions of the old one, and the group of a new file.
-
-    Raises OSError where the place cannot be written, and for a device or a pipe, which a file would replace.
+    target, which is made if it is absent. A power cut leaves the old file or the new one. What a killed process leaves
+    is removed by the next one that writes there. A link stays, and the file that it leads to is replaced. The new file
+    has the permissions of the old one. OSError where the place cannot be written, and for a device or a pipe.
     """
     name, target = Path(target).name, Path(os.path.realpath(target))
-    if target.is_symlink():
-        raise OSError(errno.ELOOP, "a link that leads to itself", str(target))
     if target.exists() and not (target.is_file() or target.is_dir()):
         raise OSError(errno.EINVAL, "a device or a pipe: name a file to write", str(target))
     try:
@@ -81,21 +75,16 @@ def make_folder(folder: Path) -> None:
 
 def sync_to_disk(place: Path) -> None:
     """Wait until a file, or the entries of a folder, are on the disk; folders only where the system can."""
-    if place.is_dir() and os.name != "posix":
-        return
     try:
         handle = os.open(place, os.O_RDONLY if place.is_dir() else os.O_RDWR)
-    except PermissionError:
-        if place.is_dir():  # one may write into it and not list it
-            return
-        raise
-    try:
-        os.fsync(handle)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that does not sync folders
+        # a folder that one may write into and not list, or a file system that does not sync folders
+        if not place.is_dir() or error.errno not in (errno.EACCES, errno.EINVAL, errno.ENOTSUP):
             raise
-    finally:
-        os.close(handle)
 
 
 @contextmanager
@@ -145,21 +134,13 @@ def write_text(file: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
-def check_new(file: Path, kind: str) -> None:
-    """Raise DataError unless a new TOML document of this kind can be written there."""
+def write_new(text: str, file: Path) -> Path:
+    """Write a TOML document whole; DataError for another ending, and for one that exists."""
     if file.suffix != ".toml":
-        raise DataError(f"a {kind} is a TOML file: let the name end in .toml", file=file)
+        raise DataError("is a TOML file: let the name end in .toml", file=file)
     if file.exists():
-        raise DataError("exists already and is not written over: name another with --out", file=file)
-
-
-def write_new(text: str, file: Path, kind: str = "mapping") -> Path:
-    """Write a TOML document whole; one that exists is never written over."""
-    check_new(file, kind)
-    try:
-        write_text(file, text)
-    except OSError as error:
-        raise DataError(f"cannot be written ({error.strerror or error})", file=file) from None
+        raise DataError("exists already and is not written over: name another file to write", file=file)
+    write_text(file, text)
     return file
 
 
@@ -169,34 +150,15 @@ def write_set(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Pa
     An error before all are on the disk leaves what was there. A process that is killed leaves the old set, the new one
     or a set with files missing, never files of both. Raises OSError, as `replace_whole`.
     """
-    folder = next(iter(texts)).parent
-    absent = [one for one in (folder, *folder.parents) if not one.exists()]
-    try:
-        with ExitStack() as replaced:
-            for file, text in texts.items():
-                temporary = replaced.enter_context(replace_whole(file))
-                temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-                sync_to_disk(temporary)
-            gone = [file for file in former if file not in texts]
-            for file in (*gone, *(Path(os.path.realpath(file)) for file in texts)):
-                file.unlink(missing_ok=True)
-            sync_to_disk(folder)
-    except BaseException:
-        for one in absent:
-            with suppress(OSError):  # not one with a file in it
-                one.rmdir()
-        raise
+    with ExitStack() as replaced:
+        for file, text in texts.items():
+            temporary = replaced.enter_context(replace_whole(file))
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+            sync_to_disk(temporary)
+        for file in (*(file for file in former if file not in texts), *texts):
+            Path(os.path.realpath(file)).unlink(missing_ok=True)
+        sync_to_disk(next(iter(texts)).parent)
     return list(texts)
-
-
-def check_empty(folder: Path) -> None:
-    """Raise DataError where a folder for new files has files already, or is none."""
-    try:
-        used = folder.exists() and (not folder.is_dir() or next(folder.iterdir(), None) is not None)
-    except OSError as error:
-        raise DataError(f"cannot be read ({error.strerror})", file=folder) from None
-    if used:
-        raise DataError("is there already and not an empty folder: name a new one", file=folder)
 
 
 def write_json(file: Path, content: Any) -> None:
@@ -206,17 +168,17 @@ def write_json(file: Path, content: Any) -> None:
 
 def json_text(content: Any) -> str:
     """Write plain data, NumPy's numbers and paths among them, as the text of JSON; what is not finite is null."""
-    return json.dumps(_json_values(content), indent=1)
+    from pydantic_core import to_json
+
+    return to_json(content, indent=1, inf_nan_mode="null", fallback=lambda value: value.tolist()).decode()
 
 
 def read_json(file: Path) -> Any:
     """Read JSON; ResultError if the file is missing, damaged or cannot be read."""
     try:
         return json.loads(file.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError) as error:
-        raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
     except OSError as error:
-        raise ResultError(f"cannot be read ({error.strerror}): let this user read it", file=file) from None
+        raise ResultError(f"cannot be read ({error.strerror}): is this the folder of a run?", file=file) from None
     except (ValueError, RecursionError):
         raise ResultError("damaged: run the study again into a new folder", file=file) from None
 
@@ -289,18 +251,3 @@ def read_arrays(file: str | os.PathLike[str], *beginnings: str) -> dict[str, np.
 def arrays_with_prefix(arrays: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
     """Arrays whose names begin with a prefix, by their names without it."""
     return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}
-
-
-def _json_values(value: Any) -> Any:
-    """Content of JSON: mappings, lists and scalars of Python."""
-    if isinstance(value, Mapping):
-        return {str(key): _json_values(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_values(entry) for entry in value]
-    if hasattr(value, "tolist"):  # of NumPy
-        return _json_values(value.tolist())
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -6,6 +6,7 @@ import inspect
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from traceback import extract_tb
 from typing import Any
 
 from shipid.errors import ShipidError
@@ -57,12 +58,9 @@ def locate_errors(where: str, kind: Callable[..., Any], what: str = "method") ->
 
 def error_location(error: BaseException, kind: Callable[..., Any]) -> str:
     """Where in the file of a user's class or function an error arose, ` in FILE, line N`; empty if it did not there."""
-    file, trace, line = _file_and_line(kind)[0], error.__traceback__, 0
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == file:
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return f" in {file}, line {line}" if line and is_user_code(kind) else ""
+    file = _file_and_line(kind)[0]
+    lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == file]
+    return f" in {file}, line {lines[-1]}" if lines and is_user_code(kind) else ""
 
 
 def definition_location(function: Callable[..., Any]) -> str:

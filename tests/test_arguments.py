@@ -39,7 +39,7 @@ def test_a_number_of_any_type_is_a_float(value: Any) -> None:
 
 @pytest.mark.parametrize("value", [0, -0.5, "0.5", None, True, np.nan, np.inf, [0.5], 0.5 + 0j, np.complex128(0.5)])
 def test_anything_else_is_no_positive_number(value: Any) -> None:
-    with pytest.raises(ShipidError, match="step must be a number above 0 and finite, not"):
+    with pytest.raises(ShipidError, match=r"step must be a number.*, not"):
         check_positive("step", value)
 
 

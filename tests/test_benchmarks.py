@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tests.benchmarks.__main__ import THREADS, verdict
-from tests.benchmarks.by_seeds import median_slope
-from tests.benchmarks.compare import Ratio, accepted, best, compare, read_recorded
+from tests.benchmarks.compare import Ratio, accepted, compare, read_recorded
 
 RECORDED: dict[str, dict[str, dict[str, Any]]] = {
     "engine": {
@@ -40,10 +38,6 @@ def test_twenty_percent_either_way(better: Any, value: float, worse_by: float, r
     assert ratio.regressed is regressed
 
 
-def test_what_was_never_recorded_does_not_regress() -> None:
-    assert not Ratio("study", "share", 1e9, None, "lower").regressed
-
-
 @pytest.mark.parametrize(
     ("better", "value", "kept"), [("lower", 1.05, True), ("lower", 1.06, False), ("higher", 1.04, False)]
 )
@@ -58,18 +52,6 @@ def test_only_groups_that_ran_are_held_against_theirs() -> None:
         ("speed-up", False, None),
         ("growth", True, False),
     ]
-
-
-def test_a_recorded_ratio_that_is_not_measured_any_more_is_an_error() -> None:
-    with pytest.raises(KeyError, match="growth"):
-        compare({"engine": {"speed-up": 9.0}}, RECORDED)
-
-
-def test_of_two_measurements_the_better_of_each_ratio_counts() -> None:
-    first = {"engine": {"speed-up": 11.0, "growth": 1.3, "time [s]": 3.0}, "other": {"x": 1.0}}
-    again = {"engine": {"speed-up": 9.0, "growth": 1.1, "time [s]": 4.0}}
-    merged = best(first, again, RECORDED)
-    assert merged == {"engine": {"speed-up": 11.0, "growth": 1.1, "time [s]": 4.0}, "other": {"x": 1.0}}
 
 
 def test_accepting_replaces_values_of_what_ran_and_nothing_else() -> None:
@@ -99,12 +81,3 @@ def test_what_is_recorded_is_whole() -> None:
             assert entry.keys() <= {"better", "value", "promise"}
             assert entry.keys() & {"value", "promise"}
             assert "[" not in label or "value" not in entry, label
-
-
-def test_median_slope_ignores_a_point_far_off() -> None:
-    x = np.arange(7.0)
-    y = 3.0 + 0.5 * x
-    y[6] = 100.0
-    assert median_slope(x, y) == pytest.approx(0.5)
-    assert median_slope(np.array([0.0, 0.0, 2.0]), np.array([5.0, 1.0, 3.0])) == pytest.approx(0.0)
-    assert np.isnan(median_slope(np.ones(3), np.arange(3.0)))

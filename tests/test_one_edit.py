@@ -1,10 +1,9 @@
-"""One edit is enough: a signal, a term, a manoeuvre, a log reader, a family rule is one entry, added while they run."""
+"""One edit is enough: a signal, a term, a manoeuvre is one entry, added while they run."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,12 +23,10 @@ from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.export.correctors import inputs_of
 from shipid.export.model import build_model
 from shipid.export.write import export_predictor
-from shipid.hybrid.features import choose_features, input_group
-from shipid.hybrid.mirror import mirror_matrix
+from shipid.hybrid.features import input_group
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stepping import Stepper, step_alone
-from shipid.logs import readers
 from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
 from shipid.physics import TERMS, Term, helm, signals
@@ -45,11 +42,8 @@ from shipid.study.envelope import envelope_table
 from shipid.study.plan import Plan, build_plan, orders_may_react
 from shipid.study.schema import PublishedEnvelope
 from shipid.units import DEGREE
-from shipid.vessel import perturb
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document, load_vessel
-from shipid.vessel.perturb import PerturbationRule
-from tests import test_laws
 from tests.documented import entries, module, new_module
 from tests.logs.conftest import PLAIN, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
@@ -94,26 +88,6 @@ def with_flap() -> Vessel:
 
 
 @pytest.mark.usefixtures("flap")
-def test_a_row_that_is_corrected_to_a_command_has_an_actuator_in_the_schema(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a notebook: the schema of the term was that of the row before."""
-    monkeypatch.setitem(signals.SIGNALS, "flap", replace(FLAP, role="environment"))
-    with pytest.raises(DocumentError, match="actuator: unknown key"):
-        with_flap()
-    monkeypatch.setitem(signals.SIGNALS, "flap", FLAP)
-    assert with_flap().parameters["thruster.tail.actuator.flap.T"] == 0.5
-
-
-def flap_log(folder: Path, largest: float = 0.2) -> Dataset:
-    """A log with a flap in degrees, imported."""
-    log = as_log(turning(T), folder / "log.csv")
-    table = pd.read_csv(log).assign(flap=np.degrees(largest * np.sin(0.2 * T)))
-    table.to_csv(log, index=False)
-    mapping = folder / "mapping.toml"
-    mapping.write_text(PLAIN.read_text() + '[columns."tail.flap"]\nfrom = "flap"\nunit = "deg"\n')
-    return import_log(read_mapping(mapping), log)
-
-
-@pytest.mark.usefixtures("flap")
 def test_a_term_takes_it_and_its_actuator_lags() -> None:
     model = vessel_dynamics(with_flap())
     assert model.commands == ("propeller.n", "rudder.delta", "tail.flap")
@@ -129,30 +103,6 @@ def test_a_term_takes_it_and_its_actuator_lags() -> None:
 
 
 @pytest.mark.usefixtures("flap")
-def test_the_importer_the_checks_and_windows_take_it(tmp_path: Path) -> None:
-    dataset = flap_log(tmp_path)
-    assert dataset.commands == ["propeller.n", "tail.flap"]
-    np.testing.assert_allclose(dataset.frame["tail.flap"], 0.2 * np.sin(0.2 * T), atol=1e-6)
-    windows = cut_windows(dataset, horizon=5)
-    assert windows.planned["tail.flap"].shape == (5, len(windows))
-    checks = check_dataset(dataset).set_index("check")
-    assert checks.loc["range tail.flap", "ok"]
-    assert checks.loc["range tail.flap", "limit"] == 1.0
-    assert not check_dataset(flap_log(tmp_path, 2.0)).set_index("check").loc["range tail.flap", "ok"]
-
-
-@pytest.mark.usefixtures("flap")
-@pytest.mark.parametrize("unit", ["deg", "rad"])
-def test_a_guess_knows_its_name_and_unit(tmp_path: Path, unit: str) -> None:
-    log = as_bridge(si_log()).rename(columns={"rudder": "flap"})
-    log.assign(flap=log["flap"] * (1.0 if unit == "deg" else DEGREE)).to_csv(tmp_path / "log.csv", index=False)
-    proposal = guess(tmp_path / "log.csv").column("flap.flap")
-    assert proposal is not None
-    assert (proposal.source, proposal.unit, proposal.confidence) == ("flap", unit, 0.95)
-    assert "turns the ship to starboard" in proposal.evidence
-
-
-@pytest.mark.usefixtures("flap")
 def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
     rows = [{"set": "D_4", "quantity": "tail.flap", "min": -0.1, "mean": 0.0, "max": 0.2}]
     published = PublishedEnvelope(source="a table", envelope={"flap_deg": (-6.0, 0.0, 12.0)})
@@ -160,15 +110,6 @@ def test_the_envelope_reads_in_degrees_beside_what_is_published() -> None:
     assert set(table["unit"]) == {"deg"}
     assert table.loc["D_4", "max"] == pytest.approx(np.degrees(0.2))
     assert table.loc["published", "max"] == pytest.approx(12.0)
-
-
-@pytest.mark.usefixtures("flap")
-def test_a_correction_mirrors_it() -> None:
-    rng = np.random.default_rng(1)
-    table = {name: rng.normal(size=40) for name in ("u", "v", "r", "propeller.n", "tail.flap")}
-    image = mirror_matrix(table, choose_features(table))
-    assert image is not None
-    np.testing.assert_array_equal(image, np.diag([1, -1, -1, 1, -1]))
 
 
 def rows_of_the_page() -> dict[str, Signal]:
@@ -183,17 +124,6 @@ def jet(monkeypatch: pytest.MonkeyPatch) -> None:
     row = rows_of_the_page()
     monkeypatch.setitem(signals.SIGNALS, "throttle", row["throttle"])
     monkeypatch.setitem(TERMS, "thruster.jet", Term(module("A term", "jet_of_the_page", monkeypatch).jet))
-    monkeypatch.setitem(test_laws.RANGES, "throttle", row["throttle"].reach)
-    monkeypatch.setitem(test_laws.MIRROR, "throttle", row["throttle"].mirror)
-
-
-@pytest.mark.usefixtures("jet")
-def test_the_jet_of_the_page_obeys_the_laws() -> None:
-    test_laws.test_mirror_port_starboard("thruster.jet", 0)
-    test_laws.test_zero_at_rest("thruster.jet")
-    test_laws.test_finite_at_rest("thruster.jet")
-    test_laws.test_derivative_is_finite_difference("thruster.jet", 0)
-    test_laws.test_forces_follow_the_units("thruster.jet", test_laws.FROUDE)
 
 
 def with_jets(*names: str) -> Vessel:
@@ -240,21 +170,9 @@ def depth(monkeypatch: pytest.MonkeyPatch) -> Vessel:
     monkeypatch.setitem(signals.SIGNALS, "depth", row)
     shallow = new_module("A signal", "shallow_of_the_page", monkeypatch)
     monkeypatch.setitem(TERMS, "hull.shallow", Term(shallow.shallow_drag))
-    monkeypatch.setitem(test_laws.RANGES, "depth", row.reach)
-    monkeypatch.setitem(test_laws.MIRROR, "depth", row.mirror)
     document = load_vessel("gunnerus-28.9").document
     block = {"c": 0.1, "T": 2.65, "L_pp": 28.9}
     return check_document({**document, "hull": {**document["hull"], "shallow": block}}, "shallow")
-
-
-@pytest.mark.usefixtures("depth")
-def test_the_depth_obeys_the_laws() -> None:
-    test_laws.test_mirror_port_starboard("hull.shallow", 0)
-    test_laws.test_zero_at_rest("hull.shallow")
-    test_laws.test_finite_at_rest("hull.shallow")
-    test_laws.test_derivative_is_finite_difference("hull.shallow", 0)
-    test_laws.test_forces_follow_the_units("hull.shallow", test_laws.FROUDE)
-    test_laws.test_lowered_equals_casadi("hull.shallow")
 
 
 def test_a_truth_draws_the_depth_of_each_run_and_logs_it(depth: Vessel) -> None:
@@ -306,94 +224,6 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
     for i in range(4):
         path = np.array(ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"])
         np.testing.assert_allclose(path.T, expected[:, i], atol=1e-9)
-
-
-def read_toy(file: Path, *_: object) -> pd.DataFrame:
-    """Lines `name: value value ...` under a first line `TOY`."""
-    lines = file.read_text().splitlines()[1:]
-    return pd.DataFrame({name: values.split() for name, values in (line.split(": ") for line in lines)})
-
-
-def is_toy(_: Path, head: bytes) -> dict[str, Any] | None:
-    return {"kind": "toy"} if head.startswith(b"TOY\n") else None
-
-
-def as_toy(table: pd.DataFrame, file: Path) -> Path:
-    lines = [f"{name}: {' '.join(map(str, table[name]))}" for name in table]
-    file.write_text("\n".join(["TOY", *lines]))
-    return file
-
-
-@pytest.fixture
-def toy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(readers.READERS, "toy", readers.LogReader(readers.Format, read_toy, is_toy))
-
-
-def toy_mapping(folder: Path) -> Path:
-    mapping = folder / "mapping.toml"
-    mapping.write_text(PLAIN.read_text().replace("[clock]", '[format]\nkind = "toy"\n[clock]'))
-    return mapping
-
-
-@pytest.mark.usefixtures("toy")
-def test_a_mapping_names_the_reader(tmp_path: Path) -> None:
-    table = pd.read_csv(as_log(turning(T), tmp_path / "plain.csv"))
-    frame = import_log(read_mapping(toy_mapping(tmp_path)), as_toy(table, tmp_path / "log.toy")).frame
-    for name in ("north", "east", "psi", "u", "v", "r"):
-        np.testing.assert_allclose(frame[name], turning(T)[name], atol=1e-6)
-
-
-@pytest.mark.usefixtures("toy")
-def test_a_guess_recognises_it(tmp_path: Path) -> None:
-    proposal = guess(as_toy(as_bridge(si_log()).round(4), tmp_path / "log.toy"))
-    assert proposal.sniffed.form == {"kind": "toy"}
-    assert {column.name for column in proposal.columns} >= {"north", "east", "psi", "u", "v", "r", "rudder.delta"}
-
-
-SHIFT = PerturbationRule(
-    float | tuple[float, float],
-    lambda number, shift, u: number + (shift if isinstance(shift, float) else shift[0] + (shift[1] - shift[0]) * u),
-    drawn=lambda shift: isinstance(shift, tuple),
-)
-
-
-def shifted(folder: Path, block: Mapping[str, Any]) -> list[float]:
-    """Shift of x_G [m] of each member of a study's family that says so."""
-    orders = {"n_rpm": [50.0, 200.0], "alpha_deg": [-50.0, 50.0]}
-    document = {
-        "question": "What if the centre of gravity is elsewhere?",
-        "truth": {"vessel": "gunnerus-28.9", "manoeuvres": 8, "duration": 20.0, "manoeuvre": [orders]},
-        "split": {"test": 2},
-        "prediction": {"ahead": 5.0},
-        "grid": {"N_D": [4]},
-        "family": [
-            {
-                "name": "wrong",
-                "base": "gunnerus-28.9",
-                "members": 2,
-                "perturb": [{"parameters": ["inertia.x_G"], **block}],
-            }
-        ],
-    }
-    base = load_vessel("gunnerus-28.9").parameters["inertia.x_G"]
-    variants = [one.variant for one in build_plan(document, folder / "study.toml").foundations]
-    return [variant.values["inertia.x_G"] - base for variant in variants if variant and variant.family == "wrong"]
-
-
-def test_a_study_uses_the_rule(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
-    for block, least, most in (({"shift": 0.5}, 0.5, 0.5), ({"shift": [0.1, 0.4]}, 0.1, 0.4)):
-        shifts = shifted(tmp_path, block)
-        assert len(shifts) == 2
-        assert all(least - 1e-12 <= shift <= most + 1e-12 for shift in shifts)
-        assert (shifts[0] == shifts[1]) == (least == most)
-
-
-def test_a_rule_refuses_a_value_at_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(perturb.RULES, "shift", SHIFT)
-    with pytest.raises(DocumentError) as caught:
-        shifted(tmp_path, {"shift": "far"})
-    assert str(caught.value.path).startswith("family.wrong.perturb.0.shift")
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
@@ -160,18 +159,6 @@ def test_a_command_writes_its_record(records: ModuleType, tmp_path: Path, monkey
     assert all(f"\n- {key}: " in text for key in records.HEAD)
     assert records.main("none", sys.executable, "-c", "raise SystemExit(3)") == 3
     assert not (tmp_path / "none.md").exists()
-
-
-def test_numbers_that_a_picture_shows_are_not_cut() -> None:
-    light = load(DOCS / "pictures.py").light
-    assert (
-        light('<path d="M1.23456,2"/><text x="0.999">0.696</text>') == '<path d="M1.23,2"/><text x="0.99">0.696</text>'
-    )
-
-
-def test_the_font_of_the_equations_is_the_one_that_is_declared() -> None:
-    font = hashlib.sha256((DOCS / "_static" / "math.woff2").read_bytes()).hexdigest()
-    assert font in (DOCS / "_static" / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_readme_is_short_and_its_files_are_there() -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+import shipid
 from shipid.cli import data, export, identify, predict, replay, simulation, study, vessel
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
@@ -82,10 +83,7 @@ def _check_encoding(arguments: Sequence[str]) -> None:
     """Raise ShipidError for an argument that is not UTF-8: documents, pages and tables could not name such a file."""
     for argument in arguments:
         if not is_utf_8(argument):
-            words = "is not UTF-8: rename the file or folder, or write the text in UTF-8"
-            if (system := sys.getfilesystemencoding()) != "utf-8":
-                words = f"cannot be read in this locale ({system}): set LC_ALL=C.UTF-8, and no PYTHONUTF8=0"
-            raise ShipidError(words, path=argument)
+            raise ShipidError("is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8", path=argument)
 
 
 def _configure_output(
@@ -94,23 +92,16 @@ def _configure_output(
 ) -> None:
     log_to_stderr(verbose)
     if version:
-        from shipid.version import __version__
-
-        typer.echo(__version__)
+        typer.echo(shipid.__version__)
         raise typer.Exit
 
 
-def _build_app() -> typer.Typer:
-    """Build the command line of all commands and groups."""
-    app = typer.Typer(**OPTIONS)
-    app.callback(invoke_without_command=True)(_configure_output)
-    for name, command in COMMANDS.items():
-        app.command(name, cls=GuardedCommand)(command)
-    for name, group in GROUPS.items():
-        for registered in group.registered_commands:
-            registered.cls = GuardedCommand
-        app.add_typer(group, name=name)
-    return app
-
-
-app = _build_app()
+app = typer.Typer(**OPTIONS)
+app.callback(invoke_without_command=True)(_configure_output)
+for name, command in COMMANDS.items():
+    app.command(name)(command)
+for group in (app, *GROUPS.values()):
+    for registered in group.registered_commands:
+        registered.cls = GuardedCommand
+for name, group in GROUPS.items():
+    app.add_typer(group, name=name)

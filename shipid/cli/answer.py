@@ -5,27 +5,26 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shipid.cli.terminal import four_digits, print_table, text_table
+from shipid.cli.terminal import four_digits, print_table
+from shipid.units import plural_word
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from shipid.cli.terminal import TextTable
+    from shipid.data.dataset import Dataset
+
+    Rows = DataFrame | Sequence[Mapping[Any, Any]]
 
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object instead of tables; all else goes to stderr")]
 
 
 class Answer:
-    """Collects the output of a command for JSON, or prints it immediately.
-
-    Parameters
-    ----------
-    as_json : whether standard output is to hold one JSON object and nothing else.
-    """
+    """Collects the output of a command for JSON, or prints it immediately."""
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
@@ -38,30 +37,50 @@ class Answer:
         elif text:
             typer.echo(text)
 
-    def rows(self, name: str, rows: DataFrame | Iterable[Mapping[Any, Any]], shown: TextTable | None) -> None:
-        """Print a table, if there is one to be shown; for programs its rows under a name, SI and not rounded."""
-        if self.as_json:
-            self.contents[name] = rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
-        elif shown is not None:
-            print_table(shown)
+    def warn(self, warnings: Iterable[str]) -> None:
+        """Print warnings on standard error; programs get them, too."""
+        self.contents["warnings"] = list(warnings)
+        for warning in self.contents["warnings"]:
+            typer.echo(f"warning: {warning}", err=True)
 
     def records(
         self,
         name: str,
-        rows: DataFrame | Sequence[Mapping[Any, Any]],
+        rows: Rows,
         heads: Mapping[str, str] | None = None,
         formats: Mapping[str, Callable[[Any], str]] | None = None,
+        *,
+        shown: Rows | None = None,
     ) -> None:
-        """Print dicts or rows of a frame, if there are any, as a table; programs get all of their columns.
+        """Print dicts or rows of a frame, if there are any, as a table; programs get all of them, SI and not rounded.
 
         heads : key -> heading of the columns to print; default: all, headed by their keys. formats : key -> how its
-        values are written; default: floats with four digits.
+        values are written; default: floats with four digits. shown : rows to print instead.
         """
-        records: Any = rows.to_dict("records") if hasattr(rows, "to_dict") else rows
-        heads = heads or {key: key for record in records[:1] for key in record}
-        formats = dict.fromkeys(heads, _format_cell) | dict(formats or {})
-        cells = [[formats[key](record[key]) for key in heads] for record in records]
-        self.rows(name, rows, text_table(list(heads.values()), cells) if cells else None)
+        records = _as_dicts(rows if shown is None or self.as_json else shown)
+        if self.as_json:
+            self.contents[name] = records
+        elif records:
+            heads, formats = heads or {key: str(key) for key in records[0]}, formats or {}
+            cells = [[formats.get(key, _format_cell)(record[key]) for key in heads] for record in records]
+            print_table(list(heads.values()), cells)
+
+    def save(self, what: str, file: Path | None, rows: DataFrame) -> None:
+        """Write a table, if a file is given, and say so."""
+        if file is not None:
+            from shipid.files import write_table
+
+            write_table(file, rows)
+            self.say(f"{what} -> {file}", file=file)
+
+    def say_dataset(self, dataset: Dataset, file: Path) -> None:
+        """Say how large a dataset is that was written."""
+        runs, rows = len(dataset.runs), len(dataset.frame)
+        self.say(f"{rows} rows in {runs} {plural_word(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
+
+
+def _as_dicts(rows: Any) -> list[dict[str, Any]]:
+    return rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
 
 
 def _format_cell(value: Any) -> str:
@@ -70,18 +89,10 @@ def _format_cell(value: Any) -> str:
 
 @contextmanager
 def open_answer(as_json: bool) -> Iterator[Answer]:
-    """Give an `Answer`, and print it as JSON at the end of the block, also where that ends with an exit status."""
+    """Give an `Answer`, and print it as JSON at the end of the block."""
     answer = Answer(as_json)
-    try:
-        yield answer
-    except typer.Exit:
-        _print_answer(answer)
-        raise
-    _print_answer(answer)
-
-
-def _print_answer(answer: Answer) -> None:
-    if answer.as_json:
+    yield answer
+    if as_json:
         from shipid.files import json_text
 
         sys.stdout.write(json_text(answer.contents) + "\n")

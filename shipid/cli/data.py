@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import MappingName
-from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import criterion_table, measure_table, show_steps, text_table
+from shipid.cli.outputs import check_output
+from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES, show_steps
 from shipid.errors import ShipidError
 from shipid.units import percent_text, plural_word
 
 if TYPE_CHECKING:
-    from shipid.data.dataset import Dataset
     from shipid.logs.guess.pose import Frame
 
 app = typer.Typer(no_args_is_help=True, help="Data: import, check and fetch logs of sea trials.")
@@ -59,62 +58,44 @@ def data_import(
     as_json: Json = False,
 ) -> None:
     """Import a raw log by a declared mapping into a dataset; every repair is counted and flagged."""
-    of_drafts = {"--names": names, "--vessel": vessel, "--frame": frame}
-    if guess is None and (idle := next((option for option, value in of_drafts.items() if value), None)):
-        raise ShipidError("is for drafts: give it with --guess LOG", path=idle)
     if guess is not None:
         if mapping or log or without:
             raise ShipidError("--guess drafts a mapping of one log: give neither mapping nor repairs", file=guess)
         with open_answer(as_json) as answer:
             _draft_mapping(guess, tuple(filter(None, names.split(","))), vessel, frame, out, answer)
         return
+    if names or vessel or frame:
+        raise ShipidError("is for drafts: give it with --guess LOG", path="--names, --vessel or --frame")
     if not mapping:
         raise ShipidError("name a mapping, or draft one with --guess LOG")
-    from shipid.data.dataset import write_dataset
     from shipid.logs.catalogue import fetch_log
-    from shipid.logs.importing import import_log
-    from shipid.logs.mapping import read_mapping
 
-    check_ending(out, ".parquet")
-    declared = read_mapping(mapping)
+    declared = shipid.read_mapping(mapping)
+    file = check_output(out or Path(f"{Path(mapping).stem}.parquet"), [Path(mapping)], (".parquet",))
     source = log or fetch_log(mapping)
-    out = out or Path(f"{Path(mapping).stem}.parquet")
-    check_output(out, [source, Path(mapping)], "--out")
-    if source.is_dir():
-        check_output(out, source.glob("*"), "--out")
+    check_output(file, [source, *source.glob("*")])
     with show_steps() as say:
-        dataset = import_log(
+        dataset = shipid.import_log(
             declared,
             source,
             without=without or (),
             progress=lambda share: say(f"{source.name}: {percent_text(share)} read"),
         )
-    file = write_dataset(dataset, out)
-    repairs = dataset.metadata.get("repairs", [])
     with open_answer(as_json) as answer:
-        answer.records("repairs", repairs)
-        _say_dataset_size(answer, dataset, file)
-
-
-def _say_dataset_size(answer: Answer, dataset: Dataset, file: Path) -> None:
-    rows, runs = len(dataset.frame), len(dataset.runs)
-    answer.say(f"{rows} rows in {runs} {plural_word(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
+        answer.records("repairs", dataset.metadata.get("repairs", []))
+        answer.say_dataset(dataset, shipid.write_dataset(dataset, file))
 
 
 def _draft_mapping(
     log: Path, names: tuple[str, ...], vessel: str | None, frame: Frame | None, out: Path | None, answer: Answer
 ) -> None:
-    from shipid.files import check_new, write_new
-    from shipid.logs.guess.columns import guess
+    from shipid.files import write_new
     from shipid.logs.guess.draft import NOT_YET, draft_mapping
-    from shipid.vessel.load import load_vessel
 
     if out is not None:
-        check_new(out, "mapping")
-    guessed = guess(log, names, load_vessel(vessel) if vessel else None, frame)
-    file = out or Path(f"{guessed.file.resolve().stem}.toml")
-    check_new(file, "mapping")
-    check_output(file, [], "--out")
+        check_output(out, endings=(".toml",))
+    guessed = shipid.guess(log, names, shipid.load_vessel(vessel) if vessel else None, frame)
+    file = check_output(out or Path(f"{guessed.file.resolve().stem}.toml"), endings=(".toml",))
     text = draft_mapping(guessed)
     write_new(text, file)
     columns = [
@@ -125,19 +106,25 @@ def _draft_mapping(
     findings = [{"finding": f.kind, "sure": f.confidence, "what": f.sentence} for f in guessed.findings]
     answer.records("findings", findings, formats={"sure": percent_text})
     source = guessed.source
-    if source.pattern is not None:
-        count = f"{source.held} runs" if source.parts else "as many runs"
-        files = f"{len(source.files)} {plural_word(len(source.files), 'file')}"
-        sentence = f"{files} {source.pattern!r}: one source of {count}"
-        answer.say(sentence, files=len(source.files), pattern=source.pattern)
-    answer.records("left_out", [{"left out": name, "because": why} for name, why in source.skipped.items()])
-    notes = [f"note: {note}" for note in guessed.sniffed.notes]
-    answer.say("\n".join(notes), notes=guessed.sniffed.notes)
-    answer.records("unused", [{"not used": name, "because": why} for name, why in guessed.unused.items()])
     questions = [question.sentence for question in guessed.questions]
-    answer.say("\n".join(f"? {question}" for question in questions), questions=questions)
     faults = [line.removeprefix("# ") for line in text.splitlines() if line.startswith(NOT_YET)]
-    answer.say("\n".join(faults), faults=faults)
+    lines = [
+        f"{len(source.files)} files {source.pattern!r} are one source" if source.pattern is not None else "",
+        *(f"left out: {name}: {why}" for name, why in source.skipped.items()),
+        *(f"not used: {name}: {why}" for name, why in guessed.unused.items()),
+        *(f"note: {note}" for note in guessed.sniffed.notes),
+        *(f"? {question}" for question in questions),
+        *faults,
+    ]
+    answer.say(
+        "\n".join(filter(None, lines)),
+        files=len(source.files),
+        left_out=source.skipped,
+        unused=guessed.unused,
+        notes=guessed.sniffed.notes,
+        questions=questions,
+        faults=faults,
+    )
     answer.say(f"draft -> {file}: read it before you import with it", file=file)
 
 
@@ -149,17 +136,14 @@ def data_segment(
     as_json: Json = False,
 ) -> None:
     """Find the manoeuvres of a log and write them as segments, to be corrected and put into the mapping."""
-    from shipid.files import check_new, write_new
+    from shipid.files import write_new
     from shipid.logs.catalogue import fetch_log
     from shipid.logs.guess.draft import clock_moment, segment_log, segments_text
-    from shipid.logs.mapping import read_mapping
 
-    declared = read_mapping(mapping)
+    declared = shipid.read_mapping(mapping)
     if declared.source.runs is not None or declared.parts is not None:
         raise ShipidError("says where runs begin ([source] runs or [parts]): nothing is to be cut", file=mapping)
-    file = out or Path(f"{Path(mapping).stem}-segments.toml")
-    check_new(file, "mapping")
-    check_output(file, [], "--out")
+    file = check_output(out or Path(f"{Path(mapping).stem}-segments.toml"), endings=(".toml",))
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch_log(mapping))
     write_new(segments_text(segments, unit), file)
@@ -176,19 +160,13 @@ def data_join(
     as_json: Json = False,
 ) -> None:
     """Join datasets of one vessel, such as those of several days or recorders."""
-    from shipid.data.dataset import read_dataset, write_dataset
     from shipid.logs.joining import join_datasets
 
-    check_ending(out, ".parquet")
-    places = [os.path.realpath(file) for file in datasets]
-    twice = next((file for file, place in zip(datasets, places, strict=True) if places.count(place) > 1), None)
-    if twice is not None:
-        raise ShipidError("is named twice: name each dataset once", file=twice)
-    joined, notes = join_datasets({file: read_dataset(file) for file in datasets})
-    file = write_dataset(joined, out)
+    check_output(out, endings=(".parquet",))
+    joined, notes = join_datasets({file: shipid.read_dataset(file) for file in datasets})
     with open_answer(as_json) as answer:
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-        _say_dataset_size(answer, joined, file)
+        answer.say_dataset(joined, shipid.write_dataset(joined, out))
 
 
 @app.command("check")
@@ -198,14 +176,12 @@ def data_check(
     as_json: Json = False,
 ) -> None:
     """Check a dataset: gaps, jitter, ranges, d(psi)/dt against r, position."""
-    from shipid.data.checks import check_dataset
-    from shipid.data.dataset import read_dataset
     from shipid.data.held import warn_of_constant_commands
 
-    check_ending(html, ".html")
-    log = read_dataset(dataset)
-    checks = check_dataset(log)
-    ok = checks["ok"].astype(bool)
+    log = shipid.read_dataset(dataset)
+    checks = shipid.check_dataset(log)
+    failed = checks[~checks["ok"].astype(bool)]
+    counts = checks.assign(failed=checks.index.isin(failed.index)).groupby("check", sort=False)
     with open_answer(as_json) as answer:
         if html is not None:
             from shipid.data.contents import check_content
@@ -213,19 +189,15 @@ def data_check(
 
             page = write_checks(check_content(dataset.stem, log, checks), html)
             answer.say(f"plots: {page}", page=page)
-        counts = (
-            (name, len(group), (~group["ok"].astype(bool)).sum()) for name, group in checks.groupby("check", sort=False)
-        )
-        answer.rows("checks", checks, text_table(["check", "runs", "failed"], counts))
-        failed = int((~ok).sum())
-        if failed:
-            rows = checks.loc[~ok, ["run", "check", "sentence"]].to_numpy()
-            answer.rows("failed", checks[~ok], text_table(["run", "failed", "what to look at"], rows))
-        answer.say(f"{len(checks) - failed} of {len(checks)} checks passed", passed=len(checks) - failed)
+        shown = counts.agg(runs=("ok", "size"), failed=("failed", "sum")).reset_index()
+        answer.records("checks", checks, shown=shown)
+        answer.records("failed", failed, {"run": "run", "check": "failed", "sentence": "what to look at"})
+        passed = len(checks) - len(failed)
+        answer.say(f"{passed} of {len(checks)} checks passed", passed=passed)
         notes = warn_of_constant_commands(log, log.runs)
         answer.say("\n".join(f"note: {note}" for note in notes), notes=notes)
-        if failed:
-            raise typer.Exit(1)
+    if len(failed):
+        raise typer.Exit(1)
 
 
 @app.command("measures")
@@ -239,21 +211,15 @@ def data_measures(
     as_json: Json = False,
 ) -> None:
     """Measure the standard manoeuvres of a dataset: overshoots, advance, tactical diameter, ..."""
-    from shipid.data.dataset import read_dataset
-    from shipid.files import check_table, write_table
     from shipid.logs.measuring import measure_dataset
 
-    if csv is not None:
-        check_table(csv)
-    result = measure_dataset(read_dataset(dataset), manoeuvre, length)
-    measures, criteria = (frame.to_dict("records") for frame in (result.measures, result.criteria))
+    result = measure_dataset(shipid.read_dataset(dataset), manoeuvre, length)
     left = [{"run": run, "because": why} for run, why in result.left.items()]
+    run = {"run": "run"}
     with open_answer(as_json) as answer:
-        answer.rows("measures", measures, measure_table(measures, ["run", "kind"]) if measures else None)
-        answer.rows("criteria", criteria, criterion_table(criteria, ["run"]) if criteria else None)
+        answer.records("measures", result.measures, run | {"kind": "kind"} | MEASURES, MEASURE_FORMATS)
+        answer.records("criteria", result.criteria, run | CRITERIA)
         answer.records("left", left)
-        measured = result.measures["run"].nunique() if measures else 0
+        measured = len(set(result.measures.get("run", ())))
         answer.say(f"{measured} {plural_word(measured, 'run')} measured, {len(left)} not")
-        if csv is not None:
-            write_table(csv, result.measures)
-            answer.say(f"measures -> {csv}", csv=csv)
+        answer.save("measures", csv, result.measures)

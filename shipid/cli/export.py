@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+import shipid
 from shipid.cli.options import Adaptive, Kind, check_band, command_line
-from shipid.cli.outputs import check_ending, check_output
 
 
 def export_command(
@@ -18,30 +18,24 @@ def export_command(
     to: Annotated[str, typer.Option("--to", help="c, fmu, casadi or onnx")],
     out: Annotated[Path, typer.Option("--out", help="the folder for c, else the file to write")],
     single: Annotated[bool, typer.Option("--single", help="single precision (c and onnx)")] = False,
-    integrator: Annotated[str | None, typer.Option(help="of a vessel's step: rk4 or euler", show_default="rk4")] = None,
+    integrator: Annotated[
+        Literal["rk4", "euler"] | None, typer.Option(help="of a vessel's step", show_default="rk4")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
 ) -> None:
     """Write a predictor, or a vessel alone, as C99, FMU, CasADi function or ONNX."""
     from shipid.document import bundled_documents
-    from shipid.errors import DocumentError, suggest_name
-    from shipid.export.casadi import listing_of
+    from shipid.errors import DocumentError
     from shipid.export.write import EXAMPLE_FILE, export_predictor, export_vessel
     from shipid.study.store import read_predictor
-    from shipid.vessel.load import load_vessel
 
-    if to == "casadi" and out.name:
-        for file in (out, listing_of(out)):
-            check_output(file, [Path(what)], "--out")
     if what.endswith(".npz") or (what not in bundled_documents("models") and Path(what).is_dir()):
         if integrator is not None:
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
         written = export_predictor(read_predictor(Path(what)), to, out, single=single, name=name)
     else:
-        integrator = integrator or "rk4"
-        if integrator not in ("euler", "rk4"):
-            raise DocumentError(f"no such rule: {suggest_name(integrator, ('euler', 'rk4'))}", path="--integrator")
-        vessel = load_vessel(what)
-        written = export_vessel(vessel, to, out, integrator=integrator, single=single, name=name)  # type: ignore[arg-type]
+        vessel = shipid.load_vessel(what)
+        written = export_vessel(vessel, to, out, integrator=integrator or "rk4", single=single, name=name)
     for file in written:
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
     if to == "c" and out / EXAMPLE_FILE not in written:
@@ -67,18 +61,14 @@ def aboard_command(
     from shipid.study.aboard import play_aboard, replay_summary, write_replay_points
 
     check_band(level, kind, adaptive)
-    check_ending(html, ".html")
     played = play_aboard(predictor, log, mapping, every, level=level, kind=kind, rate=adaptive)
+    lines = replay_summary(played)
+    typer.echo("\n".join(line.text for line in lines))
     if out is not None:
         write_replay_points(played, out)
-    lines = replay_summary(played)
-    for line in lines:
-        typer.echo(line.text)
-    if out is not None:
         typer.echo(f"{len(played.points)} points -> {out}")
     if html is not None:
         from shipid.report.aboard import AboardContent, write_aboard
-        from shipid.version import __version__
 
         content = AboardContent(
             title=f"{log.stem}, played as if at sea",
@@ -87,7 +77,7 @@ def aboard_command(
             instants=played.instants,
             points=played.points,
             track=played.track,
-            provenance={"Log": str(log), "Predictor": str(predictor), "shipid": __version__},
+            provenance={"Log": str(log), "Predictor": str(predictor), "shipid": shipid.__version__},
             command=command_line(),
         )
         typer.echo(f"page -> {write_aboard(content, html)}")

@@ -26,11 +26,8 @@ Scheduler = Annotated[str | None, typer.Option(help="address of a Dask scheduler
 Device = Annotated[str, typer.Option(help="PyTorch device: cpu or cuda")]
 
 
-_ASSIGNMENT = re.compile(r"(.*?[^<>=])=(?!=)(.*)", re.DOTALL)  # not the sign of a comparison
-
-
 def parse_changes(changes: list[str] | None) -> dict[str, Any]:
-    """Return path -> value of `path=value` texts; a value is read as TOML, or taken as text."""
+    """Return path -> value of `--set path=value`; a value is read as TOML, or taken as text."""
     return parse_assignments(changes or [], "--set", "--set path=value, such as --set grid.N_D=[10,30]", text=True)
 
 
@@ -40,16 +37,16 @@ def parse_assignments(given: list[str], option: str, example: str, *, text: bool
 
     result: dict[str, Any] = {}
     for pair in given:
-        match = _ASSIGNMENT.fullmatch(pair)
-        path = match[1].strip() if match else ""
+        path, *values = re.split("(?<![<>=])=(?!=)", pair, maxsplit=1)  # not the sign of a comparison
+        words = "".join(values)
         try:
-            value = parse_toml(f"value = {match[2]}")["value"] if match else None
+            value = parse_toml(f"value = {words}")["value"]
         except DocumentError:
-            value = match[2] if match and text else None
-        if not path or value is None:
+            value = words if text and values else None
+        if not path.strip() or value is None:
             raise DocumentError(f"{pair!r}: write {example}", path=option)
-        check_values({path: value}, option)
-        result[path] = value
+        result[path.strip()] = value
+    check_values(result, option)
     return result
 
 
@@ -62,14 +59,11 @@ Adaptive = Annotated[
 
 def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
     """Raise ShipidError for a level or a rate out of range, and where --kind or --adaptive come without --level."""
-    if level is not None and not 0 < level <= HIGHEST:
-        raise ShipidError(f"{level:g}: must be above 0 and up to {HIGHEST:g}, such as 0.9", path="--level")
+    for number, most, option in ((level, HIGHEST, "--level"), (adaptive, 1.0, "--adaptive")):
+        if number is not None and not 0 < number <= most:
+            raise ShipidError(f"{number:g}: must be above 0 and up to {most:g}", path=option)
     if level is None and (kind is not None or adaptive is not None):
         raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
-    if adaptive is not None and not 0 < adaptive <= 1:
-        raise ShipidError(
-            f"{adaptive:g} is no rate: give a number above 0 and up to 1, such as 0.02", path="--adaptive"
-        )
 
 
 def document_stem(name: str | Path) -> str:

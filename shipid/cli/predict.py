@@ -10,6 +10,7 @@ import typer
 from shipid.cli.options import Adaptive, Folder, Kind, check_band
 from shipid.cli.outputs import check_output
 from shipid.errors import ShipidError
+from shipid.files import TABLES
 from shipid.units import percent_text
 
 
@@ -31,16 +32,15 @@ def predict_command(
     if not cell:
         raise ShipidError("is empty: name a cell, as results.parquet does", path="--cell")
     check_band(level, kind, adaptive)
-    file = out or Path(f"{cell}.parquet")
-    check_output(file, [log], "--out")
+    file = check_output(out or Path(f"{cell}.parquet"), [log], TABLES)
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
-    if frame.attrs["coarse"]:
-        typer.echo(frame.attrs["coarse"])
-    if frame.attrs["gaps"]:
-        typer.echo(f"{frame.attrs['gaps']}: a past over one of them is interpolated")
-    if outside:
-        sentence = (
-            f"{percent_text(outside)} of the instants lie outside what the cell was trained on (column `outside`)"
-        )
-        typer.echo(sentence + (": no band is promised there" if level is not None else ""))
+    notes = [
+        frame.attrs["coarse"],
+        frame.attrs["gaps"] and f"{frame.attrs['gaps']}: a past over one of them is interpolated",
+        outside
+        and f"{percent_text(outside)} of the instants lie outside what the cell was trained on (column "
+        f"`outside`){'' if level is None else ': no band is promised there'}",
+    ]
+    for note in filter(None, notes):
+        typer.echo(note)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import shipid
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import Changes, VesselName, command_line, document_stem, parse_changes
-from shipid.cli.outputs import check_ending, check_output
-from shipid.cli.terminal import criterion_table, measure_table, text_table
+from shipid.cli.outputs import check_output
+from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES
 from shipid.errors import DocumentError, ShipidError
-from shipid.units import plural_word
+from shipid.files import TABLES
+
+if TYPE_CHECKING:
+    pass
 
 
 def simulate_command(
@@ -45,67 +49,42 @@ def simulate_command(
 
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
     """A log of a vessel: manoeuvres by a document."""
-    from shipid.data.dataset import Dataset, write_dataset
-    from shipid.files import check_table, write_table
+    from shipid.files import write_table
     from shipid.simulation.scripted import simulate_script
-    from shipid.vessel.load import load_vessel
 
-    check_table(out)
-    check_output(out, [], "--out")
-    ship = load_vessel(vessel)
-    dataset = Dataset(
+    check_output(out, endings=TABLES)
+    ship = shipid.load_vessel(vessel)
+    dataset = shipid.Dataset(
         simulate_script(ship, manoeuvres), {"vessel": vessel, "source": "simulated", "clock": "run", "flags": []}
     )
     if out.suffix == ".parquet":
-        write_dataset(dataset, out)
+        shipid.write_dataset(dataset, out)
     else:
         write_table(out, dataset.frame)
     with open_answer(as_json) as answer:
-        counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
-        answer.say(
-            f"{ship.name}: {counts['runs']} {plural_word(counts['runs'], 'run')}, {counts['rows']} rows -> {out}",
-            file=out,
-            **counts,
-        )
+        answer.say_dataset(dataset, out)
 
 
 def _simulate_truth(study: str, out: Path | None, changes: list[str] | None, as_json: bool) -> None:
     """The dataset of a study, and its envelope beside the published one."""
-    from shipid.data.dataset import write_dataset
     from shipid.study.envelope import envelope_table, input_envelope
-    from shipid.study.plan import input_files, read_plan
+    from shipid.study.plan import input_files
     from shipid.study.prepare import obtain_runs, partition, runs_by_amount
 
-    check_ending(out, ".parquet")
-    plan = read_plan(study, parse_changes(changes))
+    plan = shipid.read_plan(study, parse_changes(changes))
     if plan.truth is None:
         raise DocumentError("has no [truth]: its runs are recorded, so there is nothing to simulate", file=plan.file)
-    file = out or Path(f"{plan.name}.parquet")
-    check_output(file, input_files(plan), "--out")
+    file = check_output(out or Path(f"{plan.name}.parquet"), input_files(plan), (".parquet",))
     dataset = obtain_runs(plan)
     pool, test, _ = partition(plan, dataset)
     rows_of_sets = input_envelope(pool, test, runs_by_amount(plan.study, pool), dataset.commands)
     ranges = envelope_table(rows_of_sets, plan.study.published)
-    units = dict(zip(ranges["quantity"], ranges["unit"], strict=True))
-    rows = [
-        [str(name), *(_extremes_text(part[part["quantity"] == quantity]) for quantity in units)]
-        for name, part in ranges.groupby("set", sort=False)
-    ]
-    write_dataset(dataset, file)
+    shipid.write_dataset(dataset, file)
     with open_answer(as_json) as answer:
-        counts = {"runs": len(dataset.runs), "rows": len(dataset.frame)}
-        answer.say(
-            f"{counts['runs']} {plural_word(counts['runs'], 'run')}, {counts['rows']} rows -> {file}",
-            file=file,
-            **counts,
-        )
-        answer.say("least / mean / greatest at the instants of prediction:")
-        heads = ["set", *(f"{quantity} [{unit}]" for quantity, unit in units.items())]
-        answer.rows("envelope", ranges, text_table(heads, rows))
-
-
-def _extremes_text(row: Any) -> str:
-    return " / ".join(f"{row[name].iloc[0]:.1f}" for name in ("min", "mean", "max")) if len(row) else ""
+        answer.say_dataset(dataset, file)
+        answer.say("at the instants of prediction:")
+        heads = {"min": "least", "mean": "mean", "max": "greatest"}
+        answer.records("envelope", ranges, {"set": "set", "quantity": "quantity", "unit": "unit"} | heads)
 
 
 def manoeuvre_command(
@@ -136,20 +115,16 @@ def manoeuvre_command(
     as_json: Json = False,
 ) -> None:
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
-    from shipid.data.dataset import Dataset, write_dataset
-    from shipid.files import check_table, write_table
-    from shipid.report.manoeuvre import write_manoeuvre
-    from shipid.simulation.measured import approach_words, manoeuvre_content, measure_standard
-    from shipid.vessel.load import load_vessel
+    from pandas import DataFrame
 
-    check_ending(log, ".parquet")
-    out = out or Path(f"{document_stem(vessel)}-{name}.html")
-    check_ending(out, ".html")
-    check_output(out, [], "--out")
-    if csv is not None:
-        check_table(csv)
-    ship = load_vessel(vessel)
-    done = measure_standard(ship, name, angles or (), speed=speed, side=side, duration=duration, approach=approach)
+    from shipid.report.manoeuvre import write_manoeuvre
+    from shipid.simulation.measured import approach_words, manoeuvre_content
+
+    out = check_output(out or Path(f"{document_stem(vessel)}-{name}.html"), endings=(".html",))
+    ship = shipid.load_vessel(vessel)
+    done = shipid.measure_standard(
+        ship, name, angles or (), speed=speed, side=side, duration=duration, approach=approach
+    )
     title, approached_by = done.standard.title, done.standard.manoeuvre
     with open_answer(as_json) as answer:
         answer.say(
@@ -159,16 +134,11 @@ def manoeuvre_command(
             speed=done.standard.speed,
             n=approached_by.n_rpm / 60,
         )
-        answer.rows("measures", done.measures, measure_table(done.measures, []))
-        answer.rows("criteria", done.criteria, criterion_table(done.criteria, []) if done.criteria else None)
-        if csv is not None:
-            import pandas as pd
-
-            write_table(csv, pd.DataFrame(done.measures))
-            answer.say(f"measures -> {csv}", csv=csv)
+        answer.records("measures", done.measures, MEASURES, MEASURE_FORMATS)
+        answer.records("criteria", done.criteria, CRITERIA)
+        answer.save("measures", csv, DataFrame(done.measures))
         if log is not None:
             source = {"clock": "run", "flags": [], "source": f"simulated: {ship.name}, {title}"}
-            answer.say(f"log -> {write_dataset(Dataset(done.frame, source), log)}", log=log)
-        content = manoeuvre_content(done, command_line())
-        page = write_manoeuvre(content, out)
+            answer.say(f"log -> {shipid.write_dataset(shipid.Dataset(done.frame, source), log)}", log=log)
+        page = write_manoeuvre(manoeuvre_content(done, command_line()), out)
         answer.say(f"page -> {page}", page=page)

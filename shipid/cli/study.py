@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+import re
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from textwrap import indent
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, document_stem, parse_changes
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import (
-    count_blocks,
-    end_on_interrupt,
-    four_digits,
-    shorten_text,
-    show_steps,
-    text_table,
-)
+from shipid.cli.terminal import count_blocks, end_on_interrupt, share_text, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
-from shipid.units import digit_decimals, length_decimals, length_text, level_text, percent_text, plural_word
+from shipid.files import TABLES
+from shipid.units import level_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -33,7 +28,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
 MOST_DIFFERENCES = 20  # of documents, on a terminal
-FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "claim", "verdict", "evidence")
+CELL = {"family": "family", "method": "method", "N_D": "N_D"}
 
 
 @app.command("list")
@@ -64,44 +59,22 @@ def study_new(
     as_json: Json = False,
 ) -> None:
     """Write a study of your vessel and runs that runs as it is, each choice with its reason."""
-    from shipid.files import check_new, quote_argument, write_new
+    from shipid.files import quote_argument, write_new
     from shipid.study.new import draft_study
 
-    file = out or Path(f"{document_stem(data or vessel[0])}-study.toml")
-    check_new(file, "study")
-    check_output(file, [], "--out")
+    file = check_output(out or Path(f"{document_stem(data or vessel[0])}-study.toml"), endings=(".toml",))
     draft = draft_study(vessel, data, file)
-    write_new(draft.text, file, "study")
+    write_new(draft.text, file)
     with open_answer(as_json) as answer:
-        choices = [
-            {"path": choice.path, "value": _toml_text(choice.value), "why": choice.why} for choice in draft.choices
-        ]
-        answer.rows("choices", choices, None)
-        for choice in choices:
-            answer.say(f"{choice['path']} = {choice['value']}" + (f"  # {choice['why']}" if choice["why"] else ""))
-        for warning in draft.warnings:
-            typer.echo(f"warning: {warning}", err=True)
-        for look in draft.looks.values():
-            if not look.wrong:
-                answer.say(look.sentence)
+        choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
+        answer.records("choices", choices, shown=[])
+        answer.say("\n".join(f"{one['path']} = {one['value']}  # {one['why']}".removesuffix("  # ") for one in choices))
+        answer.warn(draft.warnings)
+        answer.say("\n".join(look.sentence for look in draft.looks.values() if not look.wrong))
         models = [model.name for model in draft.plan.foundations]
         sentence = f"{draft.plan.cells} cells of {len(models)} foundations ({', '.join(models)}) -> {file}"
-        answer.say(sentence, file=file, cells=draft.plan.cells, foundations=models, warnings=draft.warnings)
+        answer.say(sentence, file=file, cells=draft.plan.cells, foundations=models)
         answer.say(f"run it with: shipid study run {quote_argument(file)}")
-
-
-def _toml_text(value: Any) -> str:
-    """A value as the study document has it; a text alone without quotes."""
-    from tomlkit import item
-
-    def inline(one: Any) -> str:
-        if isinstance(one, dict):
-            return f"{{{', '.join(f'{key} = {inline(inner)}' for key, inner in one.items())}}}"
-        if isinstance(one, list | tuple):
-            return f"[{', '.join(map(inline, one))}]"
-        return str(item(one).as_string())
-
-    return value if isinstance(value, str) else inline(value)
 
 
 @app.command("screen")
@@ -121,7 +94,6 @@ def study_screen(
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
     from shipid.engine.engines import ENGINES, REPEATED, engine_by_name
-    from shipid.files import write_table
     from shipid.study import screen
     from shipid.study.prepare import obtain_runs, partition
 
@@ -136,25 +108,15 @@ def study_screen(
         typer.echo(note, err=True)
     blocks = count_blocks(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
     frame = screen.join_blocks(list(blocks))
-    write_table(file, frame)
-    spread = screen.accuracy_quantiles(frame)
-    shares = [percent_text(share) for share in screen.QUANTILES_OF_A]
-    rows = [[*map(str, row[:3]), *map(length_text, row[3:])] for row in spread.itertuples(index=False)]
     correlations = screen.drivers_of_accuracy(frame)
-    pairs = [
-        (str(row.family), str(row.paths), f"{row.factor:+.2f}", f"{row.away:+.2f}") for row in correlations.itertuples()
-    ]
     with open_answer(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
-        answer.rows("accuracy", spread, text_table(["family", "members", "diverged", *shares], rows))
-        if pairs:
+        answer.records("accuracy", screen.accuracy_quantiles(frame))
+        if len(correlations):
             answer.say("what drives A: rank correlation with a factor, and with its distance from 1:")
-        shown = text_table(["family", "parameter", "factor", "distance"], pairs)
-        answer.rows("drivers", correlations, shown if pairs else None)
-        for row in spread[~spread["family"].isin(correlations["family"])].to_dict("records"):
-            count = row["members"] - row["diverged"]
-            answer.say(f"{row['family']}: {count} {plural_word(count, 'member shows', 'members show')} no driver of A")
-        answer.say(f"{len(frame)} members -> {file}", file=file)
+        signs = dict.fromkeys(("factor", "away"), "{:+.2f}".format)
+        answer.records("drivers", correlations, formats=signs)
+        answer.save(f"{len(frame)} members", file, frame)
 
 
 @app.command("rotate")
@@ -170,54 +132,38 @@ def study_rotate(
     as_json: Json = False,
 ) -> None:
     """Test on every run in turn and train on all others; the same command goes on after an interruption."""
+    import pandas as pd
+
     from shipid.answer import rotate
-    from shipid.files import write_table
+    from shipid.study.plan import families_set_from, grid_seeds
     from shipid.study.prepare import obtain_runs
 
     plan, file = _prepare_command(study, changes, device, out, "rotate")
     dataset = obtain_runs(plan)
     wanted = rotate.choose_turns(plan, dataset, tests)
-    from shipid.study.plan import grid_seeds
-
-    cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
-    import pandas as pd
-
     kept = rotate.kept_folder(file, plan, dataset, device)
     blocks = rotate.rotate_test_runs(plan, dataset, wanted, device, kept)
+    cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
     sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
     frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
-    write_table(file, frame)
-    rotate.remove_kept(kept)
-    columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
-    over = rotate.turns_table(frame)
-    from shipid.study.plan import model_label
-
-    for row in over.to_dict("records"):
-        better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
-        name = model_label(plan, row["foundation"], row["method"])
-        inside = "-" if row["coverage"] != row["coverage"] else percent_text(row["coverage"])
-        rows.append([name, *(four_digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {level_text(plan.study.bands.level)}"
-    heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
-    verdicts = rotate.turn_findings(frame, plan)
     naive = frame.groupby("test")["naive"].first().mean()
-    from shipid.study.plan import families_set_from
-
+    verdicts = rotate.turn_findings(frame, plan)
     with open_answer(as_json) as answer:
-        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
-        answer.rows("turns", over, text_table(heads, rows))
-        answer.say(f"constant u, v, r: {four_digits(naive)} m", naive=naive)
+        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train", tests=wanted)
+        level = level_text(plan.study.bands.level)
+        answer.say(f"width, coverage: radius [m] of bands of {level}, share of paths inside; better: turns with H < A:")
+        answer.records("turns", rotate.turns_table(frame), formats={"coverage": share_text})
+        answer.say(f"constant u, v, r: {naive:.4g} m", naive=naive)
         if saw := families_set_from(plan, wanted):
             answer.say(
                 f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw
             )
         if verdicts:
             answer.say("findings over the turns, in brackets 95 % intervals:")
-        shown = text_table(
-            ["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in verdicts)
-        )
-        answer.rows("findings", verdicts, shown if verdicts else None)
-        answer.say(f"{len(frame)} cells -> {file}", file=file)
+        heads = {"id": "finding", "claim": "claim", "verdict": "verdict", "evidence": "evidence"}
+        answer.records("findings", verdicts, heads)
+        answer.save(f"{len(frame)} cells", file, frame)
+    rotate.remove_kept(kept)
 
 
 @app.command("run")
@@ -237,22 +183,13 @@ def study_run(
 
     if scheduler is None:
         import_for_workers()  # before this process imports for itself
-    from shipid.study.plan import read_plan
-
-    plan = read_plan(study, parse_changes(changes))
     from shipid.study.plan import default_folder
 
-    _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, _shard(shard))
-
-
-def _shard(text: str | None) -> tuple[int, int] | None:
-    """The numbers of `--shard i/n`."""
-    if text is None:
-        return None
-    number, _, count = text.partition("/")
-    if not (number.isdecimal() and count.isdecimal()):
-        raise ShipidError(f"{text!r}: write i/n, such as 3/20", path="--shard")
-    return int(number), int(count)
+    part = re.fullmatch(r"(\d+)/(\d+)", shard or "")
+    if shard is not None and part is None:
+        raise ShipidError(f"{shard!r}: write i/n, such as 3/20", path="--shard")
+    plan = shipid.read_plan(study, parse_changes(changes))
+    _run_to_report(plan, out or default_folder(plan), workers, scheduler, device, part and (int(part[1]), int(part[2])))
 
 
 @app.command("prepare")
@@ -263,12 +200,10 @@ def study_prepare(
     device: Device = "cpu",
 ) -> None:
     """Make the folder of a study with its runs, so that the tasks of a job array can work there with --shard."""
-    from shipid.study.plan import read_plan
+    from shipid.study.plan import default_folder
     from shipid.study.run import prepare_study
 
-    plan = read_plan(study, parse_changes(changes))
-    from shipid.study.plan import default_folder
-
+    plan = shipid.read_plan(study, parse_changes(changes))
     for event in prepare_study(plan, out or default_folder(plan), device=device):
         typer.echo(event.text)
 
@@ -289,10 +224,8 @@ def study_resume(
 @app.command("report")
 def study_report(folder: Folder) -> None:
     """Write report.html, summary.md and results.parquet from what is stored."""
-    from shipid.answer.pages import write_pages
-
     with show_steps() as say:
-        report = write_pages(folder, say)
+        report = shipid.write_pages(folder, say)
     typer.echo(str(report))
 
 
@@ -304,8 +237,8 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
     report = check_folder(folder)
     with open_answer(as_json) as answer:
         answer.say("\n".join(report.lines), lines=report.lines, faults=report.faults)
-        if report.faults:
-            raise typer.Exit(1)
+    if report.faults:
+        raise typer.Exit(1)
 
 
 @app.command("compare")
@@ -327,133 +260,55 @@ def study_compare(
     errors over the worlds.
     """
     from shipid.answer import compare
-    from shipid.files import check_table, write_table
 
     if out is not None:
-        check_table(out)
+        check_output(out, endings=TABLES)
+    matched = [one.partition("=") for one in pair or ()]
+    if wrong := next(("".join(one) for one in matched if not all(one)), None):
+        raise DocumentError(f"{wrong!r}: write --pair FIRST=OTHER, such as --pair drawn=trained", path="--pair")
     with open_answer(as_json) as answer:
         if pair is None and compare.are_worlds(folders):
             errors = _show_worlds(compare.read_worlds(folders), answer)
         else:
-            pairs = dict(_parse_counterpart(one) for one in pair or ())
-            errors = _show_matched(compare.compare(folders, pairs), answer)
-        if out is not None:
-            write_table(out, errors)
-            answer.say(f"{len(errors)} rows -> {out}", file=out)
-
-
-def _parse_counterpart(pair: str) -> tuple[str, str]:
-    first, equals, other = pair.partition("=")
-    if not (first and equals and other):
-        raise DocumentError(f"{pair!r}: write --pair FIRST=OTHER, such as --pair drawn=trained", path="--pair")
-    return first, other
+            errors = _show_matched(compare.compare(folders, {first: other for first, _, other in matched}), answer)
+        answer.save(f"{len(errors)} rows", out, errors)
 
 
 def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     """Show what differs between runs, and the errors of cells that match; returns these."""
-    documents, errors = compared.documents, compared.errors
-    answer.say("", folders=compared.names)
-    rows = [[shorten_text(str(text), 60) for text in row] for row in documents.itertuples(index=False)]
-    shown = text_table(["what differs", *compared.names], rows[:MOST_DIFFERENCES])
-    answer.rows("documents", documents, shown if rows else None)
-    if not rows:
-        answer.say("the documents are equal")
-    elif len(rows) > MOST_DIFFERENCES:
-        answer.say(f"and {len(rows) - MOST_DIFFERENCES} more: --json shows all")
-    banded = bool(errors[["coverage_first", "coverage_other"]].notna().any(axis=None))
-    for name, part in errors.groupby("folder", sort=False):
-        first = compared.names[0]
-        answer.say(f"H [m] of {first}, of {name}, and the difference, {name} less {first}, with its 95 % interval:")
-        heads = [
-            "family",
-            "method",
-            "N_D",
-            "cells",
-            first,
-            str(name),
-            "difference",
-            *["in band"] * banded,
-            "verdict",
-        ]
-        places = max(3, *map(length_decimals, part[["first", "other"]].max(axis=1)))
-        lines = [_difference_words(row, places, banded) for row in part.to_dict("records")]
-        answer.rows("errors", errors, text_table(heads, lines))
-        answer.say(
-            f"verdict: lower or higher where the test shows it, corrected for {len(part)} rows; empty: it does not"
-        )
-    if banded:
-        answer.say("in band: share of the test paths that lie whole in the bands of the first and of the other run")
+    documents, errors, first = compared.documents, compared.errors, compared.names[0]
+    heads = dict(zip(documents.columns, ["what differs", *compared.names], strict=True))
+    shorten = dict.fromkeys(heads, lambda text: f"{text:.60}")
+    answer.records("documents", documents, heads, shorten, shown=documents.head(MOST_DIFFERENCES))
+    more = len(documents) - MOST_DIFFERENCES
+    words = "the documents are equal" if documents.empty else f"and {more} more: --json shows all" if more > 0 else ""
+    answer.say(words, folders=compared.names)
+    answer.say(
+        f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
+    )
+    heads = {"folder": "other run"} | CELL
+    lengths = {"first": first, "other": "other", "difference": "difference", "low": "95 % from", "high": "to"}
+    bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
+    banded = bool(errors[list(bands)].notna().any(axis=None))
+    heads |= {"cells": "cells"} | lengths | (bands if banded else {}) | {"verdict": "verdict"}
+    answer.records("errors", errors, heads, dict.fromkeys(bands, share_text))
+    answer.say("verdict: lower or higher where the test shows it, corrected for the rows of a run; empty: it does not")
     answer.say("\n".join(compared.notes), notes=compared.notes)
     return errors
-
-
-def _difference_words(row: Mapping[Any, Any], places: int, banded: bool) -> list[str]:
-    """One row of a comparison as words, with so many decimals."""
-    known = row["low"] == row["low"] and row["verdict"] != "identical"
-    interval = f" [{row['low']:+.{places}f}, {row['high']:+.{places}f}]" if known else ""
-    amount = "A" if row["N_D"] == 0 else str(row["N_D"])
-    shares = row["coverage_first"], row["coverage_other"]
-    inside = ", ".join("-" if share != share else percent_text(share) for share in shares)
-    return [
-        *(row["family"], row["method"], amount, str(row["cells"])),
-        *(f"{row[side]:.{places}f}" for side in ("first", "other")),
-        f"{row['difference']:+.{places}f}{interval}",
-        *["" if inside == "-, -" else inside] * banded,
-        row["verdict"],
-    ]
-
-
-def _length_with_ends(mean: float, low: float, high: float) -> str:
-    """A length [m] with an interval, in the decimals of the length."""
-    places = length_decimals(mean)
-    return f"{mean:.{places}f} [{low:.{places}f}, {high:.{places}f}]"
-
-
-def _number_with_ends(mean: float, low: float, high: float) -> str:
-    """A number with its interval, if it has one, in the decimals that give the largest of them three digits."""
-    size = max((abs(value) for value in (mean, low, high) if math.isfinite(value)), default=0.0)
-    places = digit_decimals(size, 3)
-    interval = f" [{low:z.{places}f}, {high:z.{places}f}]" if math.isfinite(low) else ""
-    return f"{mean:z.{places}f}{interval}"
 
 
 def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     """Show findings, errors and bands of one study over several worlds; returns the errors."""
     from shipid.answer.compare import compare_errors, compare_findings
 
-    findings, errors = compare_findings(worlds), compare_errors(worlds)
-    bands = errors[errors["width"].notna()]
-    words = ["finding", f"in {len(worlds)} worlds", "number", "mean [95 % over worlds]"]
-    values = [
-        _number_with_ends(row["mean"], row["low"], row["high"]) if row["number"] else ""
-        for row in findings.to_dict("records")
-    ]
-    shown = text_table(words, zip(findings["id"], findings["verdicts"], findings["number"], values, strict=True))
-    answer.rows("findings", findings, shown if len(findings) else None)
-    texts = [_length_with_ends(*numbers) for numbers in errors[["H", "H_low", "H_high"]].to_numpy()]
-    several = bool(errors.duplicated(["family", "N_D"]).any())
-    names = errors["family"] + (" + " + errors["method"]).where((errors["N_D"] > 0) & several, "")
-    wide = errors.assign(text=texts, family=names).pivot(index="family", columns="N_D", values="text")
-    wide = wide.reindex(names.unique()).fillna("-")
-    columns = ["H [m], mean [least, greatest]", *(f"N_D = {amount}" for amount in wide.columns)]
-    answer.rows("errors", errors, text_table(columns, wide.reset_index().to_numpy().tolist()))
-    if len(bands):
-        level = worlds[0].plan.study.bands.level
-        answer.say(
-            f"bands of {level_text(level)}: share of whole test paths inside, and mean radius [m], "
-            "mean [least, greatest]:"
-        )
-    rows = [
-        [
-            *(str(row[name]) for name in ("family", "method", "N_D")),
-            "{:.2f} [{:.2f}, {:.2f}]".format(*(row[f"coverage{end}"] for end in ("", "_low", "_high"))),
-            _length_with_ends(*(row[f"width{end}"] for end in ("", "_low", "_high"))),
-            str(row["worlds"]),
-        ]
-        for row in bands.to_dict("records")
-    ]
-    heads = ["family", "method", "N_D", "coverage", "width [m]", "worlds"]
-    answer.rows("bands", bands, text_table(heads, rows) if rows else None)
+    errors = compare_errors(worlds)
+    heads = {"id": "finding", "verdicts": f"in {len(worlds)} worlds", "number": "number", "mean": "mean over worlds"}
+    answer.records("findings", compare_findings(worlds), heads | {"low": "95 % from", "high": "to"})
+    level = level_text(worlds[0].plan.study.bands.level)
+    answer.say(f"mean, least and greatest over the worlds of H [m], and of bands of {level}: share of whole test paths")
+    for name, what in (("H", "H [m]"), ("coverage", "in band"), ("width", "radius of band [m]")):
+        numbers = {name: what, f"{name}_low": "least", f"{name}_high": "greatest", "worlds": "worlds"}
+        answer.records("errors", errors, CELL | numbers, shown=errors.dropna(subset=name))
     return errors
 
 
@@ -462,17 +317,11 @@ def _prepare_command(
 ) -> tuple[Plan, Path]:
     """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
     from shipid.engine.engines import check_device
-    from shipid.files import check_table
-    from shipid.study.plan import read_plan
-
-    check_device(device)
-    plan = read_plan(study, parse_changes(changes))
-    file = out or Path(f"{plan.name}-{command}.csv")
-    check_table(file)
     from shipid.study.plan import input_files
 
-    check_output(file, input_files(plan), "--out")
-    return plan, file
+    check_device(device)
+    plan = shipid.read_plan(study, parse_changes(changes))
+    return plan, check_output(out or Path(f"{plan.name}-{command}.csv"), input_files(plan), TABLES)
 
 
 def _run_to_report(
@@ -483,7 +332,7 @@ def _run_to_report(
     device: str,
     shard: tuple[int, int] | None = None,
 ) -> None:
-    from shipid.answer.pages import ANSWER, write_pages
+    from shipid.answer.pages import ANSWER
     from shipid.answer.start import event_line
     from shipid.files import quote_argument
     from shipid.study import run, store
@@ -503,7 +352,6 @@ def _run_to_report(
         typer.echo(f"shard {shard[0]} of {shard[1]} is finished. When all are: {resume}")
         return
     with store.in_place(folder, plan), show_steps() as say:
-        report = write_pages(folder, say)
-    for line in (folder / ANSWER).read_text(encoding="utf-8", errors="replace").splitlines():
-        typer.echo(f"  {line}")
+        report = shipid.write_pages(folder, say)
+    typer.echo(indent((folder / ANSWER).read_text(encoding="utf-8", errors="replace").rstrip("\n"), "  "))
     typer.echo(f"report: {report}")

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+import shipid
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
-from shipid.cli.terminal import criterion_table, text_table
-from shipid.errors import ShipidError
+from shipid.cli.outputs import check_output
+from shipid.cli.terminal import CRITERIA
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
 
@@ -32,34 +32,25 @@ def vessel_show(
     as_json: Json = False,
 ) -> None:
     """Show particulars, terms, and every parameter with its dotted path and unit."""
-    from shipid.vessel.load import load_vessel
     from shipid.vessel.schema import PARTICULARS, term_blocks
 
-    ship = load_vessel(vessel)
-    document = ship.document
+    ship = shipid.load_vessel(vessel)
+    document, particulars = ship.document, ship.document.get("particulars", {})
+    known = {key: particulars[key] for key in PARTICULARS if key in particulars}
     terms: list[dict[str, Any]] = [
         {"term": path, "kind": key.split(".")[1], "off": off}
         for off in (False, True)
         for path, key, _ in term_blocks(document, off)
     ]
-    known = {key: document["particulars"][key] for key in PARTICULARS if key in document.get("particulars", {})}
     with open_answer(as_json) as answer:
         words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
         answer.say("\n".join(filter(None, words)), name=ship.name, file=ship.file, digest=ship.digest)
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
         answer.say(f"particulars: {sentence}", particulars=known)
-        rows = ((t["term"], t["kind"] + ", off" * t["off"]) for t in terms)
-        answer.rows("terms", terms, text_table(["term", "kind"], rows))
-        for path, _, block in term_blocks(document):
-            if "table" in block:
-                omega, beta = block["table"]["omega"], block["table"]["beta_deg"]
-                ends = f"{min(omega):g} to {max(omega):g} rad/s"
-                answer.say(f"{path}: {ends}, {len(set(beta))} headings from 0 to 180 deg")
-        answer.rows(
-            "parameters",
-            [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()],
-            text_table(["parameter", "value", "unit"], _parameter_rows(ship.parameters, ship.units)),
-        )
+        answer.records("terms", terms)
+        rows = [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()]
+        heads = {"path": "parameter", "value": "value", "unit": "unit"}
+        answer.records("parameters", rows, heads, {"value": "{:.10g}".format})
 
 
 @app.command("new")
@@ -89,15 +80,12 @@ def vessel_new(
     as_json: Json = False,
 ) -> None:
     """Write a first guess of a vessel from its main particulars: runnable, each number with its formula."""
-    if out.suffix != ".toml":
-        raise ShipidError("a vessel is a TOML file: let the name end in .toml", file=out)
-    if out.exists():
-        raise ShipidError("exists already: choose another name", file=out)
     from shipid.document import check_values
     from shipid.files import write_text
     from shipid.simulation.measured import measure_trials
     from shipid.vessel.template import Particulars, first_guess
 
+    check_output(out, endings=(".toml",))
     check_values({"name": name or ""}, "vessel new")
     given = Particulars(
         length, beam, draught, block, speed, propulsor, ship_type, rpm, shafts, propeller_diameter, rudder_area,
@@ -109,25 +97,9 @@ def vessel_new(
         count = len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)
         answer.say(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s", n=guessed.n, speed=given.service)
-        if guessed.growth < 0:
-            answer.say("course-stable by these formulae", growth=guessed.growth)
-        else:
-            grows = f"a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
-            answer.say(f"course-UNSTABLE by these formulae: {grows}", growth=guessed.growth)
+        grows = "" if guessed.growth < 0 else f": a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
+        answer.say(f"course-{'UNSTABLE' if grows else 'stable'} by these formulae{grows}", growth=guessed.growth)
         judged, notes = measure_trials(guessed.vessel, given.service)
         answer.say("\n".join(guessed.remarks), remarks=guessed.remarks)
-        answer.rows("criteria", judged, criterion_table(judged, []) if judged else None)
+        answer.records("criteria", judged, CRITERIA)
         answer.say("\n".join(notes), notes=notes)
-
-
-def _parameter_rows(values: dict[str, float], units: dict[str, str]) -> Iterator[tuple[str, str, str]]:
-    """Yield rows of dotted path, value, unit; the entries of one table column, `path.0`, `path.1`, ..., share a row."""
-    import re
-    from itertools import groupby
-
-    for stem, group in groupby(values, key=lambda path: re.sub(r"\.\d+$", "", path)):
-        paths = list(group)
-        if len(paths) == 1:
-            yield paths[0], f"{values[paths[0]]:.10g}", units[paths[0]]
-        else:
-            yield f"{stem}.0 ... .{len(paths) - 1}", " ".join(f"{values[p]:g}" for p in paths), units[paths[0]]

@@ -486,7 +486,7 @@ def check_identification(
 
 def write_patch(outcome: Identification, file: Path) -> Path:
     """Write the identified vessel as a patch on its base; an existing file is never overwritten."""
-    return write_new(outcome.patch(file), file, "patch")
+    return write_new(outcome.patch(file), file)
 
 
 def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> pd.DataFrame:

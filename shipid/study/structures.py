@@ -150,7 +150,7 @@ class StructureComparison:
 
 def write_chosen_structure(compared: StructureComparison, file: Path) -> Path:
     """Write the vessel with the chosen structure; it is read again to be sure. An existing file is kept."""
-    written = write_new(compared.document(), file, "vessel")
+    written = write_new(compared.document(), file)
     load_vessel(str(written.resolve()))
     return written
 

@@ -33,7 +33,6 @@ THREADS = {  # group, the module of that name -> threads that PyTorch may use
 }
 ASKED = {
     "coverage": 1,
-    "observer": 1,
     "strangers": 1,
     "bands": 1,
     "verdicts": 1,

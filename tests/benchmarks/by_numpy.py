@@ -6,13 +6,44 @@ from typing import Any
 
 import numpy as np
 
-from tests.benchmarks.by_hand import Model
+from shipid.vessel.load import Vessel
+
+MOTIONS = ("1", "u", "v", "r", "|u|", "|v|", "|r|")
+DERIVATIVES = "hull.derivatives."
 
 Array = np.ndarray[Any, Any]
 
 
-class Fleet(Model):
-    """The model of `by_hand` for many samples at once, with wind."""
+class Fleet:
+    """The vessel as one writes it by hand, for many samples at once, with wind."""
+
+    def __init__(self, vessel: Vessel) -> None:
+        value = vessel.parameters
+        self.base = np.array([x for path, x in value.items() if path.startswith(DERIVATIVES)])
+        names = [path.removeprefix(DERIVATIVES) for path in value if path.startswith(DERIVATIVES)]
+        self.factors = np.array([[MOTIONS.index(each) for each in _factors(name)] for name in names]).T
+        self.axis = np.array([["XYN".index(name[0]) == row for name in names] for row in range(3)], dtype=float)
+        m, I_z = value["inertia.m"], value["inertia.I_z"]
+        self.m, self.value = m, value
+        self.added = -np.array(
+            [
+                [value["added_mass.X_udot"], 0, 0],
+                [0, value["added_mass.Y_vdot"], value["added_mass.Y_rdot"]],
+                [0, value["added_mass.N_vdot"], value["added_mass.N_rdot"]],
+            ]
+        )
+        self.inverse = np.linalg.inv(np.diag([m, m, I_z]) + self.added)
+        self.sides = [
+            {
+                key.removeprefix(f"thruster.{side}."): x
+                for key, x in value.items()
+                if key.startswith(f"thruster.{side}.")
+            }
+            for side in ("port", "starboard")
+        ]
+        wind = vessel.document["wind"]
+        self.gamma, self.air = np.array(wind["gamma_deg"]), [np.array(wind[name]) for name in ("C_X", "C_Y", "C_N")]
+        self.area = value["wind.A_FW"], value["wind.A_LW"], value["wind.L_oa"], value["constants.rho_a"]
 
     def roll_out(self, state: Array, commands: Array, wind: Array, step: float, num_steps: int) -> Array:
         """States (6, S) after `num_steps` steps from north, east, psi, u, v, r (6, S); commands (4, S), wind (2, S).
@@ -75,3 +106,13 @@ class Fleet(Model):
         C_X, C_Y, C_N = (np.interp(angle, self.gamma, values) for values in self.air)
         q, sense = rho / 2 * (u**2 + v**2), np.sign(gamma)
         return np.stack([q * front * C_X, sense * q * side * C_Y, sense * q * side * length * C_N])
+
+
+def _factors(name: str) -> list[str]:
+    """`Y_v|r|` -> v, |r|, 1: three factors."""
+    rest, factors = name.split("_", 1)[1], []
+    while rest:
+        size = 3 if rest[0] == "|" else 1
+        factors.append(rest[:size])
+        rest = rest[size:]
+    return [*factors, "1", "1"][:3]

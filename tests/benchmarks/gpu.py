@@ -1,4 +1,4 @@
-"""A GPU against all cores of the processor: rollouts of gunnerus-28.9, and batches of the study `simulation`."""
+"""A GPU against all cores of the processor: rollouts of gunnerus-28.9."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ import numpy as np
 import torch
 
 from shipid.engine.rollout import rollout
-from shipid.study.plan import read_plan, whole_unit
-from shipid.study.prepare import obtain_runs, prepare
-from shipid.study.run import run_unit
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.rollouts import STEPS, inputs, variants
 from tests.benchmarks.timing import best_of, clock
@@ -19,13 +16,13 @@ SIZES = ((6016, 1), (6016, 16), (60160, 16))  # samples, variants
 
 
 def run() -> dict[str, Any]:
-    """Million steps per second with the final states, first calls, and seconds of a batch of 21 models."""
+    """Million steps per second with the final states, and first calls."""
     if not torch.cuda.is_available():
         return {"GPU": "PyTorch sees none"}
     figures: dict[str, Any] = {"GPU": torch.cuda.get_device_name()}
     for samples, count in SIZES:
         figures |= _rollouts(samples, count)
-    return figures | _batches()
+    return figures
 
 
 def _rollouts(samples: int, count: int) -> dict[str, Any]:
@@ -49,20 +46,3 @@ def _rollouts(samples: int, count: int) -> dict[str, Any]:
     size = f"{samples} samples, {count} variants"
     work = samples * count * STEPS / 1e6
     return {f"{size}: {name} [million steps/s]": round(work / took, 1) for name, took in seconds.items()}
-
-
-def _batches() -> dict[str, Any]:
-    plan = read_plan("simulation", {"method.0.kind": "path-drawn"})
-    dataset = obtain_runs(plan)
-    of_amount = {batch.N_D: batch for batch in plan.batches}
-    ends = [of_amount[10], of_amount[10], of_amount[100]]
-    figures, errors = {}, {}
-    for device in ("cpu", "cuda"):
-        prepared = prepare(plan, dataset, device)
-        for batch in ends:  # the first is timed twice: what is loaded once is not its price
-            rows = []
-            took = clock(lambda: rows.extend(run_unit(plan, prepared, whole_unit(plan, batch), device)))  # noqa: B023
-            figures[f"batch, N_D {batch.N_D}, one thread, {device} [s]"] = round(took, 1)
-            errors[device, batch.N_D] = np.array([cell.row["H"] for cell in rows])
-    apart = max(float(np.abs(errors["cuda", n] - errors["cpu", n]).max()) for n in (10, 100))
-    return figures | {"H apart, at most [mm]": round(1000 * apart, 3)}

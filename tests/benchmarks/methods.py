@@ -4,18 +4,60 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shipid.hybrid.method import Case, Method, Task
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.study.plan import whole_unit
+from shipid.metrics import position_error, summarise_errors
+from shipid.study.plan import Batch, Plan, read_plan, whole_unit
+from shipid.study.prepare import PreparedStudy, instants_of, obtain_runs, physics_of, prepare
 from shipid.study.run import run_unit
-from tests.benchmarks.yardstick import KEPT, Cell, tune_cell, world
 
 DRAWN = PathDrawn()
-world = cache(world)
+KEPT = Path(__file__).with_name("yardstick.json")  # `path-trained` on cells of worlds that no method was chosen on
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of the study `simulation` in another world (top-level `seed`)."""
+
+    world: int
+    N_D: int
+    model: str
+
+
+@cache
+def world(number: int) -> tuple[Plan, PreparedStudy]:
+    """The study `simulation` in a world: its plan and all that its cells need."""
+    plan = read_plan("simulation", {"seed": number, "method": [{"name": "drawn", "kind": "path-drawn"}]})
+    return plan, prepare(plan, obtain_runs(plan))
+
+
+def tune_cell(plan: Plan, prepared: PreparedStudy, cell: Cell, method: Method) -> dict[str, Any]:
+    """Tune one cell alone, on one thread: core-seconds, H and H_90 [m], and its trials."""
+    batch = Batch(cell.N_D, plan.batches[0].seed)
+    mask = np.isin(prepared.pool.run, prepared.runs(batch))
+    windows = prepared.pool.select(mask)
+    vessel = next(one.vessel for one in prepared.foundations if one.name == cell.model)
+    physics = physics_of(plan.study, vessel)
+    folds = prepared.folds(batch, windows, method.validation)
+    case = Case(physics, prepared.pool_paths[cell.model][:, mask])
+    start = time.process_time()
+    fit = method.fit(Task({cell.model: case}, windows, folds, prepared.commands, seed=batch.seed))[cell.model]
+    seconds = time.process_time() - start
+    assert fit.corrector is not None
+    instants = instants_of(plan.study, vessel, prepared.data, prepared.test)
+    paths = fit.corrector.predict(physics, instants, prepared.test_paths[cell.model])
+    error = summarise_errors(position_error(paths, prepared.test.future))
+    alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]
+    row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}
+    chosen = dict(fit.corrector.hyperparameters)
+    return {**row, "H_90": error["p90"], "core_seconds": seconds, "chosen": chosen, "trials": fit.trials}
 
 
 def run() -> dict[str, Any]:

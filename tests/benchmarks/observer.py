@@ -1,8 +1,7 @@
-"""What the observer buys in seeded worlds with waves, wind and current; `python -m tests.benchmarks.observer`."""
+"""What the observer buys in seeded worlds with waves, wind and current."""
 
 from __future__ import annotations
 
-import time
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -148,30 +147,3 @@ def errors(
     ideal |= {"observer.current_north": current[0], "observer.current_east": current[1]}
     floor = mean(ideal)
     return {"alone": alone, "observer": seen, "floor": floor}
-
-
-def run() -> dict[str, float]:
-    """Figures of one vessel in three worlds; printed as a table by `python -m tests.benchmarks.observer`."""
-    vessels = physics(("nominal", "moderate-3", "moderate-10", "high-3", "high-4"))
-    how = {
-        "waves, current, changing": {"runs": 16, "duration": 210.0, "waves": True, "current": True, "changing": True},
-        "waves, constant orders": {"runs": 16, "duration": 210.0, "waves": True, "current": False, "changing": False},
-        "calm": {"runs": 16, "duration": 210.0, "waves": False, "current": False, "changing": True},
-    }
-    figures: dict[str, float] = {}
-    for label, given in how.items():
-        made = world("gunnerus-28.9-6dof", 11, **given)  # type: ignore[arg-type]
-        for name, vessel in vessels.items():
-            for known in (True, False):
-                rms = errors(vessel, made, known=known)
-                text = f"{label}, {name}, {'known' if known else 'held'}"
-                figures |= {f"{text}: {key} [m]": round(value, 2) for key, value in rms.items()}
-        begun = time.perf_counter()
-        run_observer(vessels["nominal"], made.data)
-        figures[f"{label}: update [ms]"] = round(1e3 * (time.perf_counter() - begun) / len(made.data.frame), 2)
-    return figures
-
-
-if __name__ == "__main__":
-    for label, figure in run().items():
-        print(f"{label:70s} {figure:g}")

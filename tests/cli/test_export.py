@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
@@ -41,14 +40,3 @@ def test_a_folder_is_no_cell_but_has_some(tmp_path):
     result = CliRunner().invoke(app, ["export", str(tmp_path), "--to", "c", "--out", str(tmp_path / "ship")])
     assert result.exit_code == 1
     assert "name one of its cells, FOLDER/cells/NAME.npz" in str(result.exception)
-
-
-@pytest.mark.parametrize("name", ["a.casadi", "a.casadi.json"])
-def test_no_file_beside_a_function_takes_the_place_of_what_is_read(name, tmp_path):
-    """Before, the names of its inputs were written over the vessel."""
-    vessel = tmp_path / name
-    vessel.write_text('base = "gunnerus-28.9"\nname = "mine"\n')
-    before = vessel.read_bytes()
-    result = CliRunner().invoke(app, ["export", str(vessel), "--to", "casadi", "--out", str(tmp_path / "a.casadi")])
-    assert "is named twice, and would be written over" in str(result.exception)
-    assert (list(tmp_path.iterdir()), vessel.read_bytes()) == ([vessel], before)

@@ -20,7 +20,7 @@ def test_options_are_read_before_anything_is_loaded(tmp_path: Path) -> None:
     for arguments, remedy in (
         (["--prior", "hull.derivatives.*"], "--prior: 'hull.derivatives.*': write paths=0.3"),
         (["--bounds", "hull.derivatives.*=[0.5"], "--bounds: 'hull.derivatives.*=[0.5': write paths=[0.5,2]"),
-        (["--html", "page.pdf"], "page.pdf: a page is an HTML file"),
+        (["--html", "page.pdf"], "page.pdf: --html: let the name end in .html"),
         (["--folds", "2"], "--folds: goes with --structures"),
     ):
         out = ["--out", str(tmp_path / "patch.toml")]
@@ -56,7 +56,7 @@ def test_the_answer_of_a_comparison_for_programs_has_all_that_is_shown(capsys: p
         [{"structure": "mmg", "numbers": 3, **dict.fromkeys(("u", "v", "r", "position", "more", "low", "high"), 0.1)}]
     ).assign(test=0.1, note="")
     diverges = {"structure": "mmg", "manoeuvre": "turning 35 to port", "measure": "", "note": "diverges"}
-    spread = {"manoeuvre": "turning 35 to port", "measure": "advance", "spread": 2.0}
+    spread = {"manoeuvre": "turning 35 to port", "measure": "advance", "spread": 2.0, "width": 1.0}
     compared = SimpleNamespace(
         vessel=load_vessel("gunnerus-28.9"), runs=("a", "b"), ahead=20.0, table=table, groups=[], sentences=["best"],
         manoeuvres=pd.DataFrame([diverges]), spread=pd.DataFrame([spread]), shared=("shared",), chosen="mmg",

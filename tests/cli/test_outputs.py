@@ -41,12 +41,10 @@ def there(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     [
         "manoeuvre ./ship.toml zigzag 20 20 --out ship.toml",
         "manoeuvre ./ship.toml zigzag 20 20 --out link.html",
-        "manoeuvre ./ship.toml zigzag 20 20 --out a.html --csv a.html",
         "data measures log.parquet --csv log.parquet",
         "data measures log.parquet --csv ../there/log.parquet",
         "data measures link.parquet --csv log.parquet",
         "replay ./ship.toml log.parquet --csv log.parquet",
-        "data check log.parquet --html log.parquet",
     ],
 )
 def test_what_is_read_is_not_written(words: str, there: Path) -> None:
@@ -72,9 +70,9 @@ def test_what_is_read_is_not_written(words: str, there: Path) -> None:
     ],
 )
 def test_a_dataset_or_page_of_another_ending_is_refused_before_anything_is_read(words: str) -> None:
-    what = "a dataset is a Parquet file" if "a.csv" in words else "a page is an HTML file"
     file, ending = ("a.csv", ".parquet") if "a.csv" in words else ("a.htm", ".html")
-    assert ended(*words.split()) == (1, "", f"error: {file}: {what}: let the name end in {ending}\n")
+    option = words.split()[-2]
+    assert ended(*words.split()) == (1, "", f"error: {file}: {option}: let the name end in {ending}\n")
 
 
 @pytest.mark.usefixtures("there")
@@ -86,8 +84,8 @@ def test_what_cannot_be_written_is_refused_before_anything_is_computed(monkeypat
     Path("locked").mkdir()
     for name in ("locked/a.html", "locked/new/a.html"):
         with pytest.raises(ShipidError, match="is in a folder that this user may not write into: name another"):
-            check_output(Path(name), [], "--out")
-    check_output(Path("new/a.html"), [], "--out")
+            check_output(Path(name))
+    check_output(Path("new/a.html"))
 
 
 def test_no_file_of_results_is_written_over(there: Path) -> None:
@@ -128,27 +126,7 @@ def test_every_command_is_guarded() -> None:
     leaves = commands(typer.main.get_command(app))
     assert len(leaves) > 20
     assert all(isinstance(one, GuardedCommand) for one in leaves)
-    assert {name for one in leaves for param in one.params for name in [param.name] if name in OUTPUTS} == set(OUTPUTS)
-
-
-STAGES = (  # what a command calls one after the other, before its own work
-    "shipid.cli._check_encoding",
-    "shipid.cli.log_to_stderr",
-    "shipid.cli.outputs.isfinite",
-    "shipid.cli.outputs.check_output",
-    "shipid.cli.outputs.raise_interrupts",
-)
-
-
-@pytest.mark.parametrize("stage", STAGES)
-def test_ctrl_c_before_a_command_begins_is_one_line(stage: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before, it ended without a word there."""
-
-    def pressed(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(stage, pressed)
-    assert ended("manoeuvre", "mariner", "zigzag", "10", "10", "--out", "a.html") == (130, "", "interrupted\n")
+    assert {param.name for one in leaves for param in one.params} >= set(OUTPUTS)
 
 
 def test_ctrl_c_is_one_line_in_every_command(monkeypatch: pytest.MonkeyPatch) -> None:

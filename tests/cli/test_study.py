@@ -13,18 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.document import bundled_documents
 from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study import run
 from shipid.study.store import DATASET, read_rows
 from tests.cli.running import ended, output_of
 from tests.study.tiny import TINY, without_figures, without_workers
-
-
-def test_studies() -> None:
-    text = output_of("study", "list")
-    assert all(f" {name} " in text for name in bundled_documents("studies"))
 
 
 @pytest.mark.parametrize("command", ["screen", "rotate"])
@@ -54,9 +48,8 @@ def test_screen_writes_a_row_per_member(study: Path) -> None:
     shown = re.search(r"^ *wrong +6 +0 +([\d. ]+)$", text, re.MULTILINE)
     assert shown
     expected = np.quantile(frame["A"], [0.05, 0.25, 0.5, 0.75, 0.95])
-    np.testing.assert_allclose([float(word) for word in shown[1].split()], expected, atol=0.005)
+    np.testing.assert_allclose([float(word) for word in shown[1].split()], expected, atol=0.001)
     assert "what drives A" not in text
-    assert "wrong: 6 members show no driver of A" in text
     many = output_of("study", "screen", study, "--members", "300", "--out", "many.csv")
     listed = re.findall(r"^ *wrong +hull\.derivatives\.\S+ +[+-]\d\.\d\d +[+-]\d\.\d\d *$", many, re.MULTILINE)
     assert 1 <= len(listed) <= 5
@@ -64,7 +57,7 @@ def test_screen_writes_a_row_per_member(study: Path) -> None:
     pd.testing.assert_frame_equal(pd.read_parquet("new/rows.parquet"), frame[:2], rtol=1e-12)
     for arguments, remedy in (
         (["right"], "'right' draws no factor from a range"),
-        (["--out", "rows.txt"], "ending in .parquet or .csv"),
+        (["--out", "rows.txt"], "end in .parquet or .csv"),
     ):
         with pytest.raises(ShipidError, match=re.escape(remedy)):
             output_of("study", "screen", study, *arguments)

@@ -8,25 +8,15 @@ from collections.abc import Iterator
 import pytest
 
 
-def test_a_table_prints_text_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
-    from shipid.cli.terminal import print_table, text_table
-
-    print_table(text_table(["speed [m/s]"], [["[bold]4"]]))
-    out = capsys.readouterr().out
-    assert "speed [m/s]" in out
-    assert "[bold]4" in out
-
-
 def test_without_a_terminal_a_row_is_one_line_and_columns_stay_in_line(capsys: pytest.CaptureFixture[str]) -> None:
     """A search for a name finds the whole row."""
-    from shipid.cli.terminal import print_table, text_table
+    from shipid.cli.terminal import print_table
 
-    print_table(text_table(["ship", "H [m]"], [["b", 1.5], ["a", "x" * 300]]))
+    print_table(["ship", "H [m]"], [["b", "[bold]4"], ["a", "x" * 300]])
     first, heading, rule, *rows, last = capsys.readouterr().out.splitlines()
     assert (first, heading, last) == ("", "  ship   H [m]", "")
-    assert rows == ["  b      1.5", f"  a      {'x' * 300}"]
+    assert rows == ["  b      [bold]4", f"  a      {'x' * 300}"]
     assert set(rule.strip()) == {"\u2500"}
-    print_table(text_table([], []))
 
 
 def test_digits() -> None:
@@ -41,10 +31,11 @@ def test_digits() -> None:
 
 
 def test_a_table_of_measures_has_no_minus_zero(capsys: pytest.CaptureFixture[str]) -> None:
-    from shipid.cli.terminal import measure_table, print_table
+    from shipid.cli.answer import Answer
+    from shipid.cli.terminal import MEASURE_FORMATS, MEASURES
 
     row = {"measure": "lateral deviation", "value": -1e-7, "unit": "m", "lengths": -3e-9, "note": ""}
-    print_table(measure_table([row], []))
+    Answer(False).records("measures", [row], MEASURES, MEASURE_FORMATS)
     out = capsys.readouterr().out
     assert "0.00" in out
     assert "-" not in out
@@ -71,23 +62,3 @@ def test_an_interruption_says_what_is_kept(capsys: pytest.CaptureFixture[str]) -
         list(count_blocks(blocks(), 3, "cells", "what is finished is kept"))
     assert end.value.code == 130
     assert capsys.readouterr().err == "what is finished is kept\n"
-
-
-def test_where_there_is_no_terminal_counted_says_how_far_it_is(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A rotation of an hour whose output goes to a file is not silent, also before its first cell."""
-    from shipid.cli import terminal
-    from shipid.cli.terminal import count_blocks
-
-    monkeypatch.setattr(terminal, "SILENCE", 0.02)
-
-    def slowly() -> Iterator[list[int]]:
-        for block in ([1, 2], [3]):
-            time.sleep(0.1)
-            yield block
-
-    assert list(count_blocks(slowly(), 3, "cells")) == [[1, 2], [3]]
-    lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "0 of 3 cells"
-    assert any(line.startswith("2 of 3 cells") for line in lines)

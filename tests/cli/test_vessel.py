@@ -19,16 +19,7 @@ def test_vessels() -> None:
     ship = load_vessel("gunnerus-28.9")
     text = output_of("vessel", "show", "gunnerus-28.9")
     assert ship.digest in text
-    columns = {
-        stem: re.search(rf"^\s*{stem}\.0 \.\.\. \.18 +(.+?)\s+-\s*$", text, re.MULTILINE)
-        for stem in ("wind.C_X", "wind.C_Y")
-    }
-    for stem, shown in columns.items():
-        assert shown, stem
-        assert [float(number) for number in shown[1].split()] == [ship.parameters[f"{stem}.{i}"] for i in range(19)]
     for path, value in ship.parameters.items():
-        if re.fullmatch(r"wind\.\w+\.\d+", path):
-            continue
         shown = re.search(rf"^\s*{re.escape(path)} +(\S+)", text, re.MULTILINE)
         assert shown, path
         assert float(shown[1]) == pytest.approx(value, rel=1e-9)
@@ -45,7 +36,10 @@ def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
     assert "First guess, 33.9 m" in output_of("vessel", "show", file)
     written = file.read_text()
     status, _, err = ended(*order)
-    assert (status, err) == (1, f"error: {file}: exists already: choose another name\n")
+    assert (status, err) == (
+        1,
+        f"error: {file}: --out: exists already and is not written over: name another file to write\n",
+    )
     assert file.read_text() == written
 
 

@@ -49,7 +49,7 @@ def test_it_prints_the_estimates_and_writes_a_patch_and_a_page(file: Path, monke
         *("--profile", ONE, "--design", "--html", "page.html"),
     )
     rows = {row.split()[0]: row.split() for row in text.splitlines() if row.split()}
-    assert float(rows[ONE][-6]) == pytest.approx(0.8, abs=0.01)
+    assert float(rows[ONE][-5]) == pytest.approx(0.8, abs=0.01)
     assert rows[ONE][-1] == "yes"
     assert "2 fitted" in text
     assert "1 held out" in text

@@ -371,7 +371,7 @@ def test_a_bad_settings_file_is_one_line(text: str, message: str, tmp_path: Path
 
 def test_a_change_of_settings_that_reaches_nothing_is_one_line() -> None:
     """Before, `--set horizon.x=1` ended in a traceback."""
-    with pytest.raises(DocumentError, match=r"identify\.horizon is no table") as error:
+    with pytest.raises(DocumentError, match=r"there is no .x.") as error:
         read_settings(None, {"horizon": 20, "horizon.x": 1})
     assert error.value.path == "identify.horizon.x"
 

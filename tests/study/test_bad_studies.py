@@ -24,7 +24,7 @@ BROKEN = {
     "dataset-with-repairs": ("data", "go with a `mapping`"),
     "unknown-truth-vessel": ("truth.vessel", "did you mean 'gunnerus-"),
     "truth-sets-unknown-block": ("truth.set.thruster.port.lag", "unknown key: valid: D_p"),
-    "truth-sets-inside-a-number": ("truth.set.inertia.m.x", "inertia.m is no table: nothing can be below it"),
+    "truth-sets-inside-a-number": ("truth.set.inertia.m.x", "there is no 'x': nothing is defined there"),
     "truth-range-backwards": ("truth.manoeuvre.0", "start_speed has low > high"),
     "truth-orders-of-old": ("truth.n_rpm", "unknown key"),
     "truth-of-no-kind": ("truth.manoeuvre.0", "did you mean 'zigzag'"),
@@ -148,17 +148,12 @@ def test_no_such_study(name: str) -> None:
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("method.3.trials", "there is no method.3: method has 1 entry, method.0"),
-        ("family.2.members", "there is no family.2: family has 2 entries, family.0 to family.1"),
-        ("family.1.perturb.4.factor", "there is no family.1.perturb.4: family.1.perturb has 1 entry"),
-        ("grid.N_D.2", "there is no grid.N_D.2: grid.N_D has 2 entries, grid.N_D.0 to grid.N_D.1"),
-        ("family.nobody.members", "there is no family.nobody: valid: right, wrong"),
-        ("family.wrnog.members", "--set: there is no family.wrnog: did you mean 'wrong'?"),
-        ("split.test.x", "--set: split.test is no table"),
-        ("family.wrong.perturb.4.factor", "there is no family.wrong.perturb.4: family.wrong.perturb has 1 entry"),
+        ("family.2.members", "--set: there is no '2': valid: right, wrong"),
+        ("family.wrnog.members", "--set: there is no 'wrnog': did you mean 'wrong'?"),
+        ("family.wrong.perturb.4.factor", "there is no '4': valid: 0"),
     ],
 )
-def test_a_change_beyond_a_list_says_how_long_it_is(path: str, message: str) -> None:
+def test_a_change_beyond_a_list_names_its_entries(path: str, message: str) -> None:
     with pytest.raises(DocumentError) as caught:
         read_plan(FOLDER / "plain.toml", {path: 7})
     assert message in str(caught.value)

@@ -161,5 +161,5 @@ def test_a_path_is_a_path_whatever_its_type(tmp_path: Path, monkeypatch: pytest.
     for wrong in (None, 3, []):
         with pytest.raises(DocumentError, match="is no name of a document"):
             load_vessel(wrong)  # type: ignore[arg-type]
-    with pytest.raises(DocumentError, match="an empty name"):
+    with pytest.raises(DocumentError, match="no vessel of this name"):
         load_vessel("")
