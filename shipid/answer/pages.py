@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from shipid.answer import bands, frames, memory, methods, sentences
+from shipid.answer import bands, frames, methods, sentences
 from shipid.answer.error_table import intervals_frame
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
@@ -29,9 +29,7 @@ Say = Callable[[str], object]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
-    "memory": memory.memory_frame,
     "coverage": bands.coverage_frame,
-    "coverage_groups": bands.groups_frame,
     "no_band": bands.refused_frame,
     "methods": methods.methods_frame,
     "intervals": intervals_frame,

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,72 +41,53 @@ def choose_turns(plan: Plan, dataset: Dataset, patterns: Sequence[str]) -> list[
     """Runs with windows that match any pattern, in the order of the dataset; DocumentError where one matches none."""
     cut = all_windows(plan, dataset).spans
     runs = [run for run in dataset.runs if run in cut]
-    chosen: set[str] = set()
-    for pattern in patterns:
-        matching = documents.match_paths(pattern, runs)
-        if not matching:
+    matching = {pattern: documents.match_paths(pattern, runs) for pattern in patterns}
+    for pattern, matches in matching.items():
+        if not matches:
             raise DocumentError(f"{pattern!r} matches no run: {suggest_name(pattern, runs)}", path="--tests")
-        chosen.update(matching)
-    if len(chosen) < 2:
-        message = f"only {chosen.pop()!r} matches: take turns with two or more of {', '.join(runs)}"
-        raise DocumentError(message, path="--tests")
-    return [run for run in runs if run in chosen]
+    return [run for run in runs if any(run in matches for matches in matching.values())]
 
 
 def rotate_test_runs(
-    plan: Plan, dataset: Dataset, tests: Sequence[str], device: str = "cpu", kept: Path | None = None
+    plan: Plan, dataset: Dataset, tests: Sequence[str], kept: Path, device: str = "cpu"
 ) -> Iterator[pd.DataFrame]:
     """Set one run aside after the other, train on all others, and yield the cells of each turn.
 
     A row has test, foundation, family, method, N_D (runs that were left), seed, A, H, H_90 [m], coverage
     [1] and width [m] of the band, naive [m], status. No training window shares a moment with the test run.
 
-    Parameters
-    ----------
-    kept : folder for the runs of the turns, each a study of its own; made where it is not there. The same call with the
-        same folder goes on after an interruption, and yields the same digits. None: nothing is kept.
+    kept : folder for the turns, each a study of its own: the same call goes on after an interruption.
     """
-    with TemporaryDirectory() if kept is None else nullcontext(kept) as place:
-        for test in tests:
-            rest, _, _ = partition(rotated_plan(plan, test, 2), dataset)
-            changes = {"split.test": [test], "grid.N_D": [len(rest.spans)]}
-            turn = build_plan(
-                documents.replace_values(plan.document, changes), Path(plan.file), plan.vessels, plan.sources
-            )
-            folder = Path(place) / documents.digest_document(test)
-            for _ in run_study(turn, folder, device=device):
-                pass
-            floor = float(store.read_test(folder)[2].mean())
-            yield read_cells(folder).assign(test=test, naive=floor)[TURN_COLUMNS]
+    for test in tests:
+        rest, _, _ = partition(rotated_plan(plan, test, 2), dataset)
+        changes = {"split.test": [test], "grid.N_D": [len(rest.spans)]}
+        document = documents.replace_values(plan.document, changes)
+        turn = build_plan(document, Path(plan.file), plan.vessels, plan.sources)
+        folder = kept / documents.digest_document(test)
+        for _ in run_study(turn, folder, device=device):
+            pass
+        floor = float(store.read_test(folder)[2].mean())
+        yield read_cells(folder).assign(test=test, naive=floor)[TURN_COLUMNS]
 
 
 def kept_folder(file: Path, plan: Plan, dataset: Dataset, device: str = "cpu") -> Path:
     """Folder of the turns of an interrupted rotation: one for each study, dataset, device and code."""
     vessels = {name: vessel.digest for name, vessel in plan.vessels.items()}  # the digest has them without their names
     decides = [plan.digest, vessels, dataset.digest, device, code_digest(), own_code(plan)]
-    return file.with_name(f"{file.name}.turns") / documents.digest_document(decides)
-
-
-def remove_kept(kept: Path) -> None:
-    """Remove the folder of kept turns, whose table is written."""
-    shutil.rmtree(kept, ignore_errors=True)
-    with suppress(OSError):  # of another rotation to the same file
-        kept.parent.rmdir()
+    return file.with_name(f"{file.name}.turns-{documents.digest_document(decides)}")
 
 
 def turns_table(frame: pd.DataFrame) -> pd.DataFrame:
     """A row per foundation and method over the turns, seeds averaged: A, H, its range, H_90 [m], turns where H < A."""
     good = frame[frame["status"] == "ok"].reindex(columns=TURN_COLUMNS)  # frames of older turns have no bands
     numbers = ["A", "H", "H_90", "coverage", "width"]
-    per_turn = good.groupby(["test", "foundation", "family", "method"], sort=False)[numbers].mean().reset_index()
-    rows = []
-    for (foundation, method), part in per_turn.groupby(["foundation", "method"], sort=False):
-        row: dict[str, Any] = {"foundation": foundation, "method": method, "turns": len(part)}
-        row |= {name: part[name].mean() for name in numbers}
-        row |= {"least": part["H"].min(), "greatest": part["H"].max()}
-        compensated = part["A"].notna().all() and not (part["H"] == part["A"]).all()
-        rows.append(row | {"better": (part["H"] < part["A"]).sum() if compensated else np.nan})
-    return pd.DataFrame(rows)
+    turns = good.groupby(["test", "foundation", "method"], sort=False)[numbers].mean().reset_index()
+    compensated = turns["A"].notna() & turns["H"].ne(turns["A"])
+    turns["better"] = turns["H"].lt(turns["A"]).astype(float).where(compensated)
+    means = {name: (name, "mean") for name in numbers}
+    grouped = turns.groupby(["foundation", "method"], sort=False)
+    table = grouped.agg(turns=("test", "size"), **means, least=("H", "min"), greatest=("H", "max"))
+    return table.assign(better=grouped["better"].sum(min_count=1)).reset_index()
 
 
 def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[ClaimVerdict]:
@@ -120,27 +97,23 @@ def turn_findings(frame: pd.DataFrame, plan: Plan) -> list[ClaimVerdict]:
     the numbers of either model were set from runs that test. Nothing without `accurate` and `inaccurate`, or where
     fewer than two turns have what they need.
     """
-    claims = plan.study.claims
+    claims, tests = plan.study.claims, set(frame["test"])
     if claims is None or claims.accurate is None or claims.inaccurate is None:
         return []
-    tests = set(frame["test"])
     if unfair := unfair_reason(plan, tests):
         return leave_undecided(FULL_SCALE_RULES, unfair)
-    aside = {*uncounted_families(plan), *families_set_from(plan, tests)}
+    aside, rivals = {*uncounted_families(plan), *families_set_from(plan, tests)}, (claims.accurate, claims.inaccurate)
     mine = frame[(frame["method"] == verdict_method(plan)) & ~frame["family"].isin(aside)]
-    good, bad = claims.accurate, claims.inaccurate
-    mine = mine.assign(model=mine["family"].where(mine["family"].isin([good, bad]), mine["foundation"]))
-    H = mine[mine["status"] == "ok"].pivot_table(index="test", columns=["model", "seed"], values="H")
+    mine = mine.assign(model=mine["family"].where(mine["family"].isin(rivals), mine["foundation"]))
+    good = mine[mine["status"] == "ok"]
+    H = good.pivot_table(index="test", columns=["model", "seed"], values="H").dropna()
     models = list(dict.fromkeys(H.columns.get_level_values(0)))
-    if any(name not in models for name in (good, bad, NO_MODEL)):
+    if not {*rivals, NO_MODEL} <= set(models) or len(H) < 2:
         return []
-    H = H.dropna()
     A = mine.pivot_table(index="test", columns="model", values="A").loc[H.index].dropna(axis=1)
-    if len(H) < 2:
-        return []
     errors = {name: H[name].to_numpy(dtype=float).T[None] for name in models}
     alone = {str(name): values.to_numpy(dtype=float) for name, values in A.items()}
-    table = ErrorTable((1,), np.ones(len(H)), alone, errors)
     steps = {name: values[0].mean(axis=0)[None] for name, values in errors.items()}
     steps |= {f"{name} alone": values[None] for name, values in alone.items()}
-    return judge_rivals(Rivals(table, good, bad, steps), remedy="name more runs with --tests")
+    table = ErrorTable((1,), np.ones(len(H)), alone, errors)
+    return judge_rivals(Rivals(table, *rivals, steps), remedy="name more runs with --tests")

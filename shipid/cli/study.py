@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -183,11 +184,11 @@ def study_rotate(
     import pandas as pd
 
     kept = rotate.kept_folder(file, plan, dataset, device)
-    blocks = rotate.rotate_test_runs(plan, dataset, wanted, device, kept)
-    sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
+    blocks = rotate.rotate_test_runs(plan, dataset, wanted, kept, device)
+    sentence = f"interrupted; what is finished is kept in {kept}: the same command goes on from there"
     frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
     write_table(file, frame)
-    rotate.remove_kept(kept)
+    shutil.rmtree(kept, ignore_errors=True)
     columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
     over = rotate.turns_table(frame)
     from shipid.study.plan import model_label

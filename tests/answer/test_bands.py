@@ -72,12 +72,10 @@ def test_a_study_of_several_methods_says_whose_bands_it_speaks_of(results: Resul
     assert f" models of the methods {' and '.join(named)} with {most} runs" in said
 
 
-def test_groups_of_the_largest_amount(results: Results) -> None:
-    frame, groups = bands.coverage_frame(results), bands.groups_frame(results)
+def test_the_higher_the_level_the_wider(results: Results) -> None:
+    frame = bands.coverage_frame(results)
     width = frame.pivot_table(index=["model", "N_D"], columns="level", values="width").diff(axis=1)
-    assert (width.fillna(0.0) >= 0).all(axis=None), "the higher the level, the wider"
-    assert set(groups["by"]) == {"kind", "ahead"}
-    assert (groups["low"] <= groups["coverage"] + 1e-9).all()
+    assert (width.fillna(0.0) >= 0).all(axis=None)
 
 
 def test_a_model_without_physics_that_has_failed_has_no_part_in_the_promise(results: Results) -> None:

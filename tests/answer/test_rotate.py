@@ -13,7 +13,6 @@ import pytest
 
 from shipid.answer.rotate import (
     choose_turns,
-    remove_kept,
     rotate_test_runs,
     turn_findings,
     turns_table,
@@ -62,9 +61,9 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
     """The same call goes on where it was interrupted, and yields the same digits."""
     plan, dataset = recorded(weaving(), split={"test": ["f"]}, prediction={"ahead": 5.0}, grid={"N_D": [5]})
     with without_workers():
-        next(rotate_test_runs(plan, dataset, ["a", "b"], kept=tmp_path / "kept"))
+        next(rotate_test_runs(plan, dataset, ["a", "b"], tmp_path / "kept"))
         before = [file.stat().st_mtime_ns for file in tmp_path.glob("kept/*/batches/*")]
-        rows_of_turns = pd.concat(list(rotate_test_runs(plan, dataset, ["a", "b"], kept=tmp_path / "kept")))
+        rows_of_turns = pd.concat(list(rotate_test_runs(plan, dataset, ["a", "b"], tmp_path / "kept")))
     after = [file.stat().st_mtime_ns for file in tmp_path.glob("kept/*/batches/*")]
     assert set(before) < set(after), "the first turn is not computed again"
     for test in ("a", "b"):
@@ -76,8 +75,6 @@ def test_a_turn_is_the_study_with_that_test_run(recorded: Callable[..., tuple[Pl
         for name in ("A", "H"):
             np.testing.assert_allclose(turn[name], [row[name] for row in rows], rtol=1e-12)
         np.testing.assert_allclose(turn["naive"], prepared.naive.mean())
-    remove_kept(tmp_path / "kept")
-    assert not (tmp_path / "kept").exists()
 
 
 def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:
@@ -85,8 +82,6 @@ def test_which_runs_take_turns(recorded: Callable[..., tuple[Plan, Dataset]]) ->
     assert choose_turns(plan, dataset, ["c", "a*"]) == ["a", "c"]
     with pytest.raises(DocumentError, match="'z' matches no run: valid: a, b, c"):
         choose_turns(plan, dataset, ["z"])
-    with pytest.raises(DocumentError, match="only 'a' matches"):
-        choose_turns(plan, dataset, ["a"])
 
 
 def test_spread_by_hand() -> None:
