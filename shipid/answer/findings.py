@@ -169,12 +169,6 @@ FULL_SCALE_RULES: dict[str, ClaimRule[Any]] = {
 }
 
 
-def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[ClaimVerdict]:
-    """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval, which needs a remedy."""
-    few = too_few_manoeuvres(rivals.table.runs)
-    return judge_claims(FULL_SCALE_RULES, rivals, f"{few}: {remedy}" if few else count_manoeuvres(rivals.table.runs))
-
-
 def full_scale_findings(results: Results) -> list[ClaimVerdict]:
     """R1-R4 on the test manoeuvres of a study."""
     claims = results.plan.study.claims
@@ -188,7 +182,11 @@ def full_scale_findings(results: Results) -> list[ClaimVerdict]:
         return leave_undecided(
             FULL_SCALE_RULES, "the physics of a claim is identified again in every cell, so it has no single A"
         )
-    return judge_rivals(Rivals(table, good, bad, _errors_by_step(results, table.amounts[-1])))
+    note = count_manoeuvres(table.runs)
+    if few := too_few_manoeuvres(table.runs):
+        note = f'{few}: [repeat] "split.test" tests other runs in turn'
+    rivals = Rivals(table, good, bad, _errors_by_step(results, table.amounts[-1]))
+    return judge_claims(FULL_SCALE_RULES, rivals, note)
 
 
 def _errors_by_step(results: Results, N_D: int) -> dict[str, Array]:

@@ -11,9 +11,10 @@ import pandas as pd
 
 from shipid.files import read_json
 from shipid.hybrid.bands import Region
-from shipid.metrics import course_over_horizon, error_of_steps, error_of_windows, over_horizon_by_axis, position_error
+from shipid.metrics import course_over_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
+from shipid.report.content import PathKey
 from shipid.report.selection import FEW_RUNS, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
@@ -73,9 +74,10 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     ahead, parts = test.step * np.arange(1, test.horizon + 1), []
     naive = {"model": "naive", "N_D": 0, "seed": 0, "source": "naive"}, constant_motion(test)
     for keys, path in (naive, *_figure_paths(results)):
-        errors = error_of_steps(position_error(path, true)) | over_horizon_by_axis(path, true)
-        errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
-        parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors}))
+        error, (along, across) = position_error(path, true), np.abs(path - true).mean(axis=1).T
+        errors = {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1), "along": along, "across": across}
+        course = np.degrees(course_over_horizon(path, true, test.step))
+        parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors, "course": course}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -93,7 +95,8 @@ def time_frame(results: Results) -> pd.DataFrame:
         )
         for keys, error in curves
     ]
-    return insert_gaps(pd.concat(parts, ignore_index=True)[columns], ["run", "model", "N_D", "source"])
+    frame = insert_gaps(pd.concat(parts, ignore_index=True)[columns], ["run", "model", "N_D", "source"])
+    return count_from_start(results, frame)
 
 
 def kinds_frame(results: Results) -> pd.DataFrame:
@@ -126,12 +129,10 @@ def kinds_frame(results: Results) -> pd.DataFrame:
 
 
 def count_from_start(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
-    """Rows of runs with the time `t` [s] since the begin of each; other frames as they are.
+    """Rows of runs with the time `t` [s] since the begin of each.
 
     Figures are in single precision, in which a clock that counts from 1970 has steps of two minutes.
     """
-    if not {"run", "t"} <= set(frame.columns):
-        return frame
     begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     return frame.assign(t=(frame["t"] - frame["run"].map(begins).astype(float)).round(CLOCK))
 
@@ -148,22 +149,15 @@ def insert_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def commands_frame(results: Results) -> pd.DataFrame:
-    """Commands over time in the shown test runs, in the units of sailors; equal commands are shown once."""
+    """Commands over time in the shown test runs, in the units of sailors."""
     frame = results.dataset.frame
     frame = frame[frame["run"].isin(figure_runs(results))]
-    shown: dict[str, str] = {}
-    for name in results.dataset.commands:
-        alike = (other for other in shown if signal_of(other) == signal_of(name))
-        twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
-        word = SIGNALS[signal_of(name)].word
-        component = name.partition(".")[0].replace("_", " ").removesuffix(word).strip()  # port_rudder, rudder
-        shown[twin or name] = component if twin is None else f"{shown[twin]} and {component}"
     result = frame[["run", "t"]].reset_index(drop=True)
-    for name, components in shown.items():
-        unit, factor = read_unit(name)
-        words = f"{components} {SIGNALS[signal_of(name)].word}".strip()
-        result[f"{words} [{unit}]"] = frame[name].to_numpy() * factor
-    return insert_gaps(result, ["run"])
+    for name in results.dataset.commands:
+        (unit, factor), word = read_unit(name), SIGNALS[signal_of(name)].word
+        component = name.partition(".")[0].replace("_", " ").removesuffix(word).strip()  # port_rudder, rudder
+        result[f"{component} {word}".strip() + f" [{unit}]"] = frame[name].to_numpy() * factor
+    return count_from_start(results, insert_gaps(result, ["run"]))
 
 
 def window_snapshots(results: Results) -> list[WindowSnapshot]:
@@ -171,32 +165,36 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
     particulars: Mapping[str, float] = next(
         (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
     )
-    begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     test, level, origin = results.test, results.plan.study.bands.level, np.zeros((1, 2))
-    seed, amounts, alone = int(results.cells["seed"].min()), figure_amounts(results), alone_models(results)
-    paths = {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
-    edges: dict[tuple[str, str, int], Region] = {}
+    paths: dict[PathKey, np.ndarray] = {("", "naive", 0): constant_motion(test)}
+    edges: dict[PathKey, Region] = {}
+    alone, amounts, seed = alone_models(results), figure_amounts(results), int(results.cells["seed"].min())
+    paths |= {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     for row in results.rows:
         if row["cell"] in results.paths and row["N_D"] in amounts and row["seed"] == seed:
             key = row["model"], "cooperative", int(row["N_D"])
             paths[key], bands = results.paths[row["cell"]], results.bands.get(row["cell"])
             if bands is not None and bands.promises(level):
                 edges[key] = bands.region(paths[key], test.columns, test.step, level)
-    paths["", "naive", 0] = constant_motion(test)
-    windows, most = [], min(INSTANTS, max(3, MOST_WINDOWS // len(figure_runs(results))))
-    for run in figure_runs(results):
-        indices = np.flatnonzero(test.run == run)
+    windows, runs = [], figure_runs(results)
+    most, V_w = min(INSTANTS, max(3, MOST_WINDOWS // len(runs))), test.columns.get("V_w")
+    for run in runs:
+        indices, log = np.flatnonzero(test.run == run), results.dataset.frame[results.dataset.frame["run"] == run]
+        clock, psi = log["t"].to_numpy(), np.unwrap(log["psi"].to_numpy())
         for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             lines = {key: path[:, index] for key, path in paths.items() if np.isfinite(path[:, index]).all()}
+            t = float(test.t[index])
+            now, end = np.interp([t, t + test.horizon * test.step], clock, psi)
+            towards = None if V_w is None else float(test.columns["beta_w"][index] - test.columns["psi"][index])
             windows.append(
                 WindowSnapshot(
                     run=run,
-                    t=round(float(test.t[index] - begins[run]), CLOCK),
+                    t=round(t - float(clock.min()), CLOCK),
                     outline=ship_outline(particulars),
-                    psi_end=_final_heading(results, run, float(test.t[index])),
+                    psi_end=float(end - now),
                     truth=np.concatenate([origin, test.future[:, index]]),
                     paths={key: np.concatenate([origin, line]) for key, line in lines.items()},
-                    wind=_wind_in_frame(test.columns, int(index)),
+                    wind=None if V_w is None or towards is None else (float(V_w[index]), towards),
                     bands={key: region_outline(region, paths[key], index) for key, region in edges.items()},
                 )
             )
@@ -214,27 +212,13 @@ def region_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
     return np.concatenate([origin, path - reach, end, (path + reach)[::-1], origin])
 
 
-def _final_heading(results: Results, run: str, t: float) -> float:
-    rows = results.dataset.frame[results.dataset.frame["run"] == run]
-    psi = np.unwrap(rows["psi"].to_numpy())
-    end = t + results.test.horizon * results.test.step
-    return float(np.interp(end, rows["t"], psi) - np.interp(t, rows["t"], psi))
-
-
-def _wind_in_frame(columns: Mapping[str, np.ndarray], index: int) -> tuple[float, float] | None:
-    if "V_w" not in columns:
-        return None
-    return float(columns["V_w"][index]), float(columns["beta_w"][index] - columns["psi"][index])
-
-
 def tracks_frame(results: Results) -> pd.DataFrame:
     """Path of every run [m] and its part in the study, thinned to what pixels can show."""
-    parts = []
-    for run, rows in results.dataset.frame.groupby("run", sort=False):
-        thin = rows.iloc[:: max(1, len(rows) // MOST_POINTS)]
-        part = "test" if run in results.test.spans else "training and validation"
-        parts.append(pd.DataFrame({"run": run, "set": part, "north": thin["north"], "east": thin["east"]}))
-    return pd.concat(parts, ignore_index=True)
+    frame = results.dataset.frame[["run", "north", "east"]]
+    runs = frame.groupby("run", sort=False)["run"]
+    kept = frame[runs.cumcount() % (runs.transform("size") // MOST_POINTS).clip(lower=1) == 0]
+    part = np.where(kept["run"].isin(list(results.test.spans)), "test", "training and validation")
+    return kept.assign(set=part).reset_index(drop=True)
 
 
 def envelope_frame(results: Results) -> pd.DataFrame:
@@ -266,12 +250,6 @@ def trials_frame(results: Results) -> pd.DataFrame:
             rows.append(row | {"chosen": trial in best, **{name: trial["params"].get(name) for name in searched}})
     columns = ["cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen", *searched]
     return pd.DataFrame(rows, columns=columns).astype(dict.fromkeys(["value", "seconds", *searched], float))
-
-
-def repairs_frame(results: Results) -> pd.DataFrame:
-    """Every repair that the importer made, with its count."""
-    rows = results.dataset.metadata.get("repairs", [])
-    return pd.DataFrame(rows, columns=["kind", "column", "count", "note"])
 
 
 def _method_words(way: StudyMethod) -> str:

@@ -26,6 +26,7 @@ from shipid.study.plan import Plan, model_label, plan_text, run_command, verdict
 from shipid.study.results import Results, read_results
 
 Say = Callable[[str], object]
+REPAIR_COLUMNS = ["kind", "column", "count", "note"]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
@@ -43,7 +44,7 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
     for name, frame in REPORT_FRAMES.items():
         if say is not None:
             say(f"{plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
-        tables[name] = frames.count_from_start(results, frame(results))
+        tables[name] = frame(results)
     if say is not None:
         say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
     words = (
@@ -62,12 +63,12 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         factors=frames.factors_frame(results),
         trials=frames.trials_frame(results),
         horizon=frames.horizon_frame(results),
-        over_time=frames.count_from_start(results, frames.time_frame(results)),
-        commands=frames.count_from_start(results, frames.commands_frame(results)),
+        over_time=frames.time_frame(results),
+        commands=frames.commands_frame(results),
         snapshots=frames.window_snapshots(results),
         tracks=frames.tracks_frame(results),
         envelope=frames.envelope_frame(results),
-        repairs=frames.repairs_frame(results),
+        repairs=pd.DataFrame(results.dataset.metadata.get("repairs", []), columns=REPAIR_COLUMNS),
         provenance=frames.provenance_words(results),
         study_document=plan_text(plan),
         command=run_command(plan),

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,7 +16,6 @@ from shipid.cli.outputs import check_output
 from shipid.cli.terminal import (
     count_blocks,
     end_on_interrupt,
-    four_digits,
     shorten_text,
     show_steps,
     text_table,
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
 MOST_DIFFERENCES = 20  # of documents, on a terminal
-FINDING: tuple[Literal["id", "claim", "verdict", "evidence"], ...] = ("id", "claim", "verdict", "evidence")
 
 
 @app.command("list")
@@ -156,69 +153,6 @@ def study_screen(
             count = row["members"] - row["diverged"]
             answer.say(f"{row['family']}: {count} {plural_word(count, 'member shows', 'members show')} no driver of A")
         answer.say(f"{len(frame)} members -> {file}", file=file)
-
-
-@app.command("rotate")
-def study_rotate(
-    study: StudyName,
-    tests: Annotated[list[str], typer.Option(help="runs that test in turn, * for any part of a name; may be repeated")],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="file for a row per turn and cell: .csv or .parquet; default: <study>-rotate.csv"),
-    ] = None,
-    changes: Changes = None,
-    device: Device = "cpu",
-    as_json: Json = False,
-) -> None:
-    """Test on every run in turn and train on all others; the same command goes on after an interruption."""
-    from shipid.answer import rotate
-    from shipid.files import write_table
-    from shipid.study.prepare import obtain_runs
-
-    plan, file = _prepare_command(study, changes, device, out, "rotate")
-    dataset = obtain_runs(plan)
-    wanted = rotate.choose_turns(plan, dataset, tests)
-    from shipid.study.plan import grid_seeds
-
-    cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
-    import pandas as pd
-
-    kept = rotate.kept_folder(file, plan, dataset, device)
-    blocks = rotate.rotate_test_runs(plan, dataset, wanted, kept, device)
-    sentence = f"interrupted; what is finished is kept in {kept}: the same command goes on from there"
-    frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
-    write_table(file, frame)
-    shutil.rmtree(kept, ignore_errors=True)
-    columns, rows = ["A", "H", "least", "greatest", "H_90", "width"], []
-    over = rotate.turns_table(frame)
-    from shipid.study.plan import model_label
-
-    for row in over.to_dict("records"):
-        better = "-" if row["better"] != row["better"] else f"{row['better']:.0f} of {row['turns']}"
-        name = model_label(plan, row["foundation"], row["method"])
-        inside = "-" if row["coverage"] != row["coverage"] else percent_text(row["coverage"])
-        rows.append([name, *(four_digits(row[column]) for column in columns), inside, better])
-    band = f"in band of {level_text(plan.study.bands.level)}"
-    heads = ["foundation", "A", "H", "least H", "greatest H", "H_90", "radius of band", band, "H below A"]
-    verdicts = rotate.turn_findings(frame, plan)
-    naive = frame.groupby("test")["naive"].first().mean()
-    from shipid.study.plan import families_set_from
-
-    with open_answer(as_json) as answer:
-        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train:", tests=wanted)
-        answer.rows("turns", over, text_table(heads, rows))
-        answer.say(f"constant u, v, r: {four_digits(naive)} m", naive=naive)
-        if saw := families_set_from(plan, wanted):
-            answer.say(
-                f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw
-            )
-        if verdicts:
-            answer.say("findings over the turns, in brackets 95 % intervals:")
-        shown = text_table(
-            ["finding", "claim", "verdict", "evidence"], (tuple(one[key] for key in FINDING) for one in verdicts)
-        )
-        answer.rows("findings", verdicts, shown if verdicts else None)
-        answer.say(f"{len(frame)} cells -> {file}", file=file)
 
 
 @app.command("run")

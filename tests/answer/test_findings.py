@@ -94,7 +94,7 @@ def test_one_test_manoeuvre_decides_nothing(made: Any) -> None:
     results = made(one(1.0, 1.9, 9.0))
     assert set(verdicts(results).values()) == {"undecided"}
     assert all("1 test manoeuvre gives no interval" in finding["evidence"] for finding in judge_findings(results)[:4])
-    assert all("shipid study rotate" in finding["evidence"] for finding in judge_findings(results)[:4])
+    assert all('[repeat] "split.test"' in finding["evidence"] for finding in judge_findings(results)[:4])
 
 
 def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> None:

@@ -18,7 +18,6 @@ import tomlkit
 
 from shipid.answer.frames import provenance_words
 from shipid.answer.pages import write_pages
-from shipid.answer.rotate import kept_folder
 from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
@@ -172,8 +171,6 @@ def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch
 
     plan = planned()
     run_here(plan, folder)
-    dataset = read_dataset(folder / store.DATASET)
-    kept = kept_folder(tmp_path / "rows.csv", plan, dataset)
     assert not any("otherwise" in event.text for event in events_here(plan, folder))
     file.write_text(file.read_text() + "\n")
     importlib.reload(module)
@@ -181,7 +178,6 @@ def test_a_method_of_a_user_that_was_edited_is_noted(tmp_path: Path, monkeypatch
     notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
     assert any("earlier results were computed otherwise: code of the method.own was" in note for note in notes)
     assert "code of the method.own" in provenance_words(read_results(folder))["computed in parts"]
-    assert kept_folder(tmp_path / "rows.csv", plan, dataset) != kept
 
 
 def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType, Plan]:
