@@ -5,7 +5,7 @@ A share, or coverage, is the mean over runs: a long run counts as much as a shor
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -27,10 +27,10 @@ REPORTED_LEVELS = (0.5, 0.8, 0.9, 0.95)
 
 
 def cell_regions(
-    results: Results, levels: Sequence[float], rows: Sequence[Mapping[str, Any]] | None = None
+    results: Results, levels: Sequence[float]
 ) -> Iterator[tuple[Mapping[str, Any], dict[float, Region], Array]]:
-    """Row, region by level and errors (T, S, 2) [m] of every cell, or of some rows, whose band promises a level."""
-    for row in results.rows if rows is None else rows:
+    """Row, region by level and errors (T, S, 2) [m] of every cell whose band promises a level."""
+    for row in results.rows:
         bands = results.bands.get(row["cell"])
         if bands is not None and any(bands.promises(level) for level in levels):
             paths = results.paths[row["cell"]]
@@ -72,24 +72,27 @@ def answer_on_bands(results: Results) -> list[tuple[str, str]]:
     mine = frame[frame["level"].eq(level) & ~frame["family"].isin(results.saw_test)]
     if mine.empty:
         refused = refused_frame(results).groupby("reason", sort=False)["model"]
-        reasons = {str(reason).removeprefix(NO_BAND): model_list(map(str, models)) for reason, models in refused}
-        each = [*reasons] if len(reasons) == 1 else [f"{models}: {reason}" for reason, models in reasons.items()]
-        return [(f"No band is promised: {'; '.join(each)}.", "cells")] if reasons else []
+        each = [f"{str(reason).removeprefix(NO_BAND)} ({model_list(map(str, models))})" for reason, models in refused]
+        return [(f"No band is promised: {'; '.join(each)}.", "cells")] if each else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (percent_text(float(top[name].mean())) for name in ("coverage", "low", "high"))
     radius = least_to_greatest(length_in_metres(top["width"].min()), length_in_metres(top["width"].max()))
-    methods = results.cells["method"][results.cells["model"].isin(top["model"])].unique()
-    data = f"{of_methods(results, [*methods])} with {top['N_D'].iloc[0]} runs; 95 % interval"
+    cells = results.cells[results.cells["model"].isin(top["model"]) & results.cells["N_D"].isin(top["N_D"])]
+    data = f"{of_methods(results, [*cells['method'].unique()])} with {top['N_D'].iloc[0]} runs; 95 % interval"
     mean = f"mean of {len(top)} models{data} of a single model" if len(top) > 1 else data.lstrip()
     sentence = (
         f"Bands of {level_text(level)} held {share} of the whole test paths ({mean} {low} to {high}); their mean "
         f"radius is {radius}."
     )
-    bands = [results.bands[cell] for cell in results.cells["cell"] if cell in results.bands]
-    known = set[str]().union(*(one.kinds for one in bands))
-    new = sorted(set(results.kinds.values()) - known) if known else []
+    new = sorted(uncalibrated_kinds(results, cells["cell"]))
     text = f"Nothing is promised for {join_few_names(new)}: no such run calibrated the bands."
     return [(sentence, "coverage"), *([(text, "coverage")] if new else [])]
+
+
+def uncalibrated_kinds(results: Results, cells: Iterable[str]) -> set[str]:
+    """Kinds of manoeuvre of test runs that no run of calibration has, for a band of some cells: nothing is promised."""
+    known = [set(results.bands[cell].kinds) for cell in cells if cell in results.bands and results.bands[cell].kinds]
+    return set(results.kinds.values()) - set.intersection(*known) if known else set()
 
 
 def of_methods(results: Results, names: Sequence[str]) -> str:

@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.answer.findings import judge_findings
-from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
+from shipid.answer.verdict import too_few_manoeuvres
 from shipid.arguments import as_path
 from shipid.document import Document
 from shipid.errors import ResultError, ShipidError
 from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
 from shipid.files import quote_argument
 from shipid.metrics import error_of_windows, position_error
+from shipid.report.wording import counted_text
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
 from shipid.study.results import Results, read_results
@@ -98,8 +99,7 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
             frame, words = _compare_with_first(runs[0], results, pairs or {})
             frames.append(frame.assign(folder=name))
             notes += [f"{name}: {note}" for note in words]
-    sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
-    documents = document_differences([results.plan for results in runs], sessions, [{}, *[called] * len(frames)])
+    documents = document_differences([results.plan for results in runs], [{}, *[called] * len(frames)])
     documents.columns = pd.Index(["path", *names])
     errors = pd.concat(frames, ignore_index=True)
     return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
@@ -146,7 +146,9 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
             row["verdict"] = verdict
     same_rows, runs = sum(row["verdict"] == IDENTICAL for row in rows), len(set(first.test.run[here]))
     whole = len(here) == len(first.test) == len(other.test)
-    notes.append(f"paired over {count_manoeuvres(runs)}{'' if whole else f', on the {len(here)} windows of both'}")
+    notes.append(
+        f"paired over {counted_text(runs, 'test manoeuvre')}{'' if whole else f', on the {len(here)} windows of both'}"
+    )
     if same_rows:
         notes.append(f"{same_rows} of {len(rows)} rows are identical to the digit: no training sets them apart")
     return pd.DataFrame(rows), [*notes, *([few] if (few := too_few_manoeuvres(runs)) else [])]
@@ -212,16 +214,11 @@ def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Docum
     return document
 
 
-def document_differences(
-    plans: Sequence[Plan], sessions: Sequence[Mapping[str, Any]] = (), called: Sequence[Mapping[str, str]] = ()
-) -> pd.DataFrame:
+def document_differences(plans: Sequence[Plan], called: Sequence[Mapping[str, str]] = ()) -> pd.DataFrame:
     """One row per value that is not the same in all plans: `path`, then a column of text for each plan, from 0 on.
 
     Compared are the studies with their defaults, the vessels that all have by one name, and the digests of data.
 
-    Parameters
-    ----------
-    sessions : for each plan, what its run was computed with; compared, too.
     called : for each plan, method or family -> the name that it is compared under.
     """
     shared = set.intersection(*({*plan.vessels} for plan in plans))
@@ -230,9 +227,8 @@ def document_differences(
             **whole_document(plan, names),
             "digest of": dict(plan.sources),
             "vessel": {name: {"digest": plan.vessels[name].digest, **plan.vessels[name].document} for name in shared},
-            "computed with": dict(session),
         }
-        for plan, session, names in zip(plans, sessions or [{}] * len(plans), called or [{}] * len(plans), strict=True)
+        for plan, names in zip(plans, called or [{}] * len(plans), strict=True)
     ]
     rows = [[path, *map(_value_in_words, values)] for path, values in _differing_values(whole, "")]
     return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])

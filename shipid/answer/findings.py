@@ -25,15 +25,14 @@ B2 : the share of whole test paths inside their bands is the level, at the large
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.answer.bands import cell_regions, of_methods
+from shipid.answer.bands import cell_regions, of_methods, uncalibrated_kinds
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.findings_simulation import (
     SIMULATION_RULES,
@@ -46,7 +45,6 @@ from shipid.answer.verdict import (
     ClaimVerdict,
     Judgement,
     UndecidedClaim,
-    count_manoeuvres,
     difference_with_interval,
     judge_claims,
     least_to_greatest,
@@ -58,7 +56,7 @@ from shipid.answer.verdict import (
 )
 from shipid.evidence import Differences, all_significant, any_significant, paired_difference, share_interval
 from shipid.metrics import coverage_share, position_error
-from shipid.report.wording import join_few_names
+from shipid.report.wording import counted_text, join_few_names
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import unfair_reason, verdict_method
 from shipid.study.results import Results
@@ -161,7 +159,7 @@ def _lead_of_others(table: ErrorTable, pure: Array, others: list[Array]) -> Diff
     return paired_difference(ahead, table.counts, float(table.noise[-1]) * np.concatenate(noise))
 
 
-FULL_SCALE_RULES: dict[str, ClaimRule[Any]] = {
+FULL_SCALE_RULES: dict[str, ClaimRule] = {
     "R1": ClaimRule("compensated physics beats the physics alone, accurate or not", _judge_gain),
     "R2": ClaimRule("the inaccurate model, compensated, is about as good as the accurate physics alone", _judge_equal),
     "R3": ClaimRule("the gap between accurate and inaccurate physics shrinks after compensation", _judge_gap),
@@ -182,7 +180,7 @@ def full_scale_findings(results: Results) -> list[ClaimVerdict]:
         return leave_undecided(
             FULL_SCALE_RULES, "the physics of a claim is identified again in every cell, so it has no single A"
         )
-    note = count_manoeuvres(table.runs)
+    note = counted_text(table.runs, "test manoeuvre")
     if few := too_few_manoeuvres(table.runs):
         note = f'{few}: [repeat] "split.test" tests other runs in turn'
     rivals = Rivals(table, good, bad, _errors_by_step(results, table.amounts[-1]))
@@ -229,14 +227,6 @@ class Promise:
     run: NDArray[np.str_]
     level: float
 
-    def of_kinds(self, kinds: NDArray[np.str_], calibrated: Collection[str]) -> tuple[Promise, str]:
-        """The windows whose kind of manoeuvre (S,) calibrated every band, and words on the others."""
-        like = np.isin(kinds, list(calibrated))
-        these, count = sorted(set(kinds[~like])), len(set(self.run[~like]))
-        words = f"no run of the kind {join_few_names(these)} calibrated them, so they promise nothing for "
-        kept = replace(self, held=self.held[like], run=self.run[like])
-        return kept, f"{words}{count_manoeuvres(count)}" if count else ""
-
 
 def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[ClaimVerdict]:
     """Verdicts on B1 and B2 for models with physics (none of them sees the test); undecided where none has a band.
@@ -259,14 +249,18 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
         return leave_undecided(BAND_RULES, f"no two models with physics{of} have a band of {level_text(level)}")
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
     of_model = {str(name): [held[cell] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
-    promise, new = Promise(np.mean([one for ones in of_model.values() for one in ones], axis=0), run, level), ""
-    if known := [set(results.bands[cell].kinds) for cell in cells["cell"] if results.bands[cell].kinds]:
-        kinds = np.array([results.kinds[str(name)] for name in run])
-        promise, new = promise.of_kinds(kinds, set.intersection(*known))
+    new = uncalibrated_kinds(results, cells["cell"])
+    like = np.array([results.kinds[str(name)] not in new for name in run])
+    inside = np.mean([one for ones in of_model.values() for one in ones], axis=0)
+    lost = counted_text(len(set(run[~like])), "test manoeuvre")
+    left_out = f"no run of the kind {join_few_names(sorted(new))} calibrated them, so they promise nothing for {lost}"
     shares = tuple(coverage_share(np.mean(of_model[name], axis=0), run) for name in sound)
     compared = Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals, shares)
     notes = [f"bands{of}" if of else "", too_few_manoeuvres(table.runs)]
-    cases: dict[str, tuple[object, list[str]]] = {"B1": (compared, notes), "B2": (promise, [new, *notes])}
+    cases: dict[str, tuple[object, list[str]]] = {
+        "B1": (compared, notes),
+        "B2": (Promise(inside[like], run[like], level), [left_out if new else "", *notes]),
+    }
     return [
         finding
         for key, (case, words) in cases.items()
@@ -320,10 +314,14 @@ def _judge_promise(promise: Promise) -> Judgement:
     each = "" if (sizes == sizes[0]).all() else ", each counts the same"
     hold = f"bands of {level_text(level)} hold {percent_text(share)}{interval} of whole paths"
     decided = "undecided" if few else verdict_of(low >= level - BROKEN_BY, high < level)
-    return decided, f"{hold} ({count_manoeuvres(len(sizes))}{each})", {f"share at {level_text(level)}": share}
+    return (
+        decided,
+        f"{hold} ({counted_text(len(sizes), 'test manoeuvre')}{each})",
+        {f"share at {level_text(level)}": share},
+    )
 
 
-BAND_RULES: dict[str, ClaimRule[Any]] = {
+BAND_RULES: dict[str, ClaimRule] = {
     "B1": ClaimRule("more accurate physics gives a narrower band", _judge_widths),
     "B2": ClaimRule("bands hold the share of whole paths that they promise", _judge_promise),
 }

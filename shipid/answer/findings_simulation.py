@@ -28,7 +28,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,13 +35,11 @@ from scipy.special import stdtr
 
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, error_table
 from shipid.answer.verdict import (
-    SAME_A,
     ClaimRule,
     ClaimVerdict,
     Judgement,
     UndecidedClaim,
     Verdict,
-    count_manoeuvres,
     difference_with_interval,
     judge_claims,
     least_to_greatest,
@@ -68,7 +65,7 @@ from shipid.evidence import (
     which_significant,
 )
 from shipid.metrics import path_roughness, rank_correlation
-from shipid.report.wording import join_few_names
+from shipid.report.wording import counted_text, join_few_names
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import verdict_method
 from shipid.study.results import Results
@@ -98,13 +95,6 @@ class ErrorGrid:
         """Members of both families."""
         return (*self.moderate, *self.high)
 
-    def members(self, family: str) -> tuple[str, ...]:
-        """Members of a family with a result in every cell, of both for `physics`; UndecidedClaim without one."""
-        names: tuple[str, ...] = getattr(self, family)
-        if not names:
-            raise UndecidedClaim(f"no {family} model has a result in every cell")
-        return names
-
 
 def simulation_findings(results: Results) -> list[ClaimVerdict]:
     """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
@@ -127,6 +117,10 @@ def simulation_findings(results: Results) -> list[ClaimVerdict]:
     by_mean, by_90 = (replace(one, A={name: A for name, A in one.A.items() if name in one.H}) for one in known)
     moderate, high = (tuple(name for name in family if name in by_mean.A) for family in names)
     lost = [name for name in every if name not in by_mean.A]
+    if not (moderate and high):
+        return leave_undecided(
+            SIMULATION_RULES, f"of one family no model has a result in every cell: {model_list(lost)}"
+        )
     notes = (too_few_manoeuvres(by_mean.runs), f"left out for want of results: {model_list(lost)}" if lost else "")
     grid = ErrorGrid(by_mean, moderate, high, by_90, results)
     return judge_claims(SIMULATION_RULES, grid, "; ".join(note for note in notes if note))
@@ -139,7 +133,7 @@ def _difference_range(differences: Differences) -> str:
 
 
 def _judge_lead(grid: ErrorGrid) -> Judgement:
-    moderate, amounts, table = grid.members("moderate"), grid.table.amounts, grid.table
+    moderate, amounts, table = grid.moderate, grid.table.amounts, grid.table
     count, most = len(moderate), len(moderate) // 2 + 1
     leads = [table.lead(NO_MODEL, moderate, place) for place in range(len(amounts))]
     begins = verdict_of(all_significant(leads[0].above), any_significant(leads[0].below))
@@ -195,7 +189,7 @@ def trend_over_accuracy(table: ErrorTable, models: Sequence[str], *, flattens: b
         raise UndecidedClaim(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])
     if np.isclose(A.min(), A.max()):
-        raise UndecidedClaim(SAME_A)
+        raise UndecidedClaim("all physics models have the same A, so nothing can rise with it")
     weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
     each = [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
     order = np.array([[table.mean(model, k) for model in models] for k in places])
@@ -223,7 +217,7 @@ def _judge_rise(grid: ErrorGrid) -> Judgement:
 
 
 def _judge_harm(grid: ErrorGrid) -> Judgement:
-    high, table, place = grid.members("high"), grid.table, len(grid.table.amounts) - 1
+    high, table, place = grid.high, grid.table, len(grid.table.amounts) - 1
     lead = table.lead(NO_MODEL, high, place)
     better, worse = which_significant(lead.above), which_significant(lead.below)
     worst = [model for model, behind in zip(high, worse, strict=True) if behind]
@@ -238,8 +232,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         f"share of high models shown to be worse at N_D = {grid.table.amounts[-1]}": float(worse.mean()),
     }
     orders, moves = table.H[NO_MODEL].shape[1], "undecided"
-    if orders < FEWEST_ORDERS or not grid.moderate:
-        lacks = f"fluctuation needs a moderate model and {FEWEST_ORDERS} nested orders (grid seeds), the study has"
+    if orders < FEWEST_ORDERS:
+        lacks = f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has"
         return "undecided", f"{evidence}; {lacks} {orders} {plural_word(orders, 'seed')}", numbers
     if worst:
         of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
@@ -287,7 +281,6 @@ def _judge_metric(grid: ErrorGrid) -> Judgement:
 
 
 def _judge_savings(grid: ErrorGrid) -> Judgement:
-    grid.members("moderate")
     small = [k for k, amount in enumerate(grid.table.amounts) if amount <= grid.table.amounts[-1] / 2]
     if not small:
         raise UndecidedClaim(f"no N_D is at most half of the largest, {grid.table.amounts[-1]}")
@@ -346,7 +339,7 @@ def _pairs_with_better_physics(grid: ErrorGrid, k: int) -> list[SavingPair]:
 
 
 def _judge_paths(grid: ErrorGrid) -> Judgement:
-    physics, results = grid.members("physics"), grid.results
+    physics, results = grid.physics, grid.results
     assert results is not None
     if results.test.horizon < 3:
         raise UndecidedClaim("a second difference needs three steps ahead")
@@ -369,7 +362,7 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     rough, cooperative, true = (length_in_metres(value) for value in numbers.values())
     evidence = (
         f"at N_D = {grid.table.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, "
-        f"true paths {true} ({count_manoeuvres(len(names))})"
+        f"true paths {true} ({counted_text(len(names), 'test manoeuvre')})"
     )
     return decided, evidence, numbers
 
@@ -383,7 +376,7 @@ def compare_roughness(true: Array, pure: Array, together: Array, counts: Array) 
 
 
 FIRST_FOUR = ("S1", "S2", "S3", "S4")
-SIMULATION_RULES: dict[str, ClaimRule[Any]] = {
+SIMULATION_RULES: dict[str, ClaimRule] = {
     "S1": ClaimRule(
         "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead", _judge_lead
     ),

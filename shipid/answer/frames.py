@@ -14,7 +14,7 @@ from shipid.hybrid.bands import Region
 from shipid.metrics import course_over_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
-from shipid.report.content import PathKey
+from shipid.report.content import TRIAL_COLUMNS, PathKey
 from shipid.report.selection import FEW_RUNS, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
@@ -104,27 +104,23 @@ def kinds_frame(results: Results) -> pd.DataFrame:
 
     At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
     """
-    kinds = np.array([results.kinds.get(str(run), "") for run in results.test.run])
-    errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
+    test, kinds = results.test, np.array([results.kinds.get(str(run), "") for run in results.test.run])
+    errors = {("naive", "naive", 0): [results.naive]}
     for model, path in _finite_physics(results).items():
-        errors[model, "physics", 0] = [position_error(path, results.test.future)]
-    largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
+        errors[model, "physics", 0] = [position_error(path, test.future)]
     for row in results.rows:
-        if (
-            row["cell"] in results.paths
-            and row["N_D"] == largest
-            and learns_from_runs(results.plan, row["family"], row["method"])
-        ):
-            error = position_error(results.paths[row["cell"]], results.test.future)
-            errors.setdefault((row["model"], "cooperative", largest), []).append(error)
+        learns = learns_from_runs(results.plan, row["family"], row["method"])
+        if learns and row["cell"] in results.paths and row["N_D"] == results.cells["N_D"].max():
+            error = position_error(results.paths[row["cell"]], test.future)
+            errors.setdefault((row["model"], "cooperative", int(row["N_D"])), []).append(error)
     rows = []
     for kind in [*dict.fromkeys(kinds), *([ALL_KINDS] if len(set(kinds)) > 1 else [])]:
         mask = (kinds == kind) | (kind == ALL_KINDS)
-        runs = ", ".join(dict.fromkeys(map(str, results.test.run[mask])))
+        runs = ", ".join(dict.fromkeys(map(str, test.run[mask])))
         for keys, distances in errors.items():
-            mean = float(np.mean([error[:, mask].mean() for error in distances]))
-            end = float(np.mean([error[-1, mask].mean() for error in distances]))
-            rows.append((kind, runs, *keys, mean, end))
+            parts = [error[:, mask] for error in distances]
+            ends = np.mean([part[-1].mean() for part in parts])
+            rows.append((kind, runs, *keys, np.mean([part.mean() for part in parts]), ends))
     return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 
 
@@ -240,16 +236,13 @@ def trials_frame(results: Results) -> pd.DataFrame:
     """One row per trial of the search, value [m^2], with a column for all that varies; the best trials are `chosen`."""
     methods = {way.name: way.method for way in results.plan.methods}
     searched = list(dict.fromkeys(name for method in methods.values() for name in method.varied()))
-    rows = []
-    for cell in results.rows:
-        done = [trial for trial in cell["trials"] if trial["state"] == "complete" and trial["value"] is not None]
-        best = sorted(done, key=lambda trial: trial["value"])[: methods[cell["method"]].num_chosen()]
-        for trial in cell["trials"]:
-            row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}
-            row |= {name: trial[name] for name in ("number", "state", "value", "epochs", "seconds")}
-            rows.append(row | {"chosen": trial in best, **{name: trial["params"].get(name) for name in searched}})
-    columns = ["cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen", *searched]
-    return pd.DataFrame(rows, columns=columns).astype(dict.fromkeys(["value", "seconds", *searched], float))
+    rows = [cell | trial["params"] | trial for cell in results.rows for trial in cell["trials"]]
+    columns = [name for name in TRIAL_COLUMNS if name != "chosen"]
+    frame = pd.DataFrame(rows, columns=[*columns, "method", *searched])
+    frame = frame.astype(dict.fromkeys(["value", "seconds", *searched], float))
+    place = frame["value"].where(frame["state"] == "complete").groupby(frame["cell"], sort=False).rank(method="first")
+    frame["chosen"] = place <= frame["method"].map({name: method.num_chosen() for name, method in methods.items()})
+    return frame[[*TRIAL_COLUMNS, *searched]]
 
 
 def _method_words(way: StudyMethod) -> str:

@@ -35,17 +35,12 @@ def compare_methods(results: Results) -> pd.DataFrame:
     is that to the method by which the study judges. To choose the lowest H of a test chooses by the test: the interval
     does not count that.
 
-    Raises ShipidError for results that are none.
+    No rows where fewer than two methods learn from data. Raises ShipidError for results that are none.
     """
     check_class("results", results, Results, "as of `read_results`")
-    return method_table(method_cells(results), verdict_method(results.plan))
-
-
-def methods_frame(results: Results) -> pd.DataFrame:
-    """Compare the methods of one run, see `method_table`; no rows where fewer than two learn from data."""
     if sum(way.method.compensates for way in results.plan.methods) < 2:
         return pd.DataFrame(columns=METHOD_COLUMNS)
-    return compare_methods(results)
+    return method_table(method_cells(results), verdict_method(results.plan))
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:

@@ -32,21 +32,15 @@ REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
     "coverage": bands.coverage_frame,
     "no_band": bands.refused_frame,
-    "methods": methods.methods_frame,
+    "methods": methods.compare_methods,
     "intervals": intervals_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
 
-def report_content(results: Results, say: Say | None = None) -> ReportContent:
-    """Assemble everything that the report of a study shows. say : called with a few words on how far it is."""
-    plan, tables = results.plan, {}
-    for name, frame in REPORT_FRAMES.items():
-        if say is not None:
-            say(f"{plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
-        tables[name] = frame(results)
-    if say is not None:
-        say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
+def report_content(results: Results) -> ReportContent:
+    """Assemble everything that the report of a study shows."""
+    plan, tables = results.plan, {name: frame(results) for name, frame in REPORT_FRAMES.items()}
     words = (
         *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
         *bands.answer_on_bands(results),
@@ -104,7 +98,9 @@ def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
     """Write the pages of one run."""
     results = read_results(folder, say)
     store.write_results(folder, results.plan, results.cells, whole=results.complete)
-    content = report_content(results, say)
+    if say is not None:
+        say(f"{results.plan.name}: answer, findings and tables of {len(results.cells)} cells")
+    content = report_content(results)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
     return write_report(content, folder / REPORT, say)

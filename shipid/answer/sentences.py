@@ -14,8 +14,6 @@ import pandas as pd
 
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.verdict import (
-    count_manoeuvres,
-    count_runs,
     interval_after,
     length_in_metres,
     model_list,
@@ -25,7 +23,7 @@ from shipid.answer.verdict import (
 from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
-from shipid.report.wording import join_few_names
+from shipid.report.wording import counted_text, join_few_names
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, learning_methods, orders_may_react, verdict_method
 from shipid.study.results import Results
@@ -162,11 +160,10 @@ def _runs_seen(results: Results) -> Iterator[str]:
 
 
 def _mean_errors(results: Results, errors: pd.Series[float]) -> str:
-    """The least of some errors [m] by name, as a sentence."""
-    shown = errors.sort_values(kind="stable")[:MOST_SHOWN]
-    of = f" (the least of {len(errors)})" if len(errors) > MOST_SHOWN else ""
-    words = [f"{quoted_model(str(name))} {length_in_metres(value)}" for name, value in shown.items()]
-    return f"Mean errors {_horizon_in_words(results)} ahead{of}: {join_few_names(words, MOST_SHOWN)}."
+    """Some errors [m] by name, the least of them first, as a sentence."""
+    known = errors.sort_values(kind="stable").items()
+    words = [f"{quoted_model(str(name))} {length_in_metres(value)}" for name, value in known]
+    return f"Mean errors {_horizon_in_words(results)} ahead: {join_few_names(words, MOST_SHOWN)}."
 
 
 def _horizon_in_words(results: Results) -> str:
@@ -179,10 +176,10 @@ def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
         yield "It is unknown whether physics harms, since not every cell without physics has a result."
         return
     parts = {amount: _limit_and_sides(case, amount, place) for amount, place in case.ends.items()}
-    each = ". With ".join(f"{count_runs(amount)} {part}" for amount, part in parts.items())
+    each = ". With ".join(f"{counted_text(amount, 'run')} {part}" for amount, part in parts.items())
     if len(parts) == 2 and len(set(parts.values())) == 1:
         (least, part), (most, _) = parts.items()
-        each = f"{least} or {count_runs(most)} {part}"
+        each = f"{least} or {counted_text(most, 'run')} {part}"
     yield f"How good must the physics be, {_horizon_in_words(case.results)} ahead? With {each}."
 
 
@@ -236,15 +233,15 @@ def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
     if best is None or fewest == largest or not {NO_MODEL, best} <= set(case.table.H):
         return
     estimate = runs_without_physics(case.table, best, 0)
-    bounds = _bounds(estimate, "{:.0f}".format)
+    bounds, runs = _bounds(estimate, "{:.0f}".format), counted_text(fewest, "run")
     text = f"without physics the same error takes about {estimate.value:.0f} runs{bounds}, interpolated between amounts"
     if estimate.above:
-        text = f"without physics {count_runs(largest)} are not enough for that{bounds}: they give "
+        text = f"without physics {counted_text(largest, 'run')} are not enough for that{bounds}: they give "
         text += case.H(NO_MODEL, largest)
     elif estimate.below:
-        text = f"without physics the same {count_runs(fewest)} {plural_word(fewest, 'does', 'do')} as well{bounds}, "
-        text += case.H(NO_MODEL, fewest)
-    yield f"How many runs? With {count_runs(fewest)}, {best} ({BEST}) has {case.H(best, fewest)} mean error; {text}."
+        do = plural_word(fewest, "does", "do")
+        text = f"without physics the same {runs} {do} as well{bounds}, {case.H(NO_MODEL, fewest)}"
+    yield f"How many runs? With {runs}, {best} ({BEST}) has {case.H(best, fewest)} mean error; {text}."
 
 
 def _headline(case: AnswerCase) -> Iterator[str]:
@@ -252,12 +249,12 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     best, largest = case.best, case.table.amounts[-1]
     rows = case.rows[case.rows["N_D"] == largest].set_index("model")
     if best is None:
-        yield f"With {count_runs(largest)}, no model is {BEST}. {_mean_errors(case.results, rows['H'])}"
+        yield f"With {counted_text(largest, 'run')}, no model is {BEST}. {_mean_errors(case.results, rows['H'])}"
         return
     alone, worst = (length_in_metres(float(rows[name][best])) for name in ("A", "H_90"))
     without = f" Without physics: {case.H(NO_MODEL, largest)}." if NO_MODEL in rows.index else ""
     yield (
-        f"With {count_runs(largest)}, {best} ({BEST}; {alone} mean error alone) predicts "
+        f"With {counted_text(largest, 'run')}, {best} ({BEST}; {alone} mean error alone) predicts "
         f"{_horizon_in_words(case.results)} ahead with {case.H(best, largest)} mean error; "
         f"nine errors in ten are below {worst}.{without}"
     )
@@ -273,7 +270,7 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         yield from _listed(sides, "Compensation harms", "It is not shown that compensation helps")
     if models and smallest < largest:
         gain = table.compare([[(1.0, name, 0), (-1.0, name, last)] for name in models])
-        are = f"{count_runs(largest)} are"
+        are = f"{counted_text(largest, 'run')} are"
         sides = case.sides(models, gain)
         yield from _listed(sides, f"{are} worse than {smallest} for", f"{are} not clearly better than {smallest} for")
     constant = f"constant u, v, r ({length_in_metres(float(case.results.naive.mean()))})"
@@ -284,7 +281,7 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         sides = case.sides(models, paired_difference(ahead, table.counts, noise))
         yield from _listed(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
         if len(sides[0]) == len(models):
-            yield f"With {count_runs(largest)}, all {len(models)} models beat {constant}."
+            yield f"With {counted_text(largest, 'run')}, all {len(models)} models beat {constant}."
 
 
 def _listed(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:
@@ -308,11 +305,11 @@ def _how_to_read(case: AnswerCase) -> Iterator[str]:
         yield f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another."
         return
     yield (
-        f"Brackets are 95 % intervals over {count_manoeuvres(runs)} of one world. A test of several models "
-        "is corrected for their number (Holm): one that a short list names may be missing in a longer one."
+        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} of one world. A test of several "
+        "models is corrected for their number (Holm): one that a short list names may be missing in a longer one."
     )
     if len(amounts) > 1 and case.results.cells["seed"].nunique() == 1:
         yield (
-            f"One seed drew the training runs. With other draws of {count_runs(amounts[0])} the errors may lie "
-            "outside the brackets: more grid.seeds would show it."
+            f"One seed drew the training runs. With other draws of {counted_text(amounts[0], 'run')} the errors may "
+            "lie outside the brackets: more grid.seeds would show it."
         )

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypedDict, TypeVar
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
 from shipid.evidence import FEWEST_RUNS, Differences
 from shipid.report.content import model_text
-from shipid.report.wording import join_few_names
+from shipid.report.wording import counted_text, join_few_names
 from shipid.study.declared import NO_MODEL
 from shipid.units import length_decimals, plural_word
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 Judgement = tuple[Verdict, str, Mapping[str, float]]  # with the evidence in words, and key numbers by name and unit
-Judged = TypeVar("Judged", contravariant=True)
 MOST_NAMES = 5  # in one sentence
-SAME_A = "all physics models have the same A, so nothing can rise with it"
 EQUAL_A = "it is not shown which of them is more accurate"
 
 
@@ -37,13 +35,13 @@ class UndecidedClaim(Exception):
 
 
 @dataclass(frozen=True)
-class ClaimRule(Generic[Judged]):
+class ClaimRule:
     """A claim and how it is judged: `judge` takes what the claim is about, or raises UndecidedClaim."""
 
     claim: str
-    judge: Callable[[Judged], Judgement]
+    judge: Callable[[Any], Judgement]
 
-    def decide(self, case: Judged) -> Judgement:
+    def decide(self, case: object) -> Judgement:
         """Verdict, evidence and numbers; undecided, with the reason as evidence, where something lacks."""
         try:
             return self.judge(case)
@@ -51,7 +49,7 @@ class ClaimRule(Generic[Judged]):
             return "undecided", str(reason), {}
 
 
-def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[ClaimVerdict]:
+def judge_claims(rules: Mapping[str, ClaimRule], case: object, note: str = "") -> list[ClaimVerdict]:
     """The finding of each rule, in order. note : what is added to the evidence of all."""
     findings: list[ClaimVerdict] = []
     for key, rule in rules.items():
@@ -61,7 +59,7 @@ def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = 
     return findings
 
 
-def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[ClaimVerdict]:
+def leave_undecided(rules: Mapping[str, ClaimRule], reason: str) -> list[ClaimVerdict]:
     """Every claim undecided, for the same reason."""
     return [
         ClaimVerdict(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()
@@ -113,21 +111,12 @@ def least_to_greatest(*numbers: str) -> str:
     return " to ".join(dict.fromkeys(numbers))
 
 
-def count_manoeuvres(count: int) -> str:
-    """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
-    return f"{count} {plural_word(count, 'test manoeuvre')}"
-
-
 def too_few_manoeuvres(count: int) -> str:
     """Say that so many test manoeuvres give no interval; empty if they do."""
     if count >= FEWEST_RUNS:
         return ""
-    return f"{count_manoeuvres(count)} {plural_word(count, 'gives', 'give')} no interval, {FEWEST_RUNS} would"
-
-
-def count_runs(count: int) -> str:
-    """Return `1 run`, `2 runs`, ..."""
-    return f"{count} {plural_word(count, 'run')}"
+    give = plural_word(count, "gives", "give")
+    return f"{counted_text(count, 'test manoeuvre')} {give} no interval, {FEWEST_RUNS} would"
 
 
 def quoted_model(model: str) -> str:

@@ -108,6 +108,9 @@ def test_a_kind_that_no_run_of_calibration_has_is_promised_nothing(results: Resu
     words = [sentence for sentence, _ in bands.answer_on_bands(replace(results, bands=other))]
     (kind,) = set(results.kinds.values())
     assert f"Nothing is promised for {kind}: no such run calibrated the bands." in words
+    promise = judge_findings(replace(results, bands=other))[-1]
+    assert promise["verdict"] == "undecided"
+    assert f"no run of the kind {kind} calibrated them, so they promise nothing for 4" in promise["evidence"]
 
 
 def test_too_few_runs_are_reported(tiny_run: Path) -> None:
@@ -209,7 +212,7 @@ def test_why_no_band_is_promised_is_the_reason_of_the_cells_with_most_runs(resul
     most = max(row["N_D"] for row in results.rows)
     reasons = {row["cell"]: f"{NO_BAND}{row['N_D']} runs calibrate it" for row in results.rows}
     ((sentence, _),) = bands.answer_on_bands(replace(results, bands={}, no_band=reasons))
-    assert sentence == f"No band is promised: {most} runs calibrate it."
+    assert sentence.startswith(f"No band is promised: {most} runs calibrate it (")
 
 
 def test_a_refit_that_has_too_little_to_train_leaves_its_runs_without_errors(tmp_path: Path) -> None:

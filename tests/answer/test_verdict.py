@@ -9,7 +9,6 @@ import numpy as np
 from shipid.answer.verdict import (
     ClaimRule,
     UndecidedClaim,
-    count_runs,
     difference_with_interval,
     interval_after,
     judge_claims,
@@ -62,7 +61,6 @@ def test_numbers_in_words() -> None:
     assert length_in_metres(9.8) + interval_after(8.13, 11.52, 9.8) == "9.80 m [8.13, 11.52]"
     assert interval_after(-0.001, 0.0123, 0.01) == " [-0.001, 0.012]"
     assert interval_after(np.nan, np.nan, 1.0) == ""
-    assert count_runs(1) == "1 run"
     assert too_few_manoeuvres(1) == "1 test manoeuvre gives no interval, 5 would"
     assert too_few_manoeuvres(5) == ""
 
