@@ -57,8 +57,7 @@ def position_error(predicted: Array, true: Array) -> Array:
 def coverage_by_run(held: NDArray[Any], run: NDArray[Any]) -> Array:
     """Share of the windows (S,) of each run that lie in their bands, runs by name."""
     _, place = np.unique(run, return_inverse=True)
-    shares: Array = np.bincount(place, held) / np.bincount(place)
-    return shares
+    return np.asarray(np.bincount(place, held) / np.bincount(place))
 
 
 def coverage_share(held: NDArray[Any], run: NDArray[Any]) -> float:
@@ -105,8 +104,7 @@ def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
         bin_ = int(np.searchsorted(running, place, side="right"))
         places.append(bin_ + min((place - running[bin_] + row[bin_] + 0.5) / row[bin_], 1.0))
     octave, step = np.divmod(np.reshape(places, counts.shape[:-1]), BINS_AN_OCTAVE)
-    quantile: Array = 2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE)
-    return quantile
+    return np.asarray(2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE))
 
 
 SLOW = 0.2  # m/s over ground: a slower ship has no course
@@ -123,14 +121,12 @@ def course_over_horizon(predicted: Array, true: Array, step: float) -> Array:
     moves = vector_lengths(truly) >= SLOW * step
     angle = np.abs(np.arctan2(cross, (truly * going).sum(axis=-1)))
     count = moves.sum(axis=1)
-    mean: Array = np.where(count > 0, (angle * moves).sum(axis=1) / np.maximum(count, 1), np.nan)
-    return mean
+    return np.asarray(np.where(count > 0, (angle * moves).sum(axis=1) / np.maximum(count, 1), np.nan))
 
 
 def error_of_windows(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
-    mean: Array = error.mean(axis=0)
-    return mean
+    return np.asarray(error.mean(axis=0))
 
 
 def path_roughness(paths: Array) -> float:

@@ -86,7 +86,8 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 
 def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
     """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
-    folders, called, notes, frames = [results.folder.resolve() for results in runs], _names_of_first(pairs), [], []
+    folders, notes, frames = [results.folder.resolve() for results in runs], [], []
+    called = {other: first for first, other in (pairs or {}).items()}
     shared = os.path.commonpath(folders)
     names = tuple(str(folder.relative_to(shared)) for folder in folders)
     for name, results in zip(names, runs, strict=True):
@@ -96,7 +97,7 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
         if good < results.plan.cells:
             notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
         if results is not runs[0]:
-            frame, words = _compare_with_first(runs[0], results, pairs or {})
+            frame, words = _compare_with_first(runs[0], results, called)
             frames.append(frame.assign(folder=name))
             notes += [f"{name}: {note}" for note in words]
     documents = document_differences([results.plan for results in runs], [{}, *[called] * len(frames)])
@@ -105,15 +106,11 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
     return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
 
 
-def _names_of_first(pairs: Mapping[str, str] | None) -> dict[str, str]:
-    return {other: first for first, other in (pairs or {}).items()}
-
-
-def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:
-    """Rows of `Comparison.errors` for one run, without its name, and notes."""
-    mine, others, notes, called = _matching_cells(first), _matching_cells(other), [], _names_of_first(pairs)
+def _compare_with_first(first: Results, other: Results, called: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:
+    """Rows of `Comparison.errors` for one run, without its name, and notes; called : its names -> the first's."""
+    mine, others, notes, named = _matching_cells(first), _matching_cells(other), [], set(called.values())
     for key in ("family", "method"):
-        names = others[key].map(lambda name: called.get(name, name if name not in pairs else None))
+        names = others[key].map(lambda name: called.get(name, name if name not in named else None))
         others = others.assign(**{key: names, f"{key} there": others[key]})
         for who, one, rest in (("the first", mine, others), ("this", others, mine)):
             if lonely := [name for name in dict.fromkeys(one[key].dropna()) if name not in set(rest[key])]:
@@ -141,9 +138,11 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
         rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides})
         differences.append(one)
     for verdict, side in (("lower", "below"), ("higher", "above")):
-        shown = which_significant(np.array([getattr(one, side) for one in differences]))
-        for row in (row for row, sure in zip(rows, shown, strict=True) if sure and not row["verdict"]):
-            row["verdict"] = verdict
+        shown = which_significant(np.array([getattr(difference, side) for difference in differences]))
+        rows = [
+            row | {"verdict": verdict} if sure and not row["verdict"] else row
+            for row, sure in zip(rows, shown, strict=True)
+        ]
     same_rows, runs = sum(row["verdict"] == IDENTICAL for row in rows), len(set(first.test.run[here]))
     whole = len(here) == len(first.test) == len(other.test)
     notes.append(
@@ -178,7 +177,7 @@ def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], 
         for of in (first.test, other.test)
     )
     keys = one.index[one.index.isin(two.index)]
-    here, there = one[keys].to_numpy(dtype=np.int64), two[keys].to_numpy(dtype=np.int64)
+    here, there = (np.asarray(of[keys], dtype=np.int64) for of in (one, two))
     columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MOTION_COLUMNS]
     same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
     drawn = drawn_conditions(first.plan)  # the same orders, whatever the ship

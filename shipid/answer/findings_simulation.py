@@ -231,10 +231,11 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         f"share of high models shown to lead at N_D = {grid.table.amounts[-1]}": float(better.mean()),
         f"share of high models shown to be worse at N_D = {grid.table.amounts[-1]}": float(worse.mean()),
     }
-    orders, moves = table.H[NO_MODEL].shape[1], "undecided"
+    orders = table.H[NO_MODEL].shape[1]
     if orders < FEWEST_ORDERS:
         lacks = f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has"
         return "undecided", f"{evidence}; {lacks} {orders} {plural_word(orders, 'seed')}", numbers
+    moves: Verdict = "undecided"
     if worst:
         of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
         more = _chance_of_mean(of_worst - calm)
@@ -257,8 +258,7 @@ def _chance_of_mean(values: Array) -> float:
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
     H = np.array([table.H[model] @ table.weights for model in models])
-    moved: Array = np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1))
-    return moved
+    return np.asarray(np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1)))
 
 
 def _judge_metric(grid: ErrorGrid) -> Judgement:
@@ -352,7 +352,8 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     names = np.unique(run)
 
     def by_run(paths: Sequence[Array]) -> Array:
-        return np.mean([[path_roughness(path[:, run == name]) for name in names] for path in paths], axis=0)
+        by_path = [[path_roughness(path[:, run == name]) for name in names] for path in paths]
+        return np.array(by_path).mean(axis=0)
 
     pure, together = (
         by_run([results.paths[cell] for model in models for cell in cells["cell"][cells["model"] == model]])

@@ -15,7 +15,7 @@ from shipid.metrics import course_over_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
 from shipid.report.content import TRIAL_COLUMNS, PathKey
-from shipid.report.selection import FEW_RUNS, spread_items
+from shipid.report.selection import FEW_RUNS, figure_sizes, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
 from shipid.study.envelope import envelope_table
@@ -28,13 +28,6 @@ ALL_KINDS = "all"
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 CLOCK = 6  # digits after the point of a time in a run [s]
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
-
-
-def figure_amounts(results: Results) -> list[int]:
-    """Return the N_D that curves and paths are kept for: smallest, middle (of the logarithm) and largest."""
-    amounts = sorted(set(results.cells["N_D"]))
-    middle = np.sqrt(amounts[0] * amounts[-1])
-    return sorted({amounts[0], min(amounts, key=lambda amount: abs(np.log(amount / middle))), amounts[-1]})
 
 
 def figure_runs(results: Results) -> list[str]:
@@ -55,7 +48,7 @@ def _finite_physics(results: Results) -> dict[str, np.ndarray]:
 
 def _figure_paths(results: Results) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """Keys of a curve and its path: physics alone, where no cell has the same name, and the cells of shown amounts."""
-    alone, amounts = alone_models(results), figure_amounts(results)
+    alone, amounts = alone_models(results), figure_sizes(results.cells["N_D"])
     for model, path in _finite_physics(results).items():
         if model not in alone:
             yield {"model": model, "N_D": 0, "seed": 0, "source": "physics"}, path
@@ -164,7 +157,7 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
     test, level, origin = results.test, results.plan.study.bands.level, np.zeros((1, 2))
     paths: dict[PathKey, np.ndarray] = {("", "naive", 0): constant_motion(test)}
     edges: dict[PathKey, Region] = {}
-    alone, amounts, seed = alone_models(results), figure_amounts(results), int(results.cells["seed"].min())
+    alone, amounts, seed = alone_models(results), figure_sizes(results.cells["N_D"]), int(results.cells["seed"].min())
     paths |= {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     for row in results.rows:
         if row["cell"] in results.paths and row["N_D"] in amounts and row["seed"] == seed:

@@ -113,7 +113,10 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
     """
     rows, plan = errors_by_model(results), results.plan
     rows = rows[~rows["family"].isin(results.aside)]
-    caveats, seen = [(text, "cells") for text in _missing_cells(results)], [(s, "models") for s in _runs_seen(results)]
+    caveats, seen = (
+        [(text, "cells") for text in _missing_cells(results)],
+        [(s, "models") for s in _caveats_of_families(results)],
+    )
     learns = any(way.method.compensates for way in plan.methods if way.name == verdict_method(plan))
     largest = int(results.cells["N_D"].max())
     if not learns or not (rows["family"].ne(NO_MODEL) & rows["N_D"].eq(largest)).any():
@@ -149,7 +152,7 @@ def _missing_cells(results: Results) -> Iterator[str]:
         yield f"{len(failed)} of {len(results.cells)} cells {have} no result ({why})."
 
 
-def _runs_seen(results: Results) -> Iterator[str]:
+def _caveats_of_families(results: Results) -> Iterator[str]:
     """Which families know more runs than the others, of the test or of training."""
     saw = families_set_from(results.plan, results.test.spans)
     if saw:
@@ -191,9 +194,9 @@ def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
     models = [str(name) for name in case.with_physics(amount)["model"] if name in case.table.H]
     better, worse, unknown = case.sides(models, case.table.lead(NO_MODEL, models, place))
     count = f"all {len(models)}" if len(better) == len(models) > 1 else f"{len(better) or 'none'} of {len(models)}"
-    verb = _do(better) if better else "is shown to do"
+    verb = plural_word(len(better), "does", "do") if better else "is shown to do"
     words = [f"{count} physics models {verb} better than no physics"]
-    words += [f"{model_list(worse)} {_do(worse)} worse"] if worse else []
+    words += [f"{model_list(worse)} {plural_word(len(worse), 'does', 'do')} worse"] if worse else []
     words += [f"for {model_list(unknown)} the test cannot tell"] if unknown else []
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or not (better or worse) or (limit.above and worse) or (limit.below and better):
@@ -207,10 +210,6 @@ def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
             f"physics does not pay even with an error A of {length_in_metres(limit.limits[0])}, the best tried{bounds}"
         )
     return f"{pays}: {'; '.join(words)}"
-
-
-def _do(models: Sequence[str]) -> str:
-    return plural_word(len(models), "does", "do")
 
 
 def _two_digits(value: float) -> str:
@@ -267,24 +266,26 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
     if fixed:
         gain = table.compare([[(1.0, name, PHYSICS_ONLY), (-1.0, name, last)] for name in fixed])
         sides = case.sides(fixed, gain)
-        yield from _listed(sides, "Compensation harms", "It is not shown that compensation helps")
+        yield from _sentences_on_sides(sides, "Compensation harms", "It is not shown that compensation helps")
     if models and smallest < largest:
         gain = table.compare([[(1.0, name, 0), (-1.0, name, last)] for name in models])
         are = f"{counted_text(largest, 'run')} are"
         sides = case.sides(models, gain)
-        yield from _listed(sides, f"{are} worse than {smallest} for", f"{are} not clearly better than {smallest} for")
+        yield from _sentences_on_sides(
+            sides, f"{are} worse than {smallest} for", f"{are} not clearly better than {smallest} for"
+        )
     constant = f"constant u, v, r ({length_in_metres(float(case.results.naive.mean()))})"
     if models:
         errors = np.stack([table.by_run(name, last) for name in models])
         ahead = case.results.by_run(error_of_windows(case.results.naive)) - errors
         noise = errors @ table.weights * table.noise[last]
         sides = case.sides(models, paired_difference(ahead, table.counts, noise))
-        yield from _listed(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
+        yield from _sentences_on_sides(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
         if len(sides[0]) == len(models):
             yield f"With {counted_text(largest, 'run')}, all {len(models)} models beat {constant}."
 
 
-def _listed(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:
+def _sentences_on_sides(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:
     """A sentence on the models that are worse and one on those that are not known to be better, if there are any."""
     for words, models in ((worse, sides[1]), (unknown, sides[2])):
         if models:

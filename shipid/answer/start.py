@@ -44,8 +44,7 @@ def run(
     Raises ShipidError for whatever a user can mend.
     """
     if read_plan(study, set).parts:
-        message = "is a study of several parts: run it by `shipid.events`, and read each folder in parts/ separately"
-        raise ShipidError(message, path=str(study))
+        raise ShipidError("has several parts: run it by `shipid.events`, read each folder in parts/", path=str(study))
     for event in events(study, set, out, workers, scheduler=scheduler, device=device):
         if line := event_line(event):
             log.info("%s", line)

@@ -179,12 +179,6 @@ def test_trials_know_the_chosen_one(read: Results) -> None:
     assert not frames.trials_frame(replace(read, cells=pd.DataFrame([{**first, "trials": diverged}])))["chosen"].any()
 
 
-def test_curves_are_kept_for_the_ends_and_the_middle_of_the_amounts(read: Results) -> None:
-    many = pd.concat([read.cells.assign(N_D=10 * k) for k in range(1, 11)], ignore_index=True)
-    assert frames.figure_amounts(replace(read, cells=many)) == [10, 30, 100]
-    assert frames.figure_amounts(replace(read, cells=read.cells[read.cells["N_D"] == 4])) == [4]
-
-
 def test_factors_are_those_of_the_members(read: Results) -> None:
     frame = frames.factors_frame(read)
     assert set(frame["model"]) == {"wrong-1", "wrong-2"}
