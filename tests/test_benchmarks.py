@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from tests.benchmarks.__main__ import THREADS, verdict
-from tests.benchmarks.by_seeds import median_slope
 from tests.benchmarks.compare import Ratio, accepted, best, compare, read_recorded
 
 RECORDED: dict[str, dict[str, dict[str, Any]]] = {
@@ -99,12 +97,3 @@ def test_what_is_recorded_is_whole() -> None:
             assert entry.keys() <= {"better", "value", "promise"}
             assert entry.keys() & {"value", "promise"}
             assert "[" not in label or "value" not in entry, label
-
-
-def test_median_slope_ignores_a_point_far_off() -> None:
-    x = np.arange(7.0)
-    y = 3.0 + 0.5 * x
-    y[6] = 100.0
-    assert median_slope(x, y) == pytest.approx(0.5)
-    assert median_slope(np.array([0.0, 0.0, 2.0]), np.array([5.0, 1.0, 3.0])) == pytest.approx(0.0)
-    assert np.isnan(median_slope(np.ones(3), np.arange(3.0)))

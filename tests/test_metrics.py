@@ -51,12 +51,6 @@ def test_a_diverged_window_is_reported_and_not_averaged_away():
     assert np.isnan([result["mean"], result["p90"], result["rms"]]).all()
 
 
-def test_the_mean_over_windows_is_that_of_all_points(paths):
-    error = metrics.position_error(*paths)
-    assert metrics.error_of_windows(error).shape == (40,)
-    assert metrics.error_of_windows(error).mean() == pytest.approx(metrics.summarise_errors(error)["mean"])
-
-
 def test_roughness_by_hand():
     """A zigzag of 1 m has second differences of 2 m; a circle of radius R has (speed x step)^2 / R."""
     zigzag = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [3.0, 1.0]])[:, None, :]

@@ -193,7 +193,9 @@ def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
     """
     models = [str(name) for name in case.with_physics(amount)["model"] if name in case.table.H]
     better, worse, unknown = case.sides(models, case.table.lead(NO_MODEL, models, place))
-    count = f"all {len(models)}" if len(better) == len(models) > 1 else f"{len(better) or 'none'} of {len(models)}"
+    count = f"{len(better) or 'none'} of {len(models)}"
+    if len(better) == len(models) > 1:
+        count = "both" if len(models) == 2 else f"all {len(models)}"
     verb = plural_word(len(better), "does", "do") if better else "is shown to do"
     words = [f"{count} physics models {verb} better than no physics"]
     words += [f"{model_list(worse)} {plural_word(len(worse), 'does', 'do')} worse"] if worse else []

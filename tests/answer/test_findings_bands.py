@@ -49,12 +49,6 @@ def test_long_manoeuvres_that_are_harder_break_no_promise() -> None:
     assert "(24 test manoeuvres, each counts the same)" in evidence
 
 
-def test_a_plainly_kept_and_a_plainly_broken_promise_are_seen() -> None:
-    rng = np.random.default_rng(4)
-    assert [held(rng, 0.97, runs=60) for _ in range(20)].count("confirmed") >= 18
-    assert [held(rng, 0.6) for _ in range(20)].count("refuted") >= 18
-
-
 @pytest.mark.parametrize(
     ("shares", "expected"), [((0.88, 0.92), "confirmed"), ((0.76, 1.0), "undecided"), ((0.8, 0.92), "refuted")]
 )

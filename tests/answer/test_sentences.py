@@ -69,9 +69,7 @@ def test_physics_worth_no_run_at_all(made: Any) -> None:
 
 def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
-    first = (
-        "How good must the physics be, 8 s ahead? With 10 or 30 runs all 2 physics models do better than no physics."
-    )
+    first = "How good must the physics be, 8 s ahead? With 10 or 30 runs both physics models do better than no physics."
     assert advice.startswith(f"{first}\n")
 
 
