@@ -91,10 +91,8 @@ def answer_on_bands(results: Results) -> list[tuple[str, str]]:
 
 def uncalibrated_kinds(results: Results, cells: Iterable[str]) -> set[str]:
     """Kinds of manoeuvre of test runs that no run of calibration has, for a band of some cells: nothing is promised."""
-    known = [
-        set[str](results.bands[cell].kinds) for cell in cells if cell in results.bands and results.bands[cell].kinds
-    ]
-    return set(results.kinds.values()) - set.intersection(*known) if known else set()
+    known = [results.bands[cell].kinds for cell in cells if cell in results.bands and results.bands[cell].kinds]
+    return {kind for kind in results.kinds.values() if not all(kind in kinds for kinds in known)}
 
 
 def of_methods(results: Results, names: Sequence[str]) -> str:

@@ -78,7 +78,8 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 
     Raises ResultError for a folder without a result, ShipidError where no cell, or no test manoeuvre, is in both.
     """
-    places = [as_path("folder", folder) for folder in ([folders] if isinstance(folders, str) else folders)]
+    several = isinstance(folders, Sequence) and not isinstance(folders, str)
+    places = [as_path("folder", folder) for folder in folders] if several else []
     if len(places) < 2 or len({place.resolve() for place in places}) < len(places):
         raise ShipidError("name two folders or more, each once")
     return compare_results([read_results(place) for place in places], pairs)
@@ -126,17 +127,17 @@ def _compare_with_first(first: Results, other: Results, called: Mapping[str, str
     rows, differences = [], []
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
         sides = {"first": _cell_errors(first, part, "first", here), "other": _cell_errors(other, part, "other", away)}
-        one = compare_cells(sides["other"], sides["first"])
+        difference = compare_cells(sides["other"], sides["first"])
         row: dict[str, Any] = {
             key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")
         }
         row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
         row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in sides.items()}
-        row |= {"difference": one.mean, "low": one.low, "high": one.high}
+        row |= {"difference": difference.mean, "low": difference.low, "high": difference.high}
         same = all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True))
         row |= {"verdict": IDENTICAL if same else ""}
         rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides})
-        differences.append(one)
+        differences.append(difference)
     for verdict, side in (("lower", "below"), ("higher", "above")):
         shown = which_significant(np.array([getattr(difference, side) for difference in differences]))
         rows = [

@@ -353,7 +353,7 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
 
     def by_run(paths: Sequence[Array]) -> Array:
         by_path = [[path_roughness(path[:, run == name]) for name in names] for path in paths]
-        return np.array(by_path).mean(axis=0)
+        return np.asarray(np.mean(by_path, axis=0))
 
     pure, together = (
         by_run([results.paths[cell] for model in models for cell in cells["cell"][cells["model"] == model]])
