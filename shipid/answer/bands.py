@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.answer.verdict import least_to_greatest, length_in_metres, model_list
+from shipid.answer.verdict import least_to_greatest, model_list
 from shipid.evidence import share_interval
 from shipid.hybrid.bands import Region
 from shipid.metrics import coverage_share
 from shipid.predictor import NO_BAND
-from shipid.report.wording import join_few_names
+from shipid.report.wording import join_few_names, metres_text
 from shipid.study.results import Results
 from shipid.units import level_text, percent_text, plural_word
 
@@ -76,7 +76,7 @@ def answer_on_bands(results: Results) -> list[tuple[str, str]]:
         return [(f"No band is promised: {'; '.join(each)}.", "cells")] if each else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
     share, low, high = (percent_text(float(top[name].mean())) for name in ("coverage", "low", "high"))
-    radius = least_to_greatest(length_in_metres(top["width"].min()), length_in_metres(top["width"].max()))
+    radius = least_to_greatest(metres_text(top["width"].min()), metres_text(top["width"].max()))
     cells = results.cells[results.cells["model"].isin(top["model"]) & results.cells["N_D"].isin(top["N_D"])]
     data = f"{of_methods(results, [*cells['method'].unique()])} with {top['N_D'].iloc[0]} runs; 95 % interval"
     mean = f"mean of {len(top)} models{data} of a single model" if len(top) > 1 else data.lstrip()

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.answer.verdict import length_in_metres
 from shipid.evidence import Differences, paired_difference, training_noise
 from shipid.metrics import position_error
+from shipid.report.wording import metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs
 from shipid.study.results import Results
@@ -73,7 +73,7 @@ class ErrorTable:
 
     def metres(self, model: str, place: int) -> str:
         """Error of a model at an amount, or of its physics alone, in words."""
-        return length_in_metres(self.mean(model, place))
+        return metres_text(self.mean(model, place))
 
     def interval(self, model: str, place: int) -> tuple[float, float]:
         """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""

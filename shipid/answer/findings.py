@@ -49,14 +49,13 @@ from shipid.answer.verdict import (
     judge_claims,
     least_to_greatest,
     leave_undecided,
-    length_in_metres,
     quoted_model,
     too_few_manoeuvres,
     verdict_of,
 )
 from shipid.evidence import Differences, all_significant, any_significant, paired_difference, share_interval
 from shipid.metrics import coverage_share, position_error
-from shipid.report.wording import counted_text, join_few_names
+from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import unfair_reason, verdict_method
 from shipid.study.results import Results
@@ -126,8 +125,7 @@ def _judge_gap(rivals: Rivals) -> Judgement:
     before, after = (abs(table.mean(rivals.bad, at) - table.mean(rivals.good, at)) for at in (PHYSICS_ONLY, last))
     counts = 0 if gaps.mean[0] < gaps.mean[1] else 1  # the gap of H has the sign of that of A, or not
     evidence = (
-        f"gap {length_in_metres(before)} before, {length_in_metres(after)} after: "
-        f"{difference_with_interval(gaps, counts)} less"
+        f"gap {metres_text(before)} before, {metres_text(after)} after: {difference_with_interval(gaps, counts)} less"
     )
     decided = verdict_of(all_significant(gaps.above), any_significant(gaps.below))
     return decided, evidence, {"gap before [m]": before, "gap after [m]": after}
@@ -174,12 +172,9 @@ def full_scale_findings(results: Results) -> list[ClaimVerdict]:
     names = {one.family: one.name for one in results.plan.foundations if one.family in claims.roles.values()}
     good, bad = names[str(claims.accurate)], names[str(claims.inaccurate)]
     table = error_table(results, (good, bad))
-    if any(name not in table.H for name in (good, bad, NO_MODEL)):
-        return leave_undecided(FULL_SCALE_RULES, "a cell that it needs has failed or is missing")
-    if any(name not in table.A for name in (good, bad)):
-        return leave_undecided(
-            FULL_SCALE_RULES, "the physics of a claim is identified again in every cell, so it has no single A"
-        )
+    if not ({good, bad, NO_MODEL} <= set(table.H) and {good, bad} <= set(table.A)):
+        reason = "a cell that it needs has no result, or its physics, identified again in every cell, has no single A"
+        return leave_undecided(FULL_SCALE_RULES, reason)
     note = counted_text(table.runs, "test manoeuvre")
     if few := too_few_manoeuvres(table.runs):
         note = f'{few}: [repeat] "split.test" tests other runs in turn'

@@ -44,7 +44,6 @@ from shipid.answer.verdict import (
     judge_claims,
     least_to_greatest,
     leave_undecided,
-    length_in_metres,
     model_list,
     quoted_model,
     too_few_manoeuvres,
@@ -65,7 +64,7 @@ from shipid.evidence import (
     which_significant,
 )
 from shipid.metrics import path_roughness, rank_correlation
-from shipid.report.wording import counted_text, join_few_names
+from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import verdict_method
 from shipid.study.results import Results
@@ -360,7 +359,7 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
         for models in ([NO_MODEL], physics)
     )
     decided, numbers = compare_roughness(by_run([results.test.future]), pure, together, results.windows)
-    rough, cooperative, true = (length_in_metres(value) for value in numbers.values())
+    rough, cooperative, true = (metres_text(value) for value in numbers.values())
     evidence = (
         f"at N_D = {grid.table.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, "
         f"true paths {true} ({counted_text(len(names), 'test manoeuvre')})"

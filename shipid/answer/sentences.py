@@ -14,8 +14,7 @@ import pandas as pd
 
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.verdict import (
-    interval_after,
-    length_in_metres,
+    length_with_interval,
     model_list,
     quoted_model,
     too_few_manoeuvres,
@@ -23,7 +22,7 @@ from shipid.answer.verdict import (
 from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
-from shipid.report.wording import counted_text, join_few_names
+from shipid.report.wording import counted_text, join_few_names, metres_text, short_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, learning_methods, orders_may_react, verdict_method
 from shipid.study.results import Results
@@ -93,8 +92,8 @@ class AnswerCase:
         """H of a model with its interval, in words."""
         error = float(self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)]["H"].iloc[0])
         known = model in self.table.H
-        return length_in_metres(error) + (
-            interval_after(*self.table.interval(model, self.ends[amount]), error) if known else ""
+        return length_with_interval(
+            error, *(self.table.interval(model, self.ends[amount]) if known else (np.nan, np.nan))
         )
 
     def sides(self, models: Sequence[str], differences: Differences) -> list[list[str]]:
@@ -165,7 +164,7 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
 def _mean_errors(results: Results, errors: pd.Series[float]) -> str:
     """Some errors [m] by name, the least of them first, as a sentence."""
     known = errors.sort_values(kind="stable").items()
-    words = [f"{quoted_model(str(name))} {length_in_metres(value)}" for name, value in known]
+    words = [f"{quoted_model(str(name))} {metres_text(value)}" for name, value in known]
     return f"Mean errors {_horizon_in_words(results)} ahead: {join_few_names(words, MOST_SHOWN)}."
 
 
@@ -203,20 +202,13 @@ def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or not (better or worse) or (limit.above and worse) or (limit.below and better):
         return "; ".join(words)
-    bounds = _bounds(limit, _two_digits)
-    pays = f"physics pays if its error A is below about {_two_digits(limit.value)} m{bounds}"
+    bounds = _bounds(limit, short_text)
+    pays = f"physics pays if its error A is below about {short_text(limit.value)} m{bounds}"
     if limit.above:
-        pays = f"physics pays even with an error A of {length_in_metres(limit.limits[1])}, the worst tried{bounds}"
+        pays = f"physics pays even with an error A of {metres_text(limit.limits[1])}, the worst tried{bounds}"
     elif limit.below:
-        pays = (
-            f"physics does not pay even with an error A of {length_in_metres(limit.limits[0])}, the best tried{bounds}"
-        )
+        pays = f"physics does not pay even with an error A of {metres_text(limit.limits[0])}, the best tried{bounds}"
     return f"{pays}: {'; '.join(words)}"
-
-
-def _two_digits(value: float) -> str:
-    """A length with two digits: more would be pretence."""
-    return f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
 
 
 def _bounds(estimate: Estimate, write: Callable[[float], str]) -> str:
@@ -252,7 +244,7 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     if best is None:
         yield f"With {counted_text(largest, 'run')}, no model is {BEST}. {_mean_errors(case.results, rows['H'])}"
         return
-    alone, worst = (length_in_metres(float(rows[name][best])) for name in ("A", "H_90"))
+    alone, worst = (metres_text(float(rows[name][best])) for name in ("A", "H_90"))
     without = f" Without physics: {case.H(NO_MODEL, largest)}." if NO_MODEL in rows.index else ""
     yield (
         f"With {counted_text(largest, 'run')}, {best} ({BEST}; {alone} mean error alone) predicts "
@@ -276,7 +268,7 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         yield from _sentences_on_sides(
             sides, f"{are} worse than {smallest} for", f"{are} not clearly better than {smallest} for"
         )
-    constant = f"constant u, v, r ({length_in_metres(float(case.results.naive.mean()))})"
+    constant = f"constant u, v, r ({metres_text(float(case.results.naive.mean()))})"
     if models:
         errors = np.stack([table.by_run(name, last) for name in models])
         ahead = case.results.by_run(error_of_windows(case.results.naive)) - errors

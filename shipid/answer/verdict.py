@@ -10,9 +10,9 @@ import numpy as np
 
 from shipid.evidence import FEWEST_RUNS, Differences
 from shipid.report.content import model_text
-from shipid.report.wording import counted_text, join_few_names
+from shipid.report.wording import counted_text, difference_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
-from shipid.units import length_decimals, plural_word
+from shipid.units import plural_word
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 Judgement = tuple[Verdict, str, Mapping[str, float]]  # with the evidence in words, and key numbers by name and unit
@@ -77,33 +77,14 @@ def weakest_verdict(verdicts: Iterable[Verdict]) -> Verdict:
     return "refuted" if "refuted" in parts else verdict_of(set(parts) == {"confirmed"}, False)
 
 
-def length_in_metres(value: float) -> str:
-    """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
-    return f"{_fixed_decimals(value, _decimal_places(value))} m"
-
-
-def _decimal_places(value: float) -> int:
-    return 1 if abs(value) >= 9.995 else length_decimals(value)
-
-
-def _fixed_decimals(value: float, places: int) -> str:
-    """Return a number with so many decimals, and no minus zero."""
-    return f"{round(value, places) + 0.0:.{places}f}"
-
-
-def interval_after(low: float, high: float, value: float) -> str:
-    """Return ` [low, high]` with the decimals of the value that it follows, or nothing where there is none."""
-    places = _decimal_places(value)
-    return (
-        f" [{_fixed_decimals(low, places)}, {_fixed_decimals(high, places)}]" if np.isfinite([low, high]).all() else ""
-    )
+def length_with_interval(value: float, low: float, high: float) -> str:
+    """Return a length [m] with its interval, if it has one."""
+    return difference_text(value, low, high) if np.isfinite([low, high]).all() else metres_text(value)
 
 
 def difference_with_interval(differences: Differences, index: int = 0) -> str:
-    """Return a difference with its 95 % interval, all with the decimals of the greatest."""
-    mean, low, high = (float(values[index]) for values in (differences.mean, differences.low, differences.high))
-    greatest = float(np.nanmax(np.abs([mean, low, high])))
-    return f"{_fixed_decimals(mean, _decimal_places(greatest))} m{interval_after(low, high, greatest)}"
+    """Return a difference with its 95 % interval, if it has one."""
+    return length_with_interval(*(float(ends[index]) for ends in (differences.mean, differences.low, differences.high)))
 
 
 def least_to_greatest(*numbers: str) -> str:

@@ -90,7 +90,7 @@ def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
     assert finding["verdict"] == "refuted"
     assert (
         "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics (8.00 m), which has an error "
-        "larger by -1.50 m [" in finding["evidence"]
+        "larger by −1.50 m [" in finding["evidence"]
     )
     finding = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
     assert finding["verdict"] == "undecided", "one of three is not most at 30 runs, and no most is worse"
@@ -124,7 +124,7 @@ def test_S3_for_twice_the_A_by_hand(judged: Any) -> None:
     turned = {model: values[::-1] for model, values in rows.items()}
     steeper = judged(turned, alone=alone)["S3"]
     assert steeper["verdict"] == "undecided", "one of 120 orders of five models, of four comparisons"
-    assert "-1.90 m [" in steeper["evidence"]
+    assert "−1.90 m [" in steeper["evidence"]
 
 
 def test_S3_an_order_that_comes_by_chance_is_undecided(judged: Any) -> None:
