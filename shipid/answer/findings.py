@@ -252,15 +252,9 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     shares = tuple(coverage_share(np.mean(of_model[name], axis=0), run) for name in sound)
     compared = Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals, shares)
     notes = [f"bands{of}" if of else "", too_few_manoeuvres(table.runs)]
-    cases: dict[str, tuple[object, list[str]]] = {
-        "B1": (compared, notes),
-        "B2": (Promise(inside[like], run[like], level), [left_out if new else "", *notes]),
-    }
-    return [
-        finding
-        for key, (case, words) in cases.items()
-        for finding in judge_claims({key: BAND_RULES[key]}, case, "; ".join(word for word in words if word))
-    ]
+    promise = Promise(inside[like], run[like], level)
+    verdicts = judge_claims({"B1": BAND_RULES["B1"]}, compared, *notes)
+    return verdicts + judge_claims({"B2": BAND_RULES["B2"]}, promise, left_out if new else "", *notes)
 
 
 def _width_table(errors: ErrorTable, cells: pd.DataFrame, widths: Mapping[str, Array]) -> ErrorTable:

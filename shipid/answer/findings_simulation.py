@@ -120,9 +120,9 @@ def simulation_findings(results: Results) -> list[ClaimVerdict]:
         return leave_undecided(
             SIMULATION_RULES, f"of one family no model has a result in every cell: {model_list(lost)}"
         )
-    notes = (too_few_manoeuvres(by_mean.runs), f"left out for want of results: {model_list(lost)}" if lost else "")
+    left_out = f"left out for want of results: {model_list(lost)}" if lost else ""
     grid = ErrorGrid(by_mean, moderate, high, by_90, results)
-    return judge_claims(SIMULATION_RULES, grid, "; ".join(note for note in notes if note))
+    return judge_claims(SIMULATION_RULES, grid, too_few_manoeuvres(by_mean.runs), left_out)
 
 
 def _difference_range(differences: Differences) -> str:

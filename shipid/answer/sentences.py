@@ -28,7 +28,6 @@ from shipid.study.plan import families_set_from, fitted_families, learning_metho
 from shipid.study.results import Results
 from shipid.units import plural_word
 
-MOST_SHOWN = 5  # models that a sentence lists with their errors
 BEST = "best in validation"
 
 
@@ -112,20 +111,19 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
     """
     rows, plan = errors_by_model(results), results.plan
     rows = rows[~rows["family"].isin(results.aside)]
-    caveats, seen = (
-        [(text, "cells") for text in _missing_cells(results)],
-        [(s, "models") for s in _caveats_of_families(results)],
-    )
+    caveats = [(text, "cells") for text in _missing_cells(results)]
+    seen = [(text, "models") for text in _caveats_of_families(results)]
     learns = any(way.method.compensates for way in plan.methods if way.name == verdict_method(plan))
-    largest = int(results.cells["N_D"].max())
-    if not learns or not (rows["family"].ne(NO_MODEL) & rows["N_D"].eq(largest)).any():
-        cells = results.cells[(results.cells["status"] == "ok") & (results.cells["N_D"] == largest)]
+    top = rows[rows["family"].ne(NO_MODEL) & rows["N_D"].eq(rows["N_D"].max())]
+    if top.empty or not learns:
+        cells = results.cells[results.cells["status"] == "ok"]
+        cells = cells[cells["N_D"] == cells["N_D"].max()]
         words = "No result joins physics and data, so there is no conclusion."
         words += f" {_mean_errors(results, cells.groupby('model')['H'].mean())}" if len(cells) else ""
         return [*caveats, (words, "cells"), *seen]
     table = error_table(results, list(rows["model"].unique()), amounts=sorted(set(rows["N_D"])))
     case, learning = AnswerCase(results, rows, table, best_model(results)), learning_methods(plan)
-    chart = "map" if len(case.ends) > 1 and case.with_physics(largest)["model"].nunique() > 1 else "gain"
+    chart = "map" if len(case.ends) > 1 and top["model"].nunique() > 1 else "gain"
     several = f"Of {len(learning)} methods that learn from data the other sentences speak of {verdict_method(plan)!r}."
     parts: list[tuple[str, Iterable[str]]] = [
         ("methods", methods if len(learning) > 1 else ()),
@@ -165,7 +163,7 @@ def _mean_errors(results: Results, errors: pd.Series[float]) -> str:
     """Some errors [m] by name, the least of them first, as a sentence."""
     known = errors.sort_values(kind="stable").items()
     words = [f"{quoted_model(str(name))} {metres_text(value)}" for name, value in known]
-    return f"Mean errors {_horizon_in_words(results)} ahead: {join_few_names(words, MOST_SHOWN)}."
+    return f"Mean errors {_horizon_in_words(results)} ahead: {join_few_names(words)}."
 
 
 def _horizon_in_words(results: Results) -> str:
@@ -222,7 +220,7 @@ def _bounds(estimate: Estimate, write: Callable[[float], str]) -> str:
 
 def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
     """Error of the best model with the fewest runs, and how many runs give the same error without physics."""
-    best, (fewest, *_, largest) = case.best, case.table.amounts * 2
+    best, fewest, largest = case.best, case.table.amounts[0], case.table.amounts[-1]
     if best is None or fewest == largest or not {NO_MODEL, best} <= set(case.table.H):
         return
     estimate = runs_without_physics(case.table, best, 0)
@@ -255,7 +253,7 @@ def _headline(case: AnswerCase) -> Iterator[str]:
 
 def _reservations(case: AnswerCase) -> Iterator[str]:
     """Which models compensation, more data or a prediction at all does not make better than what is simpler."""
-    table, (smallest, *_, largest), fixed = case.table, case.table.amounts * 2, case.fixed_physics()
+    table, fixed, smallest, largest = case.table, case.fixed_physics(), case.table.amounts[0], case.table.amounts[-1]
     last, models = case.ends[largest], [str(name) for name in case.rows["model"].unique() if name in table.H]
     if fixed:
         gain = table.compare([[(1.0, name, PHYSICS_ONLY), (-1.0, name, last)] for name in fixed])
@@ -276,7 +274,7 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         sides = case.sides(models, paired_difference(ahead, table.counts, noise))
         yield from _sentences_on_sides(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
         if len(sides[0]) == len(models):
-            yield f"With {counted_text(largest, 'run')}, all {len(models)} models beat {constant}."
+            yield f"With {counted_text(largest, 'run')} every compared model beats {constant}."
 
 
 def _sentences_on_sides(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:

@@ -49,12 +49,12 @@ class ClaimRule:
             return "undecided", str(reason), {}
 
 
-def judge_claims(rules: Mapping[str, ClaimRule], case: object, note: str = "") -> list[ClaimVerdict]:
-    """The finding of each rule, in order. note : what is added to the evidence of all."""
+def judge_claims(rules: Mapping[str, ClaimRule], case: object, *notes: str) -> list[ClaimVerdict]:
+    """The finding of each rule, in order. notes : what is added to the evidence of all."""
     findings: list[ClaimVerdict] = []
     for key, rule in rules.items():
         decided, evidence, numbers = rule.decide(case)
-        words = "; ".join(part for part in (evidence, note) if part)
+        words = "; ".join(part for part in (evidence, *notes) if part)
         findings.append(ClaimVerdict(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
     return findings
 

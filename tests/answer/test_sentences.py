@@ -39,7 +39,7 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, good (best in validation) has 1.50 m mean error" in advice
     assert f"without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
-    assert "With 60 runs, all 3 models beat constant u, v, r (10.0 m)." in advice
+    assert "With 60 runs every compared model beats constant u, v, r (10.0 m)." in advice
     assert "With 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
 
 
@@ -256,3 +256,8 @@ def test_the_comparison_of_methods_comes_first(made: Any, monkeypatch: pytest.Mo
     assert sentences[0] == "Memory errs least."
     assert [one for one in sentences[1:] if "methods that learn" not in one] == plain
     assert len(sentences) == len(plain) + 2
+
+
+def test_an_amount_without_any_result_is_left_out(made: Any) -> None:
+    advice = text(made(grid({"good": (1.5, None), "bad": (3.0, None), "none": (9.0, None)})))
+    assert "With 10 runs, good (best in validation" in advice
