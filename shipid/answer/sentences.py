@@ -22,7 +22,7 @@ from shipid.answer.verdict import (
 from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
-from shipid.report.wording import counted_text, join_few_names, metres_text, short_text
+from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, learning_methods, orders_may_react, verdict_method
 from shipid.study.results import Results
@@ -200,13 +200,18 @@ def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or not (better or worse) or (limit.above and worse) or (limit.below and better):
         return "; ".join(words)
-    bounds = _bounds(limit, short_text)
-    pays = f"physics pays if its error A is below about {short_text(limit.value)} m{bounds}"
+    bounds = _bounds(limit, _two_digits)
+    pays = f"physics pays if its error A is below about {_two_digits(limit.value)} m{bounds}"
     if limit.above:
         pays = f"physics pays even with an error A of {metres_text(limit.limits[1])}, the worst tried{bounds}"
     elif limit.below:
         pays = f"physics does not pay even with an error A of {metres_text(limit.limits[0])}, the best tried{bounds}"
     return f"{pays}: {'; '.join(words)}"
+
+
+def _two_digits(value: float) -> str:
+    """A length with two digits: more would be pretence."""
+    return f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
 
 
 def _bounds(estimate: Estimate, write: Callable[[float], str]) -> str:

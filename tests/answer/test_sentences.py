@@ -137,7 +137,7 @@ def test_how_good_physics_must_be(made: Any) -> None:
     alone = {f"m{k}": 2.0**k for k in range(5)}
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (3.0, 1.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
-    assert re.search(r"8 s ahead\? With 10 runs physics pays if its error A is below about 6 m \[\d\.\d, \d", advice)
+    assert re.search(r"8 s ahead\? With 10 runs physics pays if its error A is below about 6\.0 m \[\d\.\d, \d", advice)
     assert ". With 30 runs none of 5 physics models is shown to do better than no physics; for m0, m1" in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
