@@ -30,20 +30,13 @@ class ErrorTable:
     """Errors [m] by test manoeuvre.
 
     amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
-    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction. What is below
-        `SMALLEST_ERROR`, such as the error of the physics that made the data, is raised to it.
+    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction.
     """
 
     amounts: tuple[int, ...]
     counts: Array
     A: Mapping[str, Array]
     H: Mapping[str, Array]
-
-    def __post_init__(self) -> None:
-        """Raise errors to `SMALLEST_ERROR`."""
-        for name in ("A", "H"):
-            raised = {model: np.maximum(values, SMALLEST_ERROR) for model, values in getattr(self, name).items()}
-            object.__setattr__(self, name, raised)
 
     @property
     def runs(self) -> int:
@@ -64,8 +57,12 @@ class ErrorTable:
         return np.asarray(np.array(each, dtype=float) / seeds**0.5)
 
     def by_run(self, model: str, place: int) -> Array:
-        """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
-        return self.A[model] if place == PHYSICS_ONLY else self.H[model][place].mean(axis=0)
+        """(R,) error of a model at an amount, mean over seeds, or of its physics alone; `SMALLEST_ERROR` at least.
+
+        Of the physics that made the data it is 0.
+        """
+        errors = self.A[model] if place == PHYSICS_ONLY else self.H[model][place].mean(axis=0)
+        return np.maximum(errors, SMALLEST_ERROR)
 
     def mean(self, model: str, place: int) -> float:
         """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, SMALLEST_ERROR, ErrorTable, ErrorTerm, error_table
 from shipid.answer.verdict import (
     ClaimRule,
     ClaimVerdict,
@@ -256,7 +256,7 @@ def _chance_of_mean(values: Array) -> float:
 
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
-    H = np.array([table.H[model] @ table.weights for model in models])
+    H = np.maximum([table.H[model] @ table.weights for model in models], SMALLEST_ERROR)
     return np.asarray(np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1)))
 
 
