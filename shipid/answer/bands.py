@@ -6,7 +6,6 @@ A share, or coverage, is the mean over runs: a long run counts as much as a shor
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,6 @@ def cell_regions(
             yield row, by_level, results.test.future - paths
 
 
-@lru_cache(maxsize=1)  # the answer and the figures ask for it
 def coverage_frame(results: Results) -> pd.DataFrame:
     """Share of whole test paths in their bands, by model, N_D and level, over seeds.
 
@@ -63,13 +61,15 @@ def coverage_frame(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
-def answer_on_bands(results: Results) -> list[tuple[str, str]]:
+def answer_on_bands(results: Results, coverage: pd.DataFrame) -> list[tuple[str, str]]:
     """What bands promise and held, and for which manoeuvres they promise nothing, each with the anchor of its figure.
 
     Means over the models at the largest N_D that has bands, without families whose numbers were set from test runs.
+
+    coverage : as of `coverage_frame`.
     """
-    level, frame = results.plan.study.bands.level, coverage_frame(results)
-    mine = frame[frame["level"].eq(level) & ~frame["family"].isin(results.saw_test)]
+    level = results.plan.study.bands.level
+    mine = coverage[coverage["level"].eq(level) & ~coverage["family"].isin(results.saw_test)]
     if mine.empty:
         refused = refused_frame(results).groupby("reason", sort=False)["model"]
         each = [f"{str(reason).removeprefix(NO_BAND)} ({model_list(map(str, models))})" for reason, models in refused]

@@ -43,7 +43,7 @@ def report_content(results: Results) -> ReportContent:
     plan, tables = results.plan, {name: frame(results) for name, frame in REPORT_FRAMES.items()}
     words = (
         *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
-        *bands.answer_on_bands(results),
+        *bands.answer_on_bands(results, tables["coverage"]),
     )
     best, naive = sentences.best_model(results), summarise_errors(results.naive)
     return ReportContent(
