@@ -148,8 +148,7 @@ def world_interval(values: Array, least: float = -np.inf, greatest: float = np.i
 def doubling_weights(x: Array) -> Array:
     """Weights (J,) that turn values at x, a logarithm, into their slope by least squares, for a doubling."""
     centred = x - x.mean()
-    weights: Array = np.log(2) * centred / np.square(centred).sum()
-    return weights
+    return np.asarray(np.log(2) * centred / np.square(centred).sum())
 
 
 def holm_correction(chances: Array) -> Array:

@@ -259,7 +259,3 @@ def _manoeuvre(source: MeasuredManoeuvre | ManoeuvreContent) -> ManoeuvreContent
 
     check_class("source", source, MeasuredManoeuvre, "as of `measure_standard`")
     return manoeuvre_content(source)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

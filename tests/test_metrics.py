@@ -51,18 +51,6 @@ def test_a_diverged_window_is_reported_and_not_averaged_away():
     assert np.isnan([result["mean"], result["p90"], result["rms"]]).all()
 
 
-def test_horizon_and_time_are_the_two_margins(paths):
-    error = metrics.position_error(*paths)
-    horizon = metrics.error_of_steps(error)
-    assert horizon["mean"].shape == horizon["p90"].shape == (30,)
-    assert metrics.error_of_windows(error).shape == (40,)
-    assert horizon["mean"].mean() == pytest.approx(metrics.summarise_errors(error)["mean"])
-    assert metrics.error_of_windows(error).mean() == pytest.approx(metrics.summarise_errors(error)["mean"])
-    by_axis = metrics.over_horizon_by_axis(*paths)
-    assert (by_axis["along"].mean(), by_axis["across"].mean()) == pytest.approx(metrics.error_by_axis(*paths))
-    assert horizon["p90"][4] == pytest.approx(np.sort(error[4])[35] * 0.9 + np.sort(error[4])[36] * 0.1)
-
-
 def test_roughness_by_hand():
     """A zigzag of 1 m has second differences of 2 m; a circle of radius R has (speed x step)^2 / R."""
     zigzag = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0], [3.0, 1.0]])[:, None, :]
@@ -72,8 +60,6 @@ def test_roughness_by_hand():
     assert metrics.path_roughness(circle) == pytest.approx(0.5**2 / 50.0, rel=1e-4)
     assert metrics.path_roughness(np.concatenate([zigzag, np.zeros_like(zigzag)], axis=1)) == pytest.approx(1.0)
     assert metrics.path_roughness(zigzag[:3]) == pytest.approx(2.0)
-    with pytest.raises(ValueError, match="3 steps or more"):
-        metrics.path_roughness(zigzag[:2])
 
 
 def test_a_long_run_counts_as_much_as_a_short_one():

@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from shipid import document as documents
 from shipid.answer.findings import judge_findings
-from shipid.answer.verdict import count_manoeuvres, too_few_manoeuvres
+from shipid.answer.verdict import too_few_manoeuvres
 from shipid.arguments import as_path
 from shipid.document import Document
-from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
+from shipid.errors import ResultError, ShipidError
 from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
 from shipid.files import quote_argument
 from shipid.metrics import error_of_windows, position_error
+from shipid.report.wording import counted_text
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
 from shipid.study.results import Results, read_results
@@ -77,61 +78,40 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 
     Raises ResultError for a folder without a result, ShipidError where no cell, or no test manoeuvre, is in both.
     """
-    if isinstance(folders, str | os.PathLike) or not isinstance(folders, Sequence) or len(folders) < 2:
-        raise ShipidError("name two folders or more")
-    places = [as_path("folder", folder) for folder in folders]
-    if len({os.path.realpath(place) for place in places}) < len(places):
-        raise ShipidError("a folder is named twice: name each folder once")
+    several = isinstance(folders, Sequence) and not isinstance(folders, str)
+    places = [as_path("folder", folder) for folder in folders] if several else []
+    if len(places) < 2 or len({place.resolve() for place in places}) < len(places):
+        raise ShipidError("name two folders or more, each once")
     return compare_results([read_results(place) for place in places], pairs)
 
 
 def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
     """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
-    names, pairs, notes, frames = _short_names([results.folder for results in runs]), pairs or {}, [], []
-    _check_pairs(runs, pairs)
+    folders, notes, frames = [results.folder.resolve() for results in runs], [], []
+    called = {other: first for first, other in (pairs or {}).items()}
+    shared = os.path.commonpath(folders)
+    names = tuple(str(folder.relative_to(shared)) for folder in folders)
     for name, results in zip(names, runs, strict=True):
         good = int((results.cells["status"] == "ok").sum())
         if not good:
             raise ResultError("has no cell with a result", file=results.folder)
         if good < results.plan.cells:
             notes.append(f"{name}: {good} of {results.plan.cells} cells have a result")
-    for name, results in zip(names[1:], runs[1:], strict=True):
-        frame, words = _compare_with_first(runs[0], results, pairs)
-        frames.append(frame.assign(folder=name))
-        notes += [f"{name}: {note}" for note in words]
-    sessions = [(results.provenance.get("sessions") or [{}])[-1] for results in runs]
-    called = [{}, *({other: first for first, other in pairs.items()} for _ in runs[1:])]
-    documents = document_differences([results.plan for results in runs], sessions, called)
+        if results is not runs[0]:
+            frame, words = _compare_with_first(runs[0], results, called)
+            frames.append(frame.assign(folder=name))
+            notes += [f"{name}: {note}" for note in words]
+    documents = document_differences([results.plan for results in runs], [{}, *[called] * len(frames)])
     documents.columns = pd.Index(["path", *names])
     errors = pd.concat(frames, ignore_index=True)
     return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
 
 
-def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
-    """DocumentError for a name that is no family or method of the first run, or a counterpart that no other run has."""
-    first, *others = ({*results.cells["family"], *results.cells["method"], NO_METHOD} for results in runs)
-    there = set[str]().union(*others)
-    for words, named, known in (("the first run", pairs, first), ("any other run", pairs.values(), there)):
-        wrong = next((name for name in named if name not in known), None)
-        if wrong is not None:
-            raise DocumentError(
-                f"{wrong!r} is no family or method of {words}: {suggest_name(wrong, known)}", path="--pair"
-            )
-
-
-def _short_names(folders: Sequence[Path]) -> tuple[str, ...]:
-    """The shortest last parts of folders that make their names different."""
-    parts = [folder.resolve().parts for folder in folders]
-    names = (tuple("/".join(part[-count:]) for part in parts) for count in range(1, max(map(len, parts)) + 1))
-    return next((short for short in names if len(set(short)) == len(short)), tuple(map(str, folders)))
-
-
-def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:
-    """Rows of `Comparison.errors` for one run, without its name, and notes."""
-    mine, others, notes = _matching_cells(first), _matching_cells(other), []
-    called = {other: first for first, other in pairs.items()}
+def _compare_with_first(first: Results, other: Results, called: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:
+    """Rows of `Comparison.errors` for one run, without its name, and notes; called : its names -> the first's."""
+    mine, others, notes, named = _matching_cells(first), _matching_cells(other), [], set(called.values())
     for key in ("family", "method"):
-        names = others[key].map(lambda name: called.get(name, name if name not in pairs else None))
+        names = others[key].map(lambda name: called.get(name, name if name not in named else None))
         others = others.assign(**{key: names, f"{key} there": others[key]})
         for who, one, rest in (("the first", mine, others), ("this", others, mine)):
             if lonely := [name for name in dict.fromkeys(one[key].dropna()) if name not in set(rest[key])]:
@@ -146,25 +126,31 @@ def _compare_with_first(first: Results, other: Results, pairs: Mapping[str, str]
     here, away = _common_windows(first, other)
     rows, differences = [], []
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
-        here_errors, away_errors = _cell_errors(first, part, "first", here), _cell_errors(other, part, "other", away)
-        differences.append(compare_cells(away_errors, here_errors))
-        row: dict[str, Any] = {key: _name_of_both(part, key) for key in ("family", "method")}
+        sides = {"first": _cell_errors(first, part, "first", here), "other": _cell_errors(other, part, "other", away)}
+        difference = compare_cells(sides["other"], sides["first"])
+        row: dict[str, Any] = {
+            key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")
+        }
         row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
-        sides = {"first": here_errors, "other": away_errors}
         row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in sides.items()}
-        row |= {"difference": differences[-1].mean, "low": differences[-1].low, "high": differences[-1].high}
-        row["verdict"] = (
-            all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True)) * IDENTICAL
-        )
-        rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in ("first", "other")})
-    lower, higher = (which_significant(np.array([getattr(d, s) for d in differences])) for s in ("below", "above"))
-    for row, less, more in zip(rows, lower, higher, strict=True):
-        row["verdict"] = row["verdict"] or ("lower" if less else "higher" if more else "")
-    same, runs = sum(row["verdict"] == IDENTICAL for row in rows), len(set(first.test.run[here]))
+        row |= {"difference": difference.mean, "low": difference.low, "high": difference.high}
+        same = all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True))
+        row |= {"verdict": IDENTICAL if same else ""}
+        rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides})
+        differences.append(difference)
+    for verdict, side in (("lower", "below"), ("higher", "above")):
+        shown = which_significant(np.array([getattr(difference, side) for difference in differences]))
+        rows = [
+            row | {"verdict": verdict} if sure and not row["verdict"] else row
+            for row, sure in zip(rows, shown, strict=True)
+        ]
+    same_rows, runs = sum(row["verdict"] == IDENTICAL for row in rows), len(set(first.test.run[here]))
     whole = len(here) == len(first.test) == len(other.test)
-    notes.append(f"paired over {count_manoeuvres(runs)}{'' if whole else f', on the {len(here)} windows of both'}")
-    if same:
-        notes.append(f"{same} of {len(rows)} rows are identical to the digit: no training sets them apart")
+    notes.append(
+        f"paired over {counted_text(runs, 'test manoeuvre')}{'' if whole else f', on the {len(here)} windows of both'}"
+    )
+    if same_rows:
+        notes.append(f"{same_rows} of {len(rows)} rows are identical to the digit: no training sets them apart")
     return pd.DataFrame(rows), [*notes, *([few] if (few := too_few_manoeuvres(runs)) else [])]
 
 
@@ -185,38 +171,31 @@ def _keys_in_words(results: Results) -> str:
     return "; ".join(f"{key} {words}" for key, words in names.items())
 
 
-def _name_of_both(part: pd.DataFrame, key: str) -> str:
-    here, there = part[key].iloc[0], part[f"{key} there"].iloc[0]
-    return str(here) if here == there else f"{here} ~ {there}"
-
-
 def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Places of the windows that both runs have; ShipidError where there are none, or they are other recordings."""
     one, two = (
-        {(str(run), round(float(t), 4)): place for place, (run, t) in enumerate(zip(of.run, of.t, strict=True))}
+        pd.Series(range(len(of)), pd.MultiIndex.from_arrays([of.run.astype(str), of.t.astype(float).round(4)]))
         for of in (first.test, other.test)
     )
-    here, there = (np.array([of[key] for key in one if key in two], dtype=np.int64) for of in (one, two))
+    keys = one.index[one.index.isin(two.index)]
+    here, there = (np.asarray(of[keys], dtype=np.int64) for of in (one, two))
     columns = [(first.test.columns[name][here], other.test.columns[name][there]) for name in MOTION_COLUMNS]
     same = all(np.allclose(a, b, rtol=1e-6, atol=1e-9) for a, b in columns)
-    draws = drawn_conditions(first.plan) is not None and drawn_conditions(first.plan) == drawn_conditions(
-        other.plan
-    )  # the same orders, whatever the ship
-    if not (len(here) and (same or draws)):
+    drawn = drawn_conditions(first.plan)  # the same orders, whatever the ship
+    if not len(here) or not (same or (drawn is not None and drawn == drawn_conditions(other.plan))):
         raise ShipidError(f"tests on other manoeuvres than {first.folder}: nothing can be paired", file=other.folder)
     return here, there
 
 
 def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArray[np.int64]) -> list[CellErrors]:
     """Errors by test manoeuvre of the cells of a group, on some windows."""
-    test = results.test
+    test, cells = results.test, []
     _, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
-    cells = []
+    rows = results.cells.set_index("cell")[["family", "method"]]
     for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
         path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
         error = error_of_windows(position_error(path[:, windows], test.future[:, windows]))
-        row = results.cells[results.cells["cell"] == cell]
-        learns = bool(cell) and learns_from_runs(results.plan, *row.iloc[0][["family", "method"]])
+        learns = bool(cell) and learns_from_runs(results.plan, *rows.loc[cell])
         cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
     return cells
 
@@ -235,16 +214,11 @@ def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Docum
     return document
 
 
-def document_differences(
-    plans: Sequence[Plan], sessions: Sequence[Mapping[str, Any]] = (), called: Sequence[Mapping[str, str]] = ()
-) -> pd.DataFrame:
+def document_differences(plans: Sequence[Plan], called: Sequence[Mapping[str, str]] = ()) -> pd.DataFrame:
     """One row per value that is not the same in all plans: `path`, then a column of text for each plan, from 0 on.
 
     Compared are the studies with their defaults, the vessels that all have by one name, and the digests of data.
 
-    Parameters
-    ----------
-    sessions : for each plan, what its run was computed with; compared, too.
     called : for each plan, method or family -> the name that it is compared under.
     """
     shared = set.intersection(*({*plan.vessels} for plan in plans))
@@ -253,9 +227,8 @@ def document_differences(
             **whole_document(plan, names),
             "digest of": dict(plan.sources),
             "vessel": {name: {"digest": plan.vessels[name].digest, **plan.vessels[name].document} for name in shared},
-            "computed with": dict(session),
         }
-        for plan, session, names in zip(plans, sessions or [{}] * len(plans), called or [{}] * len(plans), strict=True)
+        for plan, names in zip(plans, called or [{}] * len(plans), strict=True)
     ]
     rows = [[path, *map(_value_in_words, values)] for path, values in _differing_values(whole, "")]
     return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
@@ -286,10 +259,9 @@ def are_worlds(folders: Sequence[Path]) -> bool:
 def read_worlds(folders: Sequence[Path]) -> list[Results]:
     """Read finished runs of one study in different worlds, see `are_worlds`; ResultError for one not finished."""
     worlds = [read_results(folder) for folder in folders]
-    for results in worlds:
-        if not results.complete:
-            message = f"is not finished: continue with `shipid study resume {quote_argument(results.folder)}`"
-            raise ResultError(message, file=results.folder)
+    if unfinished := [results.folder for results in worlds if not results.complete]:
+        message = f"is not finished: continue with `shipid study resume {quote_argument(unfinished[0])}`"
+        raise ResultError(message, file=unfinished[0])
     return worlds
 
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.answer.verdict import length_in_metres
 from shipid.evidence import Differences, paired_difference, training_noise
 from shipid.metrics import position_error
+from shipid.report.wording import metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs
 from shipid.study.results import Results
@@ -30,20 +30,13 @@ class ErrorTable:
     """Errors [m] by test manoeuvre.
 
     amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
-    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction. What is below
-        `SMALLEST_ERROR`, such as the error of the physics that made the data, is raised to it.
+    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction.
     """
 
     amounts: tuple[int, ...]
     counts: Array
     A: Mapping[str, Array]
     H: Mapping[str, Array]
-
-    def __post_init__(self) -> None:
-        """Raise errors to `SMALLEST_ERROR`."""
-        for name in ("A", "H"):
-            raised = {model: np.maximum(values, SMALLEST_ERROR) for model, values in getattr(self, name).items()}
-            object.__setattr__(self, name, raised)
 
     @property
     def runs(self) -> int:
@@ -53,8 +46,7 @@ class ErrorTable:
     @property
     def weights(self) -> Array:
         """(R,) share of the windows in each manoeuvre."""
-        weights: Array = self.counts / self.counts.sum()
-        return weights
+        return np.asarray(self.counts / self.counts.sum())
 
     @cached_property
     def noise(self) -> Array:
@@ -62,12 +54,15 @@ class ErrorTable:
         by_seed = [values @ self.weights for values in self.H.values()]
         seeds = max((values.shape[1] for values in by_seed), default=1)
         each = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
-        noise: Array = np.array(each, dtype=float) / seeds**0.5
-        return noise
+        return np.asarray(np.array(each, dtype=float) / seeds**0.5)
 
     def by_run(self, model: str, place: int) -> Array:
-        """(R,) error of a model at an amount, mean over seeds, or of its physics alone."""
-        return self.A[model] if place == PHYSICS_ONLY else self.H[model][place].mean(axis=0)
+        """(R,) error of a model at an amount, mean over seeds, or of its physics alone; `SMALLEST_ERROR` at least.
+
+        Of the physics that made the data it is 0.
+        """
+        errors = self.A[model] if place == PHYSICS_ONLY else self.H[model][place].mean(axis=0)
+        return np.maximum(errors, SMALLEST_ERROR)
 
     def mean(self, model: str, place: int) -> float:
         """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
@@ -75,7 +70,7 @@ class ErrorTable:
 
     def metres(self, model: str, place: int) -> str:
         """Error of a model at an amount, or of its physics alone, in words."""
-        return length_in_metres(self.mean(model, place))
+        return metres_text(self.mean(model, place))
 
     def interval(self, model: str, place: int) -> tuple[float, float]:
         """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""
@@ -105,6 +100,9 @@ def error_table(
     amounts : values of N_D that count, rising; all by default.
     """
     cells = results.judged_cells
+    of_path = results.path_errors if metric == "H" else partial(_upper_errors, results)
+    good = [cell for cell in cells["cell"] if cell in results.paths]
+    errors = results.errors if metric == "H" else {cell: of_path(results.paths[cell]) for cell in good}
     amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
     seeds = sorted(set(cells["seed"]))
     keys = zip(cells["foundation"], cells["N_D"], cells["seed"], strict=True)
@@ -112,18 +110,14 @@ def error_table(
     H = {}
     for name in (*models, NO_MODEL):
         mine = [[known.get((name, N, seed)) for seed in seeds] for N in amounts]
-        if all(cell in results.paths for row in mine for cell in row):
-            H[name] = np.array([[_by_run(results, str(cell), metric) for cell in row] for row in mine])
+        if all(cell in errors for row in mine for cell in row):
+            H[name] = np.array([[errors[str(cell)] for cell in row] for row in mine])
     alone = {
-        name: results.path_errors(path) if metric == "H" else _upper_errors(results, path)
+        name: of_path(path)
         for name, path in results.physics.items()
         if name in models and name != NO_MODEL and np.isfinite(path).all()
     }
     return ErrorTable(tuple(int(N) for N in amounts), results.windows, alone, H)
-
-
-def _by_run(results: Results, cell: str, metric: Metric) -> Array:
-    return results.errors[cell] if metric == "H" else _upper_errors(results, results.paths[cell])
 
 
 def _upper_errors(results: Results, path: Array) -> Array:

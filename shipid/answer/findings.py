@@ -32,13 +32,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.answer.bands import cell_regions, of_methods
+from shipid.answer.bands import cell_regions, of_methods, uncalibrated_kinds
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
 from shipid.answer.findings_simulation import (
     SIMULATION_RULES,
     simulation_findings,
     trend_over_accuracy,
-    trend_verdict,
 )
 from shipid.answer.verdict import (
     EQUAL_A,
@@ -46,19 +45,17 @@ from shipid.answer.verdict import (
     ClaimVerdict,
     Judgement,
     UndecidedClaim,
-    count_manoeuvres,
     difference_with_interval,
     judge_claims,
     least_to_greatest,
     leave_undecided,
-    length_in_metres,
     quoted_model,
     too_few_manoeuvres,
     verdict_of,
 )
 from shipid.evidence import Differences, all_significant, any_significant, paired_difference, share_interval
-from shipid.metrics import coverage_share, position_error, rank_correlation
-from shipid.report.wording import join_few_names
+from shipid.metrics import coverage_share, position_error
+from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import unfair_reason, verdict_method
 from shipid.study.results import Results
@@ -128,8 +125,7 @@ def _judge_gap(rivals: Rivals) -> Judgement:
     before, after = (abs(table.mean(rivals.bad, at) - table.mean(rivals.good, at)) for at in (PHYSICS_ONLY, last))
     counts = 0 if gaps.mean[0] < gaps.mean[1] else 1  # the gap of H has the sign of that of A, or not
     evidence = (
-        f"gap {length_in_metres(before)} before, {length_in_metres(after)} after: "
-        f"{difference_with_interval(gaps, counts)} less"
+        f"gap {metres_text(before)} before, {metres_text(after)} after: {difference_with_interval(gaps, counts)} less"
     )
     decided = verdict_of(all_significant(gaps.above), any_significant(gaps.below))
     return decided, evidence, {"gap before [m]": before, "gap after [m]": after}
@@ -161,18 +157,12 @@ def _lead_of_others(table: ErrorTable, pure: Array, others: list[Array]) -> Diff
     return paired_difference(ahead, table.counts, float(table.noise[-1]) * np.concatenate(noise))
 
 
-FULL_SCALE_RULES = {
+FULL_SCALE_RULES: dict[str, ClaimRule] = {
     "R1": ClaimRule("compensated physics beats the physics alone, accurate or not", _judge_gain),
     "R2": ClaimRule("the inaccurate model, compensated, is about as good as the accurate physics alone", _judge_equal),
     "R3": ClaimRule("the gap between accurate and inaccurate physics shrinks after compensation", _judge_gap),
     "R4": ClaimRule(f"{quoted_model(NO_MODEL)} is worst over the whole horizon", _judge_worst),
 }
-
-
-def judge_rivals(rivals: Rivals, remedy: str = "`shipid study rotate` tests other runs in turn") -> list[ClaimVerdict]:
-    """Verdicts on R1-R4; all undecided with fewer test manoeuvres than give an interval, which needs a remedy."""
-    few = too_few_manoeuvres(rivals.table.runs)
-    return judge_claims(FULL_SCALE_RULES, rivals, f"{few}: {remedy}" if few else count_manoeuvres(rivals.table.runs))
 
 
 def full_scale_findings(results: Results) -> list[ClaimVerdict]:
@@ -182,68 +172,55 @@ def full_scale_findings(results: Results) -> list[ClaimVerdict]:
     names = {one.family: one.name for one in results.plan.foundations if one.family in claims.roles.values()}
     good, bad = names[str(claims.accurate)], names[str(claims.inaccurate)]
     table = error_table(results, (good, bad))
-    if any(name not in table.H for name in (good, bad, NO_MODEL)):
-        return leave_undecided(FULL_SCALE_RULES, "a cell that it needs has failed or is missing")
-    if any(name not in table.A for name in (good, bad)):
-        return leave_undecided(
-            FULL_SCALE_RULES, "the physics of a claim is identified again in every cell, so it has no single A"
-        )
-    return judge_rivals(Rivals(table, good, bad, _errors_by_step(results, table.amounts[-1])))
+    if not ({good, bad, NO_MODEL} <= set(table.H) and {good, bad} <= set(table.A)):
+        reason = "a cell that it needs has no result, or its physics, identified again in every cell, has no single A"
+        return leave_undecided(FULL_SCALE_RULES, reason)
+    note = counted_text(table.runs, "test manoeuvre")
+    if few := too_few_manoeuvres(table.runs):
+        note = f'{few}: [repeat] "split.test" tests other runs in turn'
+    rivals = Rivals(table, good, bad, _errors_by_step(results, table.amounts[-1]))
+    return judge_claims(FULL_SCALE_RULES, rivals, note)
 
 
 def _errors_by_step(results: Results, N_D: int) -> dict[str, Array]:
     """(T, R) errors by step of every predictor at an amount of data, mean over seeds, and of physics alone."""
     aside = {one.name for one in results.plan.foundations if one.family in results.aside}
-    names = np.unique(results.test.run)
+    run, cells = results.test.run, results.judged_cells
+    cells = cells[cells["N_D"].eq(N_D) & cells["cell"].isin(list(results.paths)) & ~cells["foundation"].isin(aside)]
+    paths = {
+        str(name): [results.paths[cell] for cell in mine] for name, mine in cells.groupby("model", sort=False)["cell"]
+    }
+    alone = {name: path for name, path in results.physics.items() if name not in (NO_MODEL, *aside)}
+    paths |= {f"{name} alone": [path] for name, path in alone.items() if np.isfinite(path).all()}
 
     def by_step(path: Array) -> Array:
         error = position_error(path, results.test.future)
-        return np.stack([error[:, results.test.run == name].mean(axis=1) for name in names], axis=1)
+        return np.stack([error[:, run == name].mean(axis=1) for name in np.unique(run)], axis=1)
 
-    parts: dict[str, list[Array]] = {}
-    cells = results.judged_cells
-    for row in cells[cells["N_D"] == N_D].itertuples():
-        if row.cell in results.paths and row.model not in aside:
-            parts.setdefault(str(row.model), []).append(by_step(results.paths[str(row.cell)]))
-    for model, path in results.physics.items():
-        if model not in (NO_MODEL, *aside) and np.isfinite(path).all():
-            parts[f"{model} alone"] = [by_step(path)]
-    return {name: np.mean(errors, axis=0) for name, errors in parts.items()}
+    return {name: np.mean([by_step(path) for path in mine], axis=0) for name, mine in paths.items()}
 
 
 @dataclass(frozen=True)
 class Widths:
     """What B1 compares: widths in place of H, at the amounts of data at which every model has a band.
 
-    physics : models with physics. rivals : whether they are the accurate and the inaccurate model.
+    physics : models with physics. rivals : whether they are the accurate and the inaccurate model. shares : of whole
+    paths that the bands of each hold at the largest amount.
     """
 
     table: ErrorTable
     physics: tuple[str, ...]
     rivals: bool = False
+    shares: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Promise:
-    """What B2 judges: the share (S,) of models whose band of a level holds the path of a window, and its run (S,).
-
-    kinds : (S,) kind of manoeuvre of each window. calibrated : kinds that calibrated every band; None if unknown.
-    """
+    """What B2 judges: the share (S,) of models whose band of a level holds the path of a window, and its run (S,)."""
 
     held: Array
     run: NDArray[np.str_]
     level: float
-    kinds: NDArray[np.str_] | None = None
-    calibrated: frozenset[str] | None = None
-
-
-@dataclass(frozen=True)
-class BandEvidence:
-    """What B1 and B2 judge, and the shares of paths that the bands of B1 hold."""
-
-    widths: Widths
-    promise: Promise
-    shares: Sequence[float] = ()
 
 
 def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> list[ClaimVerdict]:
@@ -253,11 +230,8 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
     """
     if not results.complete:
         return leave_undecided(BAND_RULES, results.missing)
-    level, run, of = (
-        results.plan.study.bands.level,
-        results.test.run,
-        of_methods(results, [verdict_method(results.plan)]),
-    )
+    level, run = results.plan.study.bands.level, results.test.run
+    of = of_methods(results, [verdict_method(results.plan)])
     widths, held = {}, {}
     for row, by_level, apart in cell_regions(results, [level]):
         region, cell = by_level[level], str(row["cell"])
@@ -270,21 +244,17 @@ def band_findings(results: Results, physics: Sequence[str], rivals: bool) -> lis
         return leave_undecided(BAND_RULES, f"no two models with physics{of} have a band of {level_text(level)}")
     cells = cells[(cells["N_D"] == table.amounts[-1]) & cells["foundation"].isin([*sound, NO_MODEL])]
     of_model = {str(name): [held[cell] for cell in mine] for name, mine in cells.groupby("foundation")["cell"]}
-    kinds = np.array([results.kinds[str(name)] for name in run])
-    known = [frozenset(results.bands[cell].kinds) for cell in cells["cell"] if results.bands[cell].kinds]
-    case = BandEvidence(
-        Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals),
-        Promise(
-            np.mean([one for ones in of_model.values() for one in ones], axis=0),
-            run,
-            level,
-            kinds,
-            frozenset.intersection(*known) if known else None,
-        ),
-        [coverage_share(np.mean(of_model[name], axis=0), run) for name in sound],
-    )
-    notes = (f"bands{of}" if of else "", too_few_manoeuvres(table.runs))
-    return judge_claims(BAND_RULES, case, "; ".join(note for note in notes if note))
+    new = uncalibrated_kinds(results, cells["cell"])
+    like = np.array([results.kinds[str(name)] not in new for name in run])
+    inside = np.mean([one for ones in of_model.values() for one in ones], axis=0)
+    lost = counted_text(len(set(run[~like])), "test manoeuvre")
+    left_out = f"no run of the kind {join_few_names(sorted(new))} calibrated them, so they promise nothing for {lost}"
+    shares = tuple(coverage_share(np.mean(of_model[name], axis=0), run) for name in sound)
+    compared = Widths(replace(table, A={name: table.A[name] for name in sound}), sound, rivals, shares)
+    notes = [f"bands{of}" if of else "", too_few_manoeuvres(table.runs)]
+    promise = Promise(inside[like], run[like], level)
+    verdicts = judge_claims({"B1": BAND_RULES["B1"]}, compared, *notes)
+    return verdicts + judge_claims({"B2": BAND_RULES["B2"]}, promise, left_out if new else "", *notes)
 
 
 def _width_table(errors: ErrorTable, cells: pd.DataFrame, widths: Mapping[str, Array]) -> ErrorTable:
@@ -297,17 +267,10 @@ def _width_table(errors: ErrorTable, cells: pd.DataFrame, widths: Mapping[str, A
     return replace(errors, amounts=amounts, H=H)
 
 
-def _judge_widths(bands: BandEvidence) -> Judgement:
-    decided, evidence, numbers = judge_width_trend(bands.widths)
-    if not numbers:
-        return decided, evidence, numbers
-    hold = least_to_greatest(percent_text(min(bands.shares)), percent_text(max(bands.shares)))
-    return decided, f"{evidence}; these bands hold {hold} of whole paths", numbers
-
-
-def judge_width_trend(widths: Widths) -> Judgement:
-    """Verdict on B1, without the shares that the bands hold."""
+def _judge_widths(widths: Widths) -> Judgement:
     table, models, last = widths.table, widths.physics, len(widths.table.amounts) - 1
+    shares = [percent_text(share) for share in (min(widths.shares), max(widths.shares))] if widths.shares else []
+    hold = f"; these bands hold {least_to_greatest(*shares)} of whole paths" if shares else ""
     if widths.rivals:
         good, bad = sorted(models, key=lambda model: table.mean(model, PHYSICS_ONLY))
         wider = table.compare([[(1.0, bad, last), (-1.0, good, last)]])
@@ -315,42 +278,24 @@ def judge_width_trend(widths: Widths) -> Judgement:
         evidence = (
             f"at N_D = {table.amounts[last]} the mean radius of the band is {table.metres(bad, last)} "
             f"for {bad}, {table.metres(good, last)} for {good}: {difference_with_interval(wider)} more"
-            f"{'' if apart else f'; {EQUAL_A}'}"
+            f"{'' if apart else f'; {EQUAL_A}'}{hold}"
         )
         decided = verdict_of(apart and all_significant(wider.above), apart and any_significant(wider.below))
         return decided, evidence, {"ratio of widths": table.mean(bad, last) / table.mean(good, last)}
-    A, each = trend_over_accuracy(table, models)
-    slopes = table.compare(each)
-    order = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
-    rises = [rank_correlation(A, values) for values in order]
-    ends = [f"{difference_with_interval(slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
+    trend = trend_over_accuracy(table, models)
+    ends = [f"{difference_with_interval(trend.slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
     evidence = (
         f"for twice the A the mean radius rises by {' and by '.join(ends)}; rank correlation of width and A "
-        f"{least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
+        f"{trend.words}{hold}"
     )
-    numbers = {"least rank correlation of width and A": min(rises)}
-    numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(slopes.mean[last])}
-    return trend_verdict(slopes, A, order), evidence, numbers
+    numbers = {"least rank correlation of width and A": trend.least}
+    numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(trend.slopes.mean[last])}
+    return trend.verdict, evidence, numbers
 
 
-def _judge_promise(bands: BandEvidence) -> Judgement:
-    """Judge test runs of the kinds that runs of calibration have: bands promise nothing for others."""
-    promise, left_out = bands.promise, ""
-    if promise.kinds is not None and promise.calibrated is not None:
-        like = np.isin(promise.kinds, list(promise.calibrated))
-        these, count = sorted(set(promise.kinds[~like])), len(set(promise.run[~like]))
-        if count:
-            left_out = f"no run of the kind {join_few_names(these)} calibrated them, so they promise nothing for "
-            left_out += count_manoeuvres(count)
-        if not like.any():
-            raise UndecidedClaim(left_out)
-        promise = replace(promise, held=promise.held[like], run=promise.run[like])
-    decided, evidence, numbers = judge_held_share(promise)
-    return decided, f"{evidence}; {left_out}" if left_out else evidence, numbers
-
-
-def judge_held_share(promise: Promise) -> Judgement:
-    """Verdict on B2 over all of these test runs."""
+def _judge_promise(promise: Promise) -> Judgement:
+    if not len(promise.held):
+        raise UndecidedClaim("bands promise nothing for any test manoeuvre")
     low, high = share_interval(promise.held, promise.run)
     share, sizes = coverage_share(promise.held, promise.run), np.unique(promise.run, return_counts=True)[1]
     few, level = too_few_manoeuvres(len(sizes)), promise.level
@@ -358,10 +303,14 @@ def judge_held_share(promise: Promise) -> Judgement:
     each = "" if (sizes == sizes[0]).all() else ", each counts the same"
     hold = f"bands of {level_text(level)} hold {percent_text(share)}{interval} of whole paths"
     decided = "undecided" if few else verdict_of(low >= level - BROKEN_BY, high < level)
-    return decided, f"{hold} ({count_manoeuvres(len(sizes))}{each})", {f"share at {level_text(level)}": share}
+    return (
+        decided,
+        f"{hold} ({counted_text(len(sizes), 'test manoeuvre')}{each})",
+        {f"share at {level_text(level)}": share},
+    )
 
 
-BAND_RULES: dict[str, ClaimRule[BandEvidence]] = {
+BAND_RULES: dict[str, ClaimRule] = {
     "B1": ClaimRule("more accurate physics gives a narrower band", _judge_widths),
     "B2": ClaimRule("bands hold the share of whole paths that they promise", _judge_promise),
 }
@@ -372,16 +321,14 @@ def judge_findings(results: Results) -> list[ClaimVerdict]:
     claims = results.plan.study.claims
     if claims is None or not (results.cells["status"] == "ok").any():
         return []
-    unfair = unfair_reason(results.plan, results.test.spans)
     rivals, simulated = claims.accurate is not None, claims.moderate is not None
+    if not (rivals or simulated):
+        return []
+    rules = (FULL_SCALE_RULES if rivals else {}) | (SIMULATION_RULES if simulated else {}) | BAND_RULES
+    if unfair := unfair_reason(results.plan, results.test.spans):
+        return leave_undecided(rules, unfair)
     roles = (claims.moderate, claims.high) if simulated else (claims.accurate, claims.inaccurate)
     physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]
-    verdicts: list[ClaimVerdict] = []
-    if rivals:
-        verdicts += leave_undecided(FULL_SCALE_RULES, unfair) if unfair else full_scale_findings(results)
-    if simulated:
-        verdicts += leave_undecided(SIMULATION_RULES, unfair) if unfair else simulation_findings(results)
-    if rivals or simulated:
-        of_bands = leave_undecided(BAND_RULES, unfair) if unfair else band_findings(results, physics, not simulated)
-        verdicts += of_bands
-    return verdicts
+    verdicts = full_scale_findings(results) if rivals else []
+    verdicts += simulation_findings(results) if simulated else []
+    return verdicts + band_findings(results, physics, not simulated)

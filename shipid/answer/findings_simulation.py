@@ -33,20 +33,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, Metric, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, SMALLEST_ERROR, ErrorTable, ErrorTerm, error_table
 from shipid.answer.verdict import (
-    SAME_A,
     ClaimRule,
     ClaimVerdict,
     Judgement,
     UndecidedClaim,
     Verdict,
-    count_manoeuvres,
     difference_with_interval,
     judge_claims,
     least_to_greatest,
     leave_undecided,
-    length_in_metres,
     model_list,
     quoted_model,
     too_few_manoeuvres,
@@ -67,7 +64,7 @@ from shipid.evidence import (
     which_significant,
 )
 from shipid.metrics import path_roughness, rank_correlation
-from shipid.report.wording import join_few_names
+from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import verdict_method
 from shipid.study.results import Results
@@ -77,7 +74,6 @@ Array = NDArray[np.float64]
 FEWEST_ORDERS = 5  # S4: nested orders of runs that a fluctuation needs
 ALIKE, UNLIKE = 0.95, 0.8  # S5
 ROUGH = 1.5  # S7: times the roughness of the true paths
-MOST_PAIRS = 2  # S6: of each kind, in words
 
 
 @dataclass(frozen=True)
@@ -90,7 +86,6 @@ class ErrorGrid:
     table: ErrorTable
     moderate: tuple[str, ...]
     high: tuple[str, ...]
-    left_out: tuple[str, ...] = ()
     by_90: ErrorTable | None = None
     results: Results | None = None
 
@@ -99,49 +94,35 @@ class ErrorGrid:
         """Members of both families."""
         return (*self.moderate, *self.high)
 
-    def members(self, family: str) -> tuple[str, ...]:
-        """Members of a family with a result in every cell, of both for `physics`; UndecidedClaim without one."""
-        names: tuple[str, ...] = getattr(self, family)
-        if not names:
-            raise UndecidedClaim(f"no {family} model has a result in every cell")
-        return names
-
 
 def simulation_findings(results: Results) -> list[ClaimVerdict]:
     """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
-    try:
-        grid = read_grid(results)
-    except UndecidedClaim as reason:
-        return leave_undecided(SIMULATION_RULES, str(reason))
-    left_out = f"left out for want of results: {model_list(grid.left_out)}" if grid.left_out else ""
-    notes = [note for note in (too_few_manoeuvres(grid.table.runs), left_out) if note]
-    return judge_claims(SIMULATION_RULES, grid, "; ".join(notes))
-
-
-def read_grid(results: Results) -> ErrorGrid:
-    """The errors of a finished study; UndecidedClaim, with the reason, where there are none."""
     claims, cells = results.plan.study.claims, results.judged_cells
     assert claims is not None
-    if not results.complete:
-        raise UndecidedClaim(results.missing)
-    if NO_MODEL not in set(cells["model"]):
-        raise UndecidedClaim(f"the method {verdict_method(results.plan)!r} is not run without physics")
-    if NO_MODEL in set(cells["model"][cells["status"] != "ok"]):
-        raise UndecidedClaim(f"{quoted_model(NO_MODEL)} has no result in every cell")
-    if cells["N_D"].nunique() < 2:
-        raise UndecidedClaim("the findings are about a growing N_D, and the study has one")
-    families = (claims.moderate, claims.high)
-    names = {f: tuple(one.name for one in results.plan.foundations if one.family == f) for f in families}
-    every = [name for family in families for name in names[family]]
-
-    def table(metric: Metric) -> ErrorTable:
-        known = error_table(results, every, metric)
-        return replace(known, A={name: A for name, A in known.A.items() if name in known.H})
-
-    by_mean = table("H")
-    moderate, high = (tuple(name for name in names[family] if name in by_mean.A) for family in families)
-    left_out = tuple(name for name in every if name not in by_mean.A)
-    return ErrorGrid(by_mean, moderate, high, left_out, table("H_90"), results)
+    pure = cells["status"][cells["model"] == NO_MODEL]
+    lacks = {
+        results.missing: not results.complete,
+        f"{quoted_model(NO_MODEL)} has no result in every cell": pure.empty or pure.ne("ok").any(),
+        "the findings are about a growing N_D, and the study has one": cells["N_D"].nunique() < 2,
+    }
+    if reason := next((words for words, lacking in lacks.items() if lacking), ""):
+        return leave_undecided(SIMULATION_RULES, reason)
+    names = [
+        [one.name for one in results.plan.foundations if one.family == family]
+        for family in (claims.moderate, claims.high)
+    ]
+    every = [*names[0], *names[1]]
+    known = [error_table(results, every, metric) for metric in ("H", "H_90")]
+    by_mean, by_90 = (replace(one, A={name: A for name, A in one.A.items() if name in one.H}) for one in known)
+    moderate, high = (tuple(name for name in family if name in by_mean.A) for family in names)
+    lost = [name for name in every if name not in by_mean.A]
+    if not (moderate and high):
+        return leave_undecided(
+            SIMULATION_RULES, f"of one family no model has a result in every cell: {model_list(lost)}"
+        )
+    left_out = f"left out for want of results: {model_list(lost)}" if lost else ""
+    grid = ErrorGrid(by_mean, moderate, high, by_90, results)
+    return judge_claims(SIMULATION_RULES, grid, too_few_manoeuvres(by_mean.runs), left_out)
 
 
 def _difference_range(differences: Differences) -> str:
@@ -151,7 +132,7 @@ def _difference_range(differences: Differences) -> str:
 
 
 def _judge_lead(grid: ErrorGrid) -> Judgement:
-    moderate, amounts, table = grid.members("moderate"), grid.table.amounts, grid.table
+    moderate, amounts, table = grid.moderate, grid.table.amounts, grid.table
     count, most = len(moderate), len(moderate) // 2 + 1
     leads = [table.lead(NO_MODEL, moderate, place) for place in range(len(amounts))]
     begins = verdict_of(all_significant(leads[0].above), any_significant(leads[0].below))
@@ -186,44 +167,56 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
     return verdict_of(all_significant(falls.above), any_significant(falls.below)), evidence, numbers
 
 
-def trend_over_accuracy(table: ErrorTable, models: Sequence[str]) -> tuple[Array, list[list[ErrorTerm]]]:
-    """A of models [m], and at each amount of data the terms of the rise of H for twice the A."""
+@dataclass(frozen=True)
+class AccuracyTrend:
+    """How values rise along ln A over models.
+
+    slopes : the rise for twice the A at each N_D, and, where asked for, how much larger it is at the least N_D than at
+    the largest. verdict : whether all are above 0, and would hardly be so with the models in any other order.
+    words : range of the rank correlations with A. least : the least of them.
+    """
+
+    slopes: Differences
+    verdict: Verdict
+    words: str
+    least: float
+
+
+def trend_over_accuracy(table: ErrorTable, models: Sequence[str], *, flattens: bool = False) -> AccuracyTrend:
+    """Judge how the values of a table rise with A; flattens : whether they must rise most at the least N_D."""
     if len(models) < FEWEST_MODELS:
         raise UndecidedClaim(f"{len(models)} physics models, a trend needs {FEWEST_MODELS}")
     A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])
     if np.isclose(A.min(), A.max()):
-        raise UndecidedClaim(SAME_A)
+        raise UndecidedClaim("all physics models have the same A, so nothing can rise with it")
     weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
-    return A, [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
-
-
-def trend_verdict(slopes: Differences, A: Array, order: Array) -> Verdict:
-    """Whether values rise over A, and would hardly do so in another order of the models; order : (J, models) values."""
-    risen = np.maximum(slopes.above, order_chance(A, order))
-    fallen = np.maximum(slopes.below, order_chance(A, -order))
-    return verdict_of(all_significant(risen), any_significant(fallen))
+    each = [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
+    order = np.array([[table.mean(model, k) for model in models] for k in places])
+    rises = [rank_correlation(A, values) for values in order]
+    if flattens:
+        each.append([*each[0], *((-factor, model, place) for factor, model, place in each[-1])])
+        order = np.vstack([order, order[0] - order[-1]])
+    slopes = table.compare(each)
+    risen, fallen = np.maximum(slopes.above, order_chance(A, order)), np.maximum(slopes.below, order_chance(A, -order))
+    words = f"{least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
+    return AccuracyTrend(slopes, verdict_of(all_significant(risen), any_significant(fallen)), words, min(rises))
 
 
 def _judge_rise(grid: ErrorGrid) -> Judgement:
-    table, models = grid.table, grid.physics
-    A, each = trend_over_accuracy(table, models)
-    last, (first_N, *_, last_N) = len(each) - 1, grid.table.amounts
-    slopes = table.compare([*each, [*each[0], *((-factor, model, last) for factor, model, _ in each[last])]])
-    H = np.array([[table.mean(model, k) for model in models] for k in range(len(each))])
-    rises = [rank_correlation(A, values) for values in H]
-    at_first, at_last, less = (difference_with_interval(slopes, k) for k in (0, last, len(each)))
+    trend, amounts = trend_over_accuracy(grid.table, grid.physics, flattens=True), grid.table.amounts
+    at_first, at_last, less = (difference_with_interval(trend.slopes, k) for k in (0, len(amounts) - 1, len(amounts)))
     evidence = (
-        f"for twice the A, H rises by {at_first} at N_D = {first_N} and by {at_last} at {last_N}, {less} less; rank "
-        f"correlation of H and A {least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D "
-        f"({len(A)} models)"
+        f"for twice the A, H rises by {at_first} at N_D = {amounts[0]} and by {at_last} at {amounts[-1]}, {less} less; "
+        f"rank correlation of H and A {trend.words}"
     )
-    numbers = {"least rank correlation of H and A": min(rises)}
-    numbers |= {f"rise for twice the A at N_D = {grid.table.amounts[k]} [m]": float(slopes.mean[k]) for k in (0, last)}
-    return trend_verdict(slopes, A, np.vstack([H, H[0] - H[last]])), evidence, numbers
+    numbers = {"least rank correlation of H and A": trend.least}
+    ends = (0, len(amounts) - 1)
+    numbers |= {f"rise for twice the A at N_D = {amounts[k]} [m]": float(trend.slopes.mean[k]) for k in ends}
+    return trend.verdict, evidence, numbers
 
 
 def _judge_harm(grid: ErrorGrid) -> Judgement:
-    high, table, place = grid.members("high"), grid.table, len(grid.table.amounts) - 1
+    high, table, place = grid.high, grid.table, len(grid.table.amounts) - 1
     lead = table.lead(NO_MODEL, high, place)
     better, worse = which_significant(lead.above), which_significant(lead.below)
     worst = [model for model, behind in zip(high, worse, strict=True) if behind]
@@ -238,14 +231,9 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         f"share of high models shown to be worse at N_D = {grid.table.amounts[-1]}": float(worse.mean()),
     }
     orders = table.H[NO_MODEL].shape[1]
-    if orders < FEWEST_ORDERS or not grid.moderate:
-        lacks = (
-            f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has {orders} "
-            f"{plural_word(orders, 'seed')}"
-            if orders < FEWEST_ORDERS
-            else "no moderate model to compare their fluctuation with"
-        )
-        return "undecided", f"{evidence}; {lacks}", numbers
+    if orders < FEWEST_ORDERS:
+        lacks = f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has"
+        return "undecided", f"{evidence}; {lacks} {orders} {plural_word(orders, 'seed')}", numbers
     moves: Verdict = "undecided"
     if worst:
         of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
@@ -257,8 +245,7 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         )
         numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
     one_sided = all_significant(lead.above) or all_significant(lead.below)
-    split = verdict_of(bool(better.any() and worse.any()), one_sided)
-    return weakest_verdict((split, moves)), evidence, numbers
+    return weakest_verdict((verdict_of(bool(better.any() and worse.any()), one_sided), moves)), evidence, numbers
 
 
 def _chance_of_mean(values: Array) -> float:
@@ -269,19 +256,16 @@ def _chance_of_mean(values: Array) -> float:
 
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
-    H = np.array([table.H[model] @ table.weights for model in models])
-    moved: Array = np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1))
-    return moved
+    H = np.maximum([table.H[model] @ table.weights for model in models], SMALLEST_ERROR)
+    return np.asarray(np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1)))
 
 
 def _judge_metric(grid: ErrorGrid) -> Judgement:
     assert grid.by_90 is not None
-    tables, other = (grid.table, grid.by_90), replace(grid, table=grid.by_90)
-    both = [np.concatenate([table.H[m] @ table.weights for m in grid.table.H]).ravel() for table in tables]
-    alike, verdicts = (
-        rank_correlation(*both),
-        {k: [SIMULATION_RULES[k].decide(g)[0] for g in (grid, other)] for k in FIRST_FOUR},
-    )
+    grids = (grid, replace(grid, table=grid.by_90))
+    both = [np.concatenate([one.table.H[m] @ one.table.weights for m in grid.table.H]).ravel() for one in grids]
+    alike = rank_correlation(*both)
+    verdicts = {key: [SIMULATION_RULES[key].decide(one)[0] for one in grids] for key in FIRST_FOUR}
     changed = {key: pair for key, pair in verdicts.items() if pair[0] != pair[1]}
     opposite = any({"confirmed", "refuted"} <= set(pair) for pair in changed.values())
     words = [f"{key} is {by_90} instead of {by_mean}" for key, (by_mean, by_90) in changed.items()]
@@ -295,23 +279,7 @@ def _judge_metric(grid: ErrorGrid) -> Judgement:
     return decided, evidence, numbers
 
 
-@dataclass(frozen=True)
-class SavingPair:
-    """A moderate model against something dearer: what it saves, and the words.
-
-    terms : the difference that must be shown. also : a second one that must be shown, too.
-    """
-
-    terms: tuple[ErrorTerm, ...]
-    saved: float
-    text: str
-    also: tuple[ErrorTerm, ...] | None = None
-
-
 def _judge_savings(grid: ErrorGrid) -> Judgement:
-    grid.members("moderate")
-    if len(grid.physics) < 2:
-        raise UndecidedClaim("one physics model: there is no other to compare it with")
     small = [k for k, amount in enumerate(grid.table.amounts) if amount <= grid.table.amounts[-1] / 2]
     if not small:
         raise UndecidedClaim(f"no N_D is at most half of the largest, {grid.table.amounts[-1]}")
@@ -323,28 +291,30 @@ def _judge_savings(grid: ErrorGrid) -> Judgement:
         raise UndecidedClaim("no physics model is more accurate than a moderate one")
     parts, examples, numbers = [], [], {}
     for what, pairs in kinds.items():
-        first, second = (
-            grid.table.compare(of) for of in ([p.terms for p in pairs], [p.also or p.terms for p in pairs])
-        )
+        texts, terms, also = zip(*pairs, strict=True)
+        first, second = grid.table.compare(terms), grid.table.compare(also)
         better = which_significant(np.maximum(first.above, second.above))
-        sure = [pair for pair, good in zip(pairs, better, strict=True) if good]
-        best = sorted(sure, key=lambda pair: -pair.saved)[:MOST_PAIRS]
+        sure = [text for text, shown in zip(texts, better, strict=True) if shown]
         parts.append(verdict_of(bool(sure), all_significant(first.below)))
         text = f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}"
-        examples.append(text + (f": {', '.join(pair.text for pair in best)}" if best else ""))
+        examples.append(text + (f", such as {sure[0]}" if sure else ""))
         numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
     return weakest_verdict(parts), "; ".join(examples), numbers
 
 
+SavingPair = tuple[str, list[ErrorTerm], list[ErrorTerm]]
+"""A moderate model against something dearer: the words, and two differences that must be shown."""
+
+
 def _pairs_with_more_data(grid: ErrorGrid, small: Sequence[int]) -> list[SavingPair]:
     """Every moderate model with a small amount against no physics with the next larger one."""
-    mean, amounts = grid.table.mean, grid.table.amounts
+    table, amounts = grid.table, grid.table.amounts
     return [
-        SavingPair(
-            ((1.0, NO_MODEL, k + 1), (-1.0, model, k)),
-            amounts[k + 1] / amounts[k] - mean(model, k) / mean(NO_MODEL, k + 1),
-            f"{model} with {amounts[k]} runs {grid.table.metres(model, k)} against {amounts[k + 1]} runs without "
-            f"physics, {grid.table.metres(NO_MODEL, k + 1)}",
+        (
+            f"{model} with {amounts[k]} runs {table.metres(model, k)} against {amounts[k + 1]} runs without "
+            f"physics, {table.metres(NO_MODEL, k + 1)}",
+            [(1.0, NO_MODEL, k + 1), (-1.0, model, k)],
+            [(1.0, NO_MODEL, k + 1), (-1.0, model, k)],
         )
         for model in grid.moderate
         for k in small
@@ -353,23 +323,22 @@ def _pairs_with_more_data(grid: ErrorGrid, small: Sequence[int]) -> list[SavingP
 
 def _pairs_with_better_physics(grid: ErrorGrid, k: int) -> list[SavingPair]:
     """Every moderate model with the largest small amount against every more accurate physics alone."""
-    table, mean = grid.table, grid.table.mean
+    table = grid.table
     return [
-        SavingPair(
-            ((1.0, other, PHYSICS_ONLY), (-1.0, model, k)),
-            mean(model, PHYSICS_ONLY) / mean(other, PHYSICS_ONLY),
+        (
             f"{model} ({table.metres(model, PHYSICS_ONLY)} alone) with {table.amounts[k]} runs "
             f"{table.metres(model, k)} against {other} alone, {table.metres(other, PHYSICS_ONLY)}",
-            ((1.0, model, PHYSICS_ONLY), (-1.0, other, PHYSICS_ONLY)),
+            [(1.0, other, PHYSICS_ONLY), (-1.0, model, k)],
+            [(1.0, model, PHYSICS_ONLY), (-1.0, other, PHYSICS_ONLY)],
         )
         for model in grid.moderate
         for other in grid.physics
-        if mean(other, PHYSICS_ONLY) < mean(model, PHYSICS_ONLY)
+        if table.mean(other, PHYSICS_ONLY) < table.mean(model, PHYSICS_ONLY)
     ]
 
 
 def _judge_paths(grid: ErrorGrid) -> Judgement:
-    physics, results = grid.members("physics"), grid.results
+    physics, results = grid.physics, grid.results
     assert results is not None
     if results.test.horizon < 3:
         raise UndecidedClaim("a second difference needs three steps ahead")
@@ -377,21 +346,23 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
     if terms is not None and terms < results.plan.study.prediction.horizon:
         evidence = "the compensation is a polynomial of time, which is smooth whatever it learned"
         return "not testable", f"{evidence}; 'path-trained' is not", {}
-    cells, names = results.judged_cells, np.unique(results.test.run)
+    cells, run = results.judged_cells, results.test.run
     cells = cells[cells["N_D"] == grid.table.amounts[0]]
+    names = np.unique(run)
 
-    def by_run(path: Array) -> Array:
-        return np.array([path_roughness(path[:, results.test.run == name]) for name in names])
+    def by_run(paths: Sequence[Array]) -> Array:
+        by_path = [[path_roughness(path[:, run == name]) for name in names] for path in paths]
+        return np.asarray(np.mean(by_path, axis=0))
 
     pure, together = (
-        np.mean([by_run(results.paths[cell]) for m in models for cell in cells["cell"][cells["model"] == m]], axis=0)
+        by_run([results.paths[cell] for model in models for cell in cells["cell"][cells["model"] == model]])
         for models in ([NO_MODEL], physics)
     )
-    decided, numbers = compare_roughness(by_run(results.test.future), pure, together, results.windows)
-    rough, cooperative, true = (length_in_metres(value) for value in numbers.values())
+    decided, numbers = compare_roughness(by_run([results.test.future]), pure, together, results.windows)
+    rough, cooperative, true = (metres_text(value) for value in numbers.values())
     evidence = (
         f"at N_D = {grid.table.amounts[0]}: {quoted_model(NO_MODEL)} {rough}, cooperative {cooperative} in the mean, "
-        f"true paths {true} ({count_manoeuvres(len(names))})"
+        f"true paths {true} ({counted_text(len(names), 'test manoeuvre')})"
     )
     return decided, evidence, numbers
 
@@ -405,7 +376,7 @@ def compare_roughness(true: Array, pure: Array, together: Array, counts: Array) 
 
 
 FIRST_FOUR = ("S1", "S2", "S3", "S4")
-SIMULATION_RULES: dict[str, ClaimRule[ErrorGrid]] = {
+SIMULATION_RULES: dict[str, ClaimRule] = {
     "S1": ClaimRule(
         "every moderate cooperative model beats no physics at the smallest N_D, and most keep the lead", _judge_lead
     ),

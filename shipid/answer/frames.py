@@ -11,10 +11,11 @@ import pandas as pd
 
 from shipid.files import read_json
 from shipid.hybrid.bands import Region
-from shipid.metrics import course_over_horizon, error_of_steps, error_of_windows, over_horizon_by_axis, position_error
+from shipid.metrics import course_over_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
-from shipid.report.selection import FEW_RUNS, spread_items
+from shipid.report.content import TRIAL_COLUMNS, PathKey
+from shipid.report.selection import FEW_RUNS, figure_sizes, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
 from shipid.study.envelope import envelope_table
@@ -27,13 +28,6 @@ ALL_KINDS = "all"
 MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 CLOCK = 6  # digits after the point of a time in a run [s]
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
-
-
-def figure_amounts(results: Results) -> list[int]:
-    """Return the N_D that curves and paths are kept for: smallest, middle (of the logarithm) and largest."""
-    amounts = sorted(set(results.cells["N_D"]))
-    middle = np.sqrt(amounts[0] * amounts[-1])
-    return sorted({amounts[0], min(amounts, key=lambda amount: abs(np.log(amount / middle))), amounts[-1]})
 
 
 def figure_runs(results: Results) -> list[str]:
@@ -54,7 +48,7 @@ def _finite_physics(results: Results) -> dict[str, np.ndarray]:
 
 def _figure_paths(results: Results) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """Keys of a curve and its path: physics alone, where no cell has the same name, and the cells of shown amounts."""
-    alone, amounts = alone_models(results), figure_amounts(results)
+    alone, amounts = alone_models(results), figure_sizes(results.cells["N_D"])
     for model, path in _finite_physics(results).items():
         if model not in alone:
             yield {"model": model, "N_D": 0, "seed": 0, "source": "physics"}, path
@@ -73,9 +67,10 @@ def horizon_frame(results: Results) -> pd.DataFrame:
     ahead, parts = test.step * np.arange(1, test.horizon + 1), []
     naive = {"model": "naive", "N_D": 0, "seed": 0, "source": "naive"}, constant_motion(test)
     for keys, path in (naive, *_figure_paths(results)):
-        errors = error_of_steps(position_error(path, true)) | over_horizon_by_axis(path, true)
-        errors["course"] = np.degrees(course_over_horizon(path, true, test.step))
-        parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors}))
+        error, (along, across) = position_error(path, true), np.abs(path - true).mean(axis=1).T
+        errors = {"mean": error.mean(axis=1), "p90": np.quantile(error, 0.9, axis=1), "along": along, "across": across}
+        course = np.degrees(course_over_horizon(path, true, test.step))
+        parts.append(pd.DataFrame({**keys, "ahead": ahead, **errors, "course": course}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -93,7 +88,8 @@ def time_frame(results: Results) -> pd.DataFrame:
         )
         for keys, error in curves
     ]
-    return insert_gaps(pd.concat(parts, ignore_index=True)[columns], ["run", "model", "N_D", "source"])
+    frame = insert_gaps(pd.concat(parts, ignore_index=True)[columns], ["run", "model", "N_D", "source"])
+    return count_from_start(results, frame)
 
 
 def kinds_frame(results: Results) -> pd.DataFrame:
@@ -101,37 +97,31 @@ def kinds_frame(results: Results) -> pd.DataFrame:
 
     At the largest N_D; over the seeds that have a result. `all` are the test runs of every kind, if there are several.
     """
-    kinds = np.array([results.kinds.get(str(run), "") for run in results.test.run])
-    errors: dict[tuple[str, str, int], list[np.ndarray]] = {("naive", "naive", 0): [results.naive]}
+    test, kinds = results.test, np.array([results.kinds.get(str(run), "") for run in results.test.run])
+    errors = {("naive", "naive", 0): [results.naive]}
     for model, path in _finite_physics(results).items():
-        errors[model, "physics", 0] = [position_error(path, results.test.future)]
-    largest = int(results.cells["N_D"].max()) if len(results.cells) else 0
+        errors[model, "physics", 0] = [position_error(path, test.future)]
     for row in results.rows:
-        if (
-            row["cell"] in results.paths
-            and row["N_D"] == largest
-            and learns_from_runs(results.plan, row["family"], row["method"])
-        ):
-            error = position_error(results.paths[row["cell"]], results.test.future)
-            errors.setdefault((row["model"], "cooperative", largest), []).append(error)
+        learns = learns_from_runs(results.plan, row["family"], row["method"])
+        if learns and row["cell"] in results.paths and row["N_D"] == results.cells["N_D"].max():
+            error = position_error(results.paths[row["cell"]], test.future)
+            errors.setdefault((row["model"], "cooperative", int(row["N_D"])), []).append(error)
     rows = []
     for kind in [*dict.fromkeys(kinds), *([ALL_KINDS] if len(set(kinds)) > 1 else [])]:
         mask = (kinds == kind) | (kind == ALL_KINDS)
-        runs = ", ".join(dict.fromkeys(map(str, results.test.run[mask])))
+        runs = ", ".join(dict.fromkeys(map(str, test.run[mask])))
         for keys, distances in errors.items():
-            mean = float(np.mean([error[:, mask].mean() for error in distances]))
-            end = float(np.mean([error[-1, mask].mean() for error in distances]))
-            rows.append((kind, runs, *keys, mean, end))
+            parts = [error[:, mask] for error in distances]
+            ends = np.mean([part[-1].mean() for part in parts])
+            rows.append((kind, runs, *keys, np.mean([part.mean() for part in parts]), ends))
     return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 
 
 def count_from_start(results: Results, frame: pd.DataFrame) -> pd.DataFrame:
-    """Rows of runs with the time `t` [s] since the begin of each; other frames as they are.
+    """Rows of runs with the time `t` [s] since the begin of each.
 
     Figures are in single precision, in which a clock that counts from 1970 has steps of two minutes.
     """
-    if not {"run", "t"} <= set(frame.columns):
-        return frame
     begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     return frame.assign(t=(frame["t"] - frame["run"].map(begins).astype(float)).round(CLOCK))
 
@@ -148,22 +138,15 @@ def insert_gaps(frame: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
 
 
 def commands_frame(results: Results) -> pd.DataFrame:
-    """Commands over time in the shown test runs, in the units of sailors; equal commands are shown once."""
+    """Commands over time in the shown test runs, in the units of sailors."""
     frame = results.dataset.frame
     frame = frame[frame["run"].isin(figure_runs(results))]
-    shown: dict[str, str] = {}
-    for name in results.dataset.commands:
-        alike = (other for other in shown if signal_of(other) == signal_of(name))
-        twin = next((other for other in alike if np.allclose(frame[other], frame[name], atol=1e-9)), None)
-        word = SIGNALS[signal_of(name)].word
-        component = name.partition(".")[0].replace("_", " ").removesuffix(word).strip()  # port_rudder, rudder
-        shown[twin or name] = component if twin is None else f"{shown[twin]} and {component}"
     result = frame[["run", "t"]].reset_index(drop=True)
-    for name, components in shown.items():
-        unit, factor = read_unit(name)
-        words = f"{components} {SIGNALS[signal_of(name)].word}".strip()
-        result[f"{words} [{unit}]"] = frame[name].to_numpy() * factor
-    return insert_gaps(result, ["run"])
+    for name in results.dataset.commands:
+        (unit, factor), word = read_unit(name), SIGNALS[signal_of(name)].word
+        component = name.partition(".")[0].replace("_", " ").removesuffix(word).strip()  # port_rudder, rudder
+        result[f"{component} {word}".strip() + f" [{unit}]"] = frame[name].to_numpy() * factor
+    return count_from_start(results, insert_gaps(result, ["run"]))
 
 
 def window_snapshots(results: Results) -> list[WindowSnapshot]:
@@ -171,32 +154,36 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
     particulars: Mapping[str, float] = next(
         (one.base.document.get("particulars", {}) for one in results.plan.foundations if one.base), {}
     )
-    begins = results.dataset.frame.groupby("run", sort=False)["t"].min()
     test, level, origin = results.test, results.plan.study.bands.level, np.zeros((1, 2))
-    seed, amounts, alone = int(results.cells["seed"].min()), figure_amounts(results), alone_models(results)
-    paths = {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
-    edges: dict[tuple[str, str, int], Region] = {}
+    paths: dict[PathKey, np.ndarray] = {("", "naive", 0): constant_motion(test)}
+    edges: dict[PathKey, Region] = {}
+    alone, amounts, seed = alone_models(results), figure_sizes(results.cells["N_D"]), int(results.cells["seed"].min())
+    paths |= {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     for row in results.rows:
         if row["cell"] in results.paths and row["N_D"] in amounts and row["seed"] == seed:
             key = row["model"], "cooperative", int(row["N_D"])
             paths[key], bands = results.paths[row["cell"]], results.bands.get(row["cell"])
             if bands is not None and bands.promises(level):
                 edges[key] = bands.region(paths[key], test.columns, test.step, level)
-    paths["", "naive", 0] = constant_motion(test)
-    windows, most = [], min(INSTANTS, max(3, MOST_WINDOWS // len(figure_runs(results))))
-    for run in figure_runs(results):
-        indices = np.flatnonzero(test.run == run)
+    windows, runs = [], figure_runs(results)
+    most, V_w = min(INSTANTS, max(3, MOST_WINDOWS // len(runs))), test.columns.get("V_w")
+    for run in runs:
+        indices, log = np.flatnonzero(test.run == run), results.dataset.frame[results.dataset.frame["run"] == run]
+        clock, psi = log["t"].to_numpy(), np.unwrap(log["psi"].to_numpy())
         for index in indices[np.unique(np.linspace(0, len(indices) - 1, most).round().astype(int))]:
             lines = {key: path[:, index] for key, path in paths.items() if np.isfinite(path[:, index]).all()}
+            t = float(test.t[index])
+            now, end = np.interp([t, t + test.horizon * test.step], clock, psi)
+            towards = None if V_w is None else float(test.columns["beta_w"][index] - test.columns["psi"][index])
             windows.append(
                 WindowSnapshot(
                     run=run,
-                    t=round(float(test.t[index] - begins[run]), CLOCK),
+                    t=round(t - float(clock.min()), CLOCK),
                     outline=ship_outline(particulars),
-                    psi_end=_final_heading(results, run, float(test.t[index])),
+                    psi_end=float(end - now),
                     truth=np.concatenate([origin, test.future[:, index]]),
                     paths={key: np.concatenate([origin, line]) for key, line in lines.items()},
-                    wind=_wind_in_frame(test.columns, int(index)),
+                    wind=None if V_w is None or towards is None else (float(V_w[index]), towards),
                     bands={key: region_outline(region, paths[key], index) for key, region in edges.items()},
                 )
             )
@@ -214,27 +201,13 @@ def region_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
     return np.concatenate([origin, path - reach, end, (path + reach)[::-1], origin])
 
 
-def _final_heading(results: Results, run: str, t: float) -> float:
-    rows = results.dataset.frame[results.dataset.frame["run"] == run]
-    psi = np.unwrap(rows["psi"].to_numpy())
-    end = t + results.test.horizon * results.test.step
-    return float(np.interp(end, rows["t"], psi) - np.interp(t, rows["t"], psi))
-
-
-def _wind_in_frame(columns: Mapping[str, np.ndarray], index: int) -> tuple[float, float] | None:
-    if "V_w" not in columns:
-        return None
-    return float(columns["V_w"][index]), float(columns["beta_w"][index] - columns["psi"][index])
-
-
 def tracks_frame(results: Results) -> pd.DataFrame:
     """Path of every run [m] and its part in the study, thinned to what pixels can show."""
-    parts = []
-    for run, rows in results.dataset.frame.groupby("run", sort=False):
-        thin = rows.iloc[:: max(1, len(rows) // MOST_POINTS)]
-        part = "test" if run in results.test.spans else "training and validation"
-        parts.append(pd.DataFrame({"run": run, "set": part, "north": thin["north"], "east": thin["east"]}))
-    return pd.concat(parts, ignore_index=True)
+    frame = results.dataset.frame[["run", "north", "east"]]
+    runs = frame.groupby("run", sort=False)["run"]
+    kept = frame[runs.cumcount() % (runs.transform("size") // MOST_POINTS).clip(lower=1) == 0]
+    part = np.where(kept["run"].isin(list(results.test.spans)), "test", "training and validation")
+    return kept.assign(set=part).reset_index(drop=True)
 
 
 def envelope_frame(results: Results) -> pd.DataFrame:
@@ -256,22 +229,13 @@ def trials_frame(results: Results) -> pd.DataFrame:
     """One row per trial of the search, value [m^2], with a column for all that varies; the best trials are `chosen`."""
     methods = {way.name: way.method for way in results.plan.methods}
     searched = list(dict.fromkeys(name for method in methods.values() for name in method.varied()))
-    rows = []
-    for cell in results.rows:
-        done = [trial for trial in cell["trials"] if trial["state"] == "complete" and trial["value"] is not None]
-        best = sorted(done, key=lambda trial: trial["value"])[: methods[cell["method"]].num_chosen()]
-        for trial in cell["trials"]:
-            row = {name: cell[name] for name in ("cell", "model", "N_D", "seed")}
-            row |= {name: trial[name] for name in ("number", "state", "value", "epochs", "seconds")}
-            rows.append(row | {"chosen": trial in best, **{name: trial["params"].get(name) for name in searched}})
-    columns = ["cell", "model", "N_D", "seed", "number", "state", "value", "epochs", "seconds", "chosen", *searched]
-    return pd.DataFrame(rows, columns=columns).astype(dict.fromkeys(["value", "seconds", *searched], float))
-
-
-def repairs_frame(results: Results) -> pd.DataFrame:
-    """Every repair that the importer made, with its count."""
-    rows = results.dataset.metadata.get("repairs", [])
-    return pd.DataFrame(rows, columns=["kind", "column", "count", "note"])
+    rows = [cell | trial["params"] | trial for cell in results.rows for trial in cell["trials"]]
+    columns = [name for name in TRIAL_COLUMNS if name != "chosen"]
+    frame = pd.DataFrame(rows, columns=[*columns, "method", *searched])
+    frame = frame.astype(dict.fromkeys(["value", "seconds", *searched], float))
+    place = frame["value"].where(frame["state"] == "complete").groupby(frame["cell"], sort=False).rank(method="first")
+    frame["chosen"] = place <= frame["method"].map({name: method.num_chosen() for name, method in methods.items()})
+    return frame[[*TRIAL_COLUMNS, *searched]]
 
 
 def _method_words(way: StudyMethod) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from shipid.study.results import Results
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
 METHOD_COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
-    *("H", "H_low", "H_high", "H_90", "end", "seconds", "trials"),
+    *("H", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
     "ahead",
@@ -35,17 +34,12 @@ def compare_methods(results: Results) -> pd.DataFrame:
     is that to the method by which the study judges. To choose the lowest H of a test chooses by the test: the interval
     does not count that.
 
-    Raises ShipidError for results that are none.
+    No rows where fewer than two methods learn from data. Raises ShipidError for results that are none.
     """
     check_class("results", results, Results, "as of `read_results`")
-    return method_table(method_cells(results), verdict_method(results.plan))
-
-
-def methods_frame(results: Results) -> pd.DataFrame:
-    """Compare the methods of one run, see `method_table`; no rows where fewer than two learn from data."""
     if sum(way.method.compensates for way in results.plan.methods) < 2:
         return pd.DataFrame(columns=METHOD_COLUMNS)
-    return compare_methods(results)
+    return method_table(method_cells(results), verdict_method(results.plan))
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
@@ -73,8 +67,8 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
 
     H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
     the others, and `missing` also the cells of other methods that this one does not have, since it does not run on
-    their model: means of methods are over the same cells where both have 0. `H_low`, `H_high`: 95 % interval of H over
-    test runs, without what another training would give; not a number with fewer than five. `difference` is H less that
+    their model: means of methods are over the same cells where both have 0.
+    `difference` is H less that
     of the method `reference` over the `pairs` of cells in which both have one, with a 95 % interval `low`, `high`, as
     of `compare_cells`. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
     `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. `ahead` names the methods that err
@@ -95,7 +89,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
             row["ahead"] = ", ".join(name for name, others in by_method.items() if _is_lower(others, errors))
             row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
-            rows.append(row | _interval_of_mean(errors))
+            rows.append(row)
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)
 
 
@@ -109,15 +103,6 @@ def _is_lower(one: ErrorsByCell, other: ErrorsByCell) -> bool:
     """Whether the mean error of one method is lower over the cells that both have, by more than rounding."""
     mine, others = (math.fsum(of[key].mean for key in one.keys() & other.keys()) for of in (one, other))
     return mine < (1 - ROUNDING) * others
-
-
-def _interval_of_mean(mine: ErrorsByCell) -> dict[str, float]:
-    """95 % interval of the mean error over test runs, each drawn with all its windows and cells."""
-    if not mine:
-        return {"H_low": np.nan, "H_high": np.nan}
-    cells = [replace(cell, trained=False) for cell in mine.values()]
-    one = compare_cells(cells, [replace(cell, errors=0 * cell.errors) for cell in cells])
-    return {"H_low": float(np.maximum(one.low, 0.0)), "H_high": one.high}
 
 
 def _difference_row(mine: ErrorsByCell, others: ErrorsByCell) -> dict[str, Any]:

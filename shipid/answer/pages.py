@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from shipid.answer import bands, frames, memory, methods, sentences
+from shipid.answer import bands, frames, methods, sentences
 from shipid.answer.error_table import intervals_frame
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
@@ -26,31 +26,24 @@ from shipid.study.plan import Plan, model_label, plan_text, run_command, verdict
 from shipid.study.results import Results, read_results
 
 Say = Callable[[str], object]
+REPAIR_COLUMNS = ["kind", "column", "count", "note"]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
-    "memory": memory.memory_frame,
     "coverage": bands.coverage_frame,
-    "coverage_groups": bands.groups_frame,
     "no_band": bands.refused_frame,
-    "methods": methods.methods_frame,
+    "methods": methods.compare_methods,
     "intervals": intervals_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 
 
-def report_content(results: Results, say: Say | None = None) -> ReportContent:
-    """Assemble everything that the report of a study shows. say : called with a few words on how far it is."""
-    plan, tables = results.plan, {}
-    for name, frame in REPORT_FRAMES.items():
-        if say is not None:
-            say(f"{plan.name}: table {name.replace('_', ' ')} of {len(results.cells)} cells")
-        tables[name] = frames.count_from_start(results, frame(results))
-    if say is not None:
-        say(f"{plan.name}: answer, findings and errors of {len(results.cells)} cells")
+def report_content(results: Results) -> ReportContent:
+    """Assemble everything that the report of a study shows."""
+    plan, tables = results.plan, {name: frame(results) for name, frame in REPORT_FRAMES.items()}
     words = (
         *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
-        *bands.answer_on_bands(results),
+        *bands.answer_on_bands(results, tables["coverage"]),
     )
     best, naive = sentences.best_model(results), summarise_errors(results.naive)
     return ReportContent(
@@ -64,12 +57,12 @@ def report_content(results: Results, say: Say | None = None) -> ReportContent:
         factors=frames.factors_frame(results),
         trials=frames.trials_frame(results),
         horizon=frames.horizon_frame(results),
-        over_time=frames.count_from_start(results, frames.time_frame(results)),
-        commands=frames.count_from_start(results, frames.commands_frame(results)),
+        over_time=frames.time_frame(results),
+        commands=frames.commands_frame(results),
         snapshots=frames.window_snapshots(results),
         tracks=frames.tracks_frame(results),
         envelope=frames.envelope_frame(results),
-        repairs=frames.repairs_frame(results),
+        repairs=pd.DataFrame(results.dataset.metadata.get("repairs", []), columns=REPAIR_COLUMNS),
         provenance=frames.provenance_words(results),
         study_document=plan_text(plan),
         command=run_command(plan),
@@ -105,7 +98,9 @@ def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
     """Write the pages of one run."""
     results = read_results(folder, say)
     store.write_results(folder, results.plan, results.cells, whole=results.complete)
-    content = report_content(results, say)
+    if say is not None:
+        say(f"{results.plan.name}: answer, findings and tables of {len(results.cells)} cells")
+    content = report_content(results)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
     write_summary(content, folder / SUMMARY)
     return write_report(content, folder / REPORT, say)

@@ -44,8 +44,7 @@ def run(
     Raises ShipidError for whatever a user can mend.
     """
     if read_plan(study, set).parts:
-        message = "is a study of several parts: run it by `shipid.events`, and read each folder in parts/ separately"
-        raise ShipidError(message, path=str(study))
+        raise ShipidError("has several parts: run it by `shipid.events`, read each folder in parts/", path=str(study))
     for event in events(study, set, out, workers, scheduler=scheduler, device=device):
         if line := event_line(event):
             log.info("%s", line)
@@ -71,22 +70,17 @@ def events(
     """
     plan = read_plan(study, set)
     folder = default_folder(plan) if out is None else as_path("out", out)
-    log.debug("study %s, digest %s, folder %s", plan.name, plan.digest, folder)
     yield from run_study(plan, folder, workers=workers, scheduler=scheduler, device=device)
 
 
 def event_line(event: Event) -> str:
     """Write an event as one line of text; empty for the end."""
     row = event.row
-    if event.kind == "note":
-        return event.text
-    if event.kind == "start":
-        return f"{event.total - event.done} of {event.total} cells to do"
     if event.kind != "cell":
-        return ""
+        start = f"{event.total - event.done} of {event.total} cells to do"
+        return {"note": event.text, "start": start}.get(event.kind, "")
+    result = f"{row['status']}: {row['sentence']}"
     if row["status"] == "ok":
         H, H_90 = (f"{row[name]:.{max(length_decimals(row[name]), 3)}f} m" for name in ("H", "H_90"))
         result = f"H {H}, H_90 {H_90}"
-    else:
-        result = f"{row['status']}: {row['sentence']}"
     return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypedDict, TypeVar
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
 from shipid.evidence import FEWEST_RUNS, Differences
 from shipid.report.content import model_text
-from shipid.report.wording import join_few_names
+from shipid.report.wording import counted_text, difference_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
-from shipid.units import length_decimals, plural_word
+from shipid.units import plural_word
 
 Verdict = Literal["confirmed", "undecided", "refuted", "not testable"]
 Judgement = tuple[Verdict, str, Mapping[str, float]]  # with the evidence in words, and key numbers by name and unit
-Judged = TypeVar("Judged", contravariant=True)
 MOST_NAMES = 5  # in one sentence
-SAME_A = "all physics models have the same A, so nothing can rise with it"
 EQUAL_A = "it is not shown which of them is more accurate"
 
 
@@ -37,13 +35,13 @@ class UndecidedClaim(Exception):
 
 
 @dataclass(frozen=True)
-class ClaimRule(Generic[Judged]):
+class ClaimRule:
     """A claim and how it is judged: `judge` takes what the claim is about, or raises UndecidedClaim."""
 
     claim: str
-    judge: Callable[[Judged], Judgement]
+    judge: Callable[[Any], Judgement]
 
-    def decide(self, case: Judged) -> Judgement:
+    def decide(self, case: object) -> Judgement:
         """Verdict, evidence and numbers; undecided, with the reason as evidence, where something lacks."""
         try:
             return self.judge(case)
@@ -51,17 +49,17 @@ class ClaimRule(Generic[Judged]):
             return "undecided", str(reason), {}
 
 
-def judge_claims(rules: Mapping[str, ClaimRule[Any]], case: object, note: str = "") -> list[ClaimVerdict]:
-    """The finding of each rule, in order. note : what is added to the evidence of all."""
+def judge_claims(rules: Mapping[str, ClaimRule], case: object, *notes: str) -> list[ClaimVerdict]:
+    """The finding of each rule, in order. notes : what is added to the evidence of all."""
     findings: list[ClaimVerdict] = []
     for key, rule in rules.items():
         decided, evidence, numbers = rule.decide(case)
-        words = "; ".join(part for part in (evidence, note) if part)
+        words = "; ".join(part for part in (evidence, *notes) if part)
         findings.append(ClaimVerdict(id=key, claim=rule.claim, verdict=decided, evidence=words, numbers=numbers))
     return findings
 
 
-def leave_undecided(rules: Mapping[str, ClaimRule[Any]], reason: str) -> list[ClaimVerdict]:
+def leave_undecided(rules: Mapping[str, ClaimRule], reason: str) -> list[ClaimVerdict]:
     """Every claim undecided, for the same reason."""
     return [
         ClaimVerdict(id=k, claim=r.claim, verdict="undecided", evidence=reason, numbers={}) for k, r in rules.items()
@@ -79,33 +77,14 @@ def weakest_verdict(verdicts: Iterable[Verdict]) -> Verdict:
     return "refuted" if "refuted" in parts else verdict_of(set(parts) == {"confirmed"}, False)
 
 
-def length_in_metres(value: float) -> str:
-    """Return a length with two decimals, from 10 m on with one, of a model below 0.1 m with two digits or more."""
-    return f"{_fixed_decimals(value, _decimal_places(value))} m"
-
-
-def _decimal_places(value: float) -> int:
-    return 1 if abs(value) >= 9.995 else length_decimals(value)
-
-
-def _fixed_decimals(value: float, places: int) -> str:
-    """Return a number with so many decimals, and no minus zero."""
-    return f"{round(value, places) + 0.0:.{places}f}"
-
-
-def interval_after(low: float, high: float, value: float) -> str:
-    """Return ` [low, high]` with the decimals of the value that it follows, or nothing where there is none."""
-    places = _decimal_places(value)
-    return (
-        f" [{_fixed_decimals(low, places)}, {_fixed_decimals(high, places)}]" if np.isfinite([low, high]).all() else ""
-    )
+def length_with_interval(value: float, low: float, high: float) -> str:
+    """Return a length [m] with its interval, if it has one."""
+    return difference_text(value, low, high) if np.isfinite([low, high]).all() else metres_text(value)
 
 
 def difference_with_interval(differences: Differences, index: int = 0) -> str:
-    """Return a difference with its 95 % interval, all with the decimals of the greatest."""
-    mean, low, high = (float(values[index]) for values in (differences.mean, differences.low, differences.high))
-    greatest = float(np.nanmax(np.abs([mean, low, high])))
-    return f"{_fixed_decimals(mean, _decimal_places(greatest))} m{interval_after(low, high, greatest)}"
+    """Return a difference with its 95 % interval, if it has one."""
+    return length_with_interval(*(float(ends[index]) for ends in (differences.mean, differences.low, differences.high)))
 
 
 def least_to_greatest(*numbers: str) -> str:
@@ -113,21 +92,12 @@ def least_to_greatest(*numbers: str) -> str:
     return " to ".join(dict.fromkeys(numbers))
 
 
-def count_manoeuvres(count: int) -> str:
-    """Return `1 test manoeuvre`, `20 test manoeuvres`, ..."""
-    return f"{count} {plural_word(count, 'test manoeuvre')}"
-
-
 def too_few_manoeuvres(count: int) -> str:
     """Say that so many test manoeuvres give no interval; empty if they do."""
     if count >= FEWEST_RUNS:
         return ""
-    return f"{count_manoeuvres(count)} {plural_word(count, 'gives', 'give')} no interval, {FEWEST_RUNS} would"
-
-
-def count_runs(count: int) -> str:
-    """Return `1 run`, `2 runs`, ..."""
-    return f"{count} {plural_word(count, 'run')}"
+    give = plural_word(count, "gives", "give")
+    return f"{counted_text(count, 'test manoeuvre')} {give} no interval, {FEWEST_RUNS} would"
 
 
 def quoted_model(model: str) -> str:

@@ -123,8 +123,7 @@ def _crossing_of_line(values: Array, limits: tuple[float, float]) -> Array:
     rising = slope > 1e-9
     at = middle + np.divide(margin, slope, out=np.zeros_like(margin), where=rising)
     flat = np.where(margin > 0, high, low)  # no better for being more accurate: all pay, or none does
-    crossing: Array = np.exp(np.clip(np.where(rising, at, flat), low, high))
-    return crossing
+    return np.asarray(np.exp(np.clip(np.where(rising, at, flat), low, high)))
 
 
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:

@@ -119,53 +119,6 @@ def study_screen(
         answer.save(f"{len(frame)} members", file, frame)
 
 
-@app.command("rotate")
-def study_rotate(
-    study: StudyName,
-    tests: Annotated[list[str], typer.Option(help="runs that test in turn, * for any part of a name; may be repeated")],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="file for a row per turn and cell: .csv or .parquet; default: <study>-rotate.csv"),
-    ] = None,
-    changes: Changes = None,
-    device: Device = "cpu",
-    as_json: Json = False,
-) -> None:
-    """Test on every run in turn and train on all others; the same command goes on after an interruption."""
-    import pandas as pd
-
-    from shipid.answer import rotate
-    from shipid.study.plan import families_set_from, grid_seeds
-    from shipid.study.prepare import obtain_runs
-
-    plan, file = _prepare_command(study, changes, device, out, "rotate")
-    dataset = obtain_runs(plan)
-    wanted = rotate.choose_turns(plan, dataset, tests)
-    kept = rotate.kept_folder(file, plan, dataset, device)
-    blocks = rotate.rotate_test_runs(plan, dataset, wanted, device, kept)
-    cells = len(wanted) * len(plan.pairs) * len(grid_seeds(plan))
-    sentence = f"interrupted; what is finished is kept in {kept.parent}: the same command goes on from there"
-    frame = pd.concat(list(count_blocks(blocks, cells, "cells", sentence)), ignore_index=True)
-    naive = frame.groupby("test")["naive"].first().mean()
-    verdicts = rotate.turn_findings(frame, plan)
-    with open_answer(as_json) as answer:
-        answer.say(f"H and A [m], each of {len(wanted)} runs is the test run in turn, the others train", tests=wanted)
-        level = level_text(plan.study.bands.level)
-        answer.say(f"width, coverage: radius [m] of bands of {level}, share of paths inside; better: turns with H < A:")
-        answer.records("turns", rotate.turns_table(frame), formats={"coverage": share_text})
-        answer.say(f"constant u, v, r: {naive:.4g} m", naive=naive)
-        if saw := families_set_from(plan, wanted):
-            answer.say(
-                f"{', '.join(saw)}: numbers set from runs that test here, A and H are not those of new runs", saw=saw
-            )
-        if verdicts:
-            answer.say("findings over the turns, in brackets 95 % intervals:")
-        heads = {"id": "finding", "claim": "claim", "verdict": "verdict", "evidence": "evidence"}
-        answer.records("findings", verdicts, heads)
-        answer.save(f"{len(frame)} cells", file, frame)
-    rotate.remove_kept(kept)
-
-
 @app.command("run")
 def study_run(
     study: StudyName,

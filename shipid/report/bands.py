@@ -29,7 +29,6 @@ from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table,
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.units import level_text, percent_text, plural_word
 
-GROUP_WORDS = {"kind": "manoeuvre", "ahead": "time ahead"}
 BAND_COLUMNS = {
     "model": TableColumn("model"),
     "N_D [1]": TableColumn("N_D", 0),
@@ -37,16 +36,6 @@ BAND_COLUMNS = {
     "held [95 %]": TableColumn("held", numeric=True),
     "mean radius [m]": TableColumn("width", "length"),
     "radius at the end [m]": TableColumn("end", "length"),
-    "in lengths [1]": TableColumn("lengths", 3),
-}
-BAND_GROUP_COLUMNS = {
-    "model": TableColumn("model"),
-    "by": TableColumn("by"),
-    "group": TableColumn("group"),
-    "held [95 %]": TableColumn("held", numeric=True),
-    "mean radius [m]": TableColumn("width", "length"),
-    "test runs [1]": TableColumn("runs", 0),
-    "note": TableColumn("note"),
 }
 
 
@@ -184,36 +173,13 @@ def _coverage_cells(frame: pd.DataFrame) -> pd.DataFrame:
     return with_cells(frame, held=[TableCell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
 
 
-def coverage_by_group(content: ReportContent) -> PageTable | None:
-    """Coverage at one level by kind of manoeuvre and time ahead."""
-    frame = content.frame("coverage_groups")
-    if frame.empty:
-        return None
-    frame = frame[frame.model.isin(close_up_models(content))]
-    shown = _coverage_cells(frame).assign(by=frame.by.map(GROUP_WORDS), note=frame.note.where(frame.note.ne(""), None))
-    return frame_table(
-        "coverage-groups", "Where bands hold more and less", _least_held(frame), shown, BAND_GROUP_COLUMNS
-    )
-
-
-def _least_held(frame: pd.DataFrame) -> str:
-    kinds = frame[frame.by.eq("kind")]
-    if kinds.empty:
-        return ""
-    worst = kinds.sort_values("coverage").iloc[0]
-    text = f"Bands hold least at {worst.group} ({worst.model}): {percent_text(worst.coverage)} of the paths."
-    better = not worst.note and kinds.group.nunique() > 1
-    return f"{text} --kind of shipid predict gives the band that is calibrated for this kind alone." if better else text
-
-
 HOW_FAR_OFF = Section(
     "How far off it may be",
     draw=lambda content: (
         coverage_figure(content),
         coverage_table(content),
         width_figure(content),
-        coverage_by_group(content),
     ),
     needs=("coverage",),
-    anchors=("coverage", "coverage-table", "width-map", "coverage-groups"),
+    anchors=("coverage", "coverage-table", "width-map"),
 )

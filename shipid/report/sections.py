@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shipid.report import bands, cells, errors_over, factors, logs, memory, methods, paths, physics_and_data, search
+from shipid.report import bands, cells, errors_over, factors, logs, methods, paths, physics_and_data, search
 from shipid.report.section import Section
 
 SECTIONS: dict[str, Section] = {
@@ -10,7 +10,6 @@ SECTIONS: dict[str, Section] = {
     "errors": errors_over.WHERE_ERRORS_GROW,
     "how-far-off": bands.HOW_FAR_OFF,
     "the-methods": methods.THE_METHODS,
-    "the-past": memory.THE_PAST,
     "predictions": paths.PREDICTIONS,
     "the-models": factors.THE_MODELS,
     "data": logs.THE_DATA,

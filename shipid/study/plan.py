@@ -263,14 +263,6 @@ def grid_seeds(plan: Plan) -> tuple[int, ...]:
     return tuple(sorted(set(plan.study.grid.seeds)))
 
 
-def rotated_plan(plan: Plan, test: str, amount: int) -> Plan:
-    """The study with one test run and one amount of data, every seed of the grid; the digest stays."""
-    split = plan.study.split.model_copy(update={"test": [test]})
-    grid = plan.study.grid.model_copy(update={"N_D": [amount]})
-    study = plan.study.model_copy(update={"split": split, "grid": grid})
-    return completed_plan(replace(plan, study=study, batches=tuple(Batch(amount, seed) for seed in grid_seeds(plan))))
-
-
 def whole_unit(plan: Plan, batch: Batch) -> Unit:
     """All cells of a batch as one unit."""
     return Unit(batch, tuple((name, way.name) for name, way in plan.pairs), batch.key)

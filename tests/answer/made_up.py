@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipid.answer.error_table import ErrorTable
-from shipid.answer.findings import FULL_SCALE_RULES, Rivals, Widths, judge_width_trend
+from shipid.answer.findings import BAND_RULES, FULL_SCALE_RULES, Rivals, Widths
 from shipid.answer.findings_simulation import SIMULATION_RULES, ErrorGrid, compare_roughness
 from shipid.answer.verdict import Verdict
 from shipid.study.declared import NO_MODEL
@@ -141,7 +141,7 @@ def rule(case: str) -> Callable[[np.random.Generator, Size, float], Verdict]:
     def judge(rng: np.random.Generator, size: Size, effect: float) -> Verdict:
         if case == "B1":
             grid = grids(rng, size, case, effect)
-            return judge_width_trend(Widths(grid.table, grid.physics))[0]
+            return BAND_RULES["B1"].decide(Widths(grid.table, grid.physics))[0]
         if case == "S7":
             return compare_roughness(*roughness(rng, size, effect))[0]
         if case in FULL_SCALE_RULES:

@@ -94,7 +94,7 @@ def test_one_test_manoeuvre_decides_nothing(made: Any) -> None:
     results = made(one(1.0, 1.9, 9.0))
     assert set(verdicts(results).values()) == {"undecided"}
     assert all("1 test manoeuvre gives no interval" in finding["evidence"] for finding in judge_findings(results)[:4])
-    assert all("shipid study rotate" in finding["evidence"] for finding in judge_findings(results)[:4])
+    assert all('[repeat] "split.test"' in finding["evidence"] for finding in judge_findings(results)[:4])
 
 
 def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> None:
@@ -117,7 +117,7 @@ def test_evidence_names_the_numbers_and_their_intervals(made: Any) -> None:
     assert evidence["R1"].startswith("good 2.00 m -> 1.00 m, 1.00 m [0.9")
     assert "; bad 6.00 m -> 2.10 m, 3.90 m [3." in evidence["R1"]
     assert evidence["R1"].endswith("; 8 test manoeuvres")
-    assert evidence["R2"].startswith("inaccurate and compensated 2.10 m, accurate alone 2.00 m: -0.10 m [-")
+    assert evidence["R2"].startswith("inaccurate and compensated 2.10 m, accurate alone 2.00 m: −0.10 m [−")
     assert evidence["R3"].startswith("gap 4.00 m before, 1.10 m after: 2.90 m [2.")
     numbers = {finding["id"]: finding["numbers"] for finding in judge_findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
     assert numbers["R1"] == {"H / A, accurate": pytest.approx(0.5), "H / A, inaccurate": pytest.approx(0.35)}

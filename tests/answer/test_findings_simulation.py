@@ -90,7 +90,7 @@ def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
     assert finding["verdict"] == "refuted"
     assert (
         "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics (8.00 m), which has an error "
-        "larger by -1.50 m [" in finding["evidence"]
+        "larger by −1.50 m [" in finding["evidence"]
     )
     finding = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
     assert finding["verdict"] == "undecided", "one of three is not most at 30 runs, and no most is worse"
@@ -124,14 +124,14 @@ def test_S3_for_twice_the_A_by_hand(judged: Any) -> None:
     turned = {model: values[::-1] for model, values in rows.items()}
     steeper = judged(turned, alone=alone)["S3"]
     assert steeper["verdict"] == "undecided", "one of 120 orders of five models, of four comparisons"
-    assert "-1.90 m [" in steeper["evidence"]
+    assert "−1.90 m [" in steeper["evidence"]
 
 
 def test_S3_an_order_that_comes_by_chance_is_undecided(judged: Any) -> None:
     """H at 100 runs is in the order 4, 1, 2, 3, 5 of A."""
     finding = judged({**H, "moderate-1": (1.5, 0.9, 1.3)})["S3"]
     assert finding["verdict"] == "undecided"
-    few = judged({**H, "high-2": (8.5, None, 1.4)})["S3"]
+    few = judged({**H, "moderate-1": (8.5, None, 1.4)})["S3"]
     assert (few["verdict"], few["evidence"][:39]) == ("undecided", "4 physics models, a trend needs 5; left")
 
 
@@ -159,11 +159,10 @@ def test_S5_sees_where_percentiles_tell_another_story(judged: Any) -> None:
 
 
 def test_S6_names_pairs(judged: Any) -> None:
-    """The pairs that save most come first: 10 runs for 30 (1.5 m, 4.0 m)."""
     finding = judged()["S6"]
     assert finding["verdict"] == "confirmed"
     evidence = finding["evidence"]
-    assert "comparisons show a moderate model better than no physics with more runs: " in evidence
+    assert "comparisons show a moderate model better than no physics with more runs, such as " in evidence
     assert "moderate-1 with 10 runs 1.50 m against 30 runs without physics, 4.00 m" in evidence
     assert "moderate-2 (4.00 m alone) with 30 runs 1.20 m against moderate-1 alone, 2.00 m" in evidence
     assert "100 runs 0.60 m" not in evidence, "100 runs are not few"

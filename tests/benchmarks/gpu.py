@@ -10,7 +10,7 @@ import torch
 from shipid.engine.rollout import rollout
 from shipid.vessel.load import load_vessel
 from tests.benchmarks.rollouts import STEPS, inputs, variants
-from tests.benchmarks.timing import best_of, clock
+from tests.benchmarks.timing import best_of
 
 SIZES = ((6016, 1), (6016, 16), (60160, 16))  # samples, variants
 

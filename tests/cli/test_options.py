@@ -210,11 +210,6 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         {"plan": is_changed, "wanted": lambda families: [one.name for one in families] == ["wrong"], "count": 7}
         | {"device": "gpu", "engine": "single"},
     ),
-    "study rotate": (
-        "shipid.answer.rotate:rotate_test_runs",
-        f"study rotate {STUDY} --tests A* --tests B1 --set grid.N_D=[5] --device gpu",
-        {"plan": is_changed, "tests": ["A*", "B1"], "device": "gpu"},
-    ),
     "study run": (
         "shipid.study.run:run_study",
         f"study run {STUDY} --workers 3 --scheduler tcp://here --set grid.N_D=[5] --shard 3/20 --device gpu",
@@ -255,7 +250,6 @@ def ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "shipid.study.prepare:obtain_runs": lambda *_: LOG,
         "shipid.study.prepare:partition": lambda *_: (),
         "shipid.study.screen:notes_on_windows": lambda *_: [],
-        "shipid.answer.rotate:choose_turns": lambda *given: given[2],
         "shipid.study.store:stored_plan": lambda *_: SimpleNamespace(parts={}),
         "shipid.study.plan:program_of": lambda *_: "shipid",
     }

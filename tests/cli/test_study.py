@@ -21,15 +21,13 @@ from tests.cli.running import ended, output_of
 from tests.study.tiny import TINY, without_figures, without_workers
 
 
-@pytest.mark.parametrize("command", ["screen", "rotate"])
-def test_a_table_replaces_nothing_that_the_study_reads(study: Path, command: str) -> None:
+def test_a_table_replaces_nothing_that_the_study_reads(study: Path) -> None:
     output_of("simulate", study, "--out", "data.parquet")
     text = study.read_text()
     head, rest = text[: text.index("[truth]")], text[text.index("[split]") :]
     study.write_text(f'{head}[data]\ndataset = "data.parquet"\n{rest}')
     before = Path("data.parquet").read_bytes()
-    words = ["--tests", "*"] if command == "rotate" else []
-    status, _, error = ended("study", command, study, *words, "--out", "data.parquet")
+    status, _, error = ended("study", "screen", study, "--out", "data.parquet")
     assert status == 1
     assert "data.parquet: --out: is named twice" in error
     assert Path("data.parquet").read_bytes() == before

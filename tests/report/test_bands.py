@@ -27,22 +27,14 @@ def banded(simulation: ReportContent) -> ReportContent:
             "level": level,
             "coverage": level - 0.05 * (model == "high-1"),
         }
-        | {"low": level - 0.1, "high": min(level + 0.1, 1.0), "width": 1.0 + level, "end": 3.0, "lengths": 0.1}
+        | {"low": level - 0.1, "high": min(level + 0.1, 1.0), "width": 1.0 + level, "end": 3.0}
         | {"runs": 20, "seeds": 2}
         for model in pd.unique(cells.model)
         for size in (10, 30, 100)
         for level in (0.5, 0.8, 0.9)
     ]
-    groups = [
-        {"model": "nominal", "by": by, "group": group, "coverage": share, "low": 0.5, "high": 0.95, "width": 1.0}
-        | {"runs": 5, "note": note}
-        for by, group, share, note in [
-            ("kind", NASTY, 0.6, "2 runs of this kind calibrated the band: too few"),
-            ("ahead", "5 s", 0.99, ""),
-        ]
-    ]
     refused = [{"model": "none", "N_D": 10, "reason": "a band of 90 % needs 9 runs or more"}]
-    frames = {"coverage": pd.DataFrame(rows), "coverage_groups": pd.DataFrame(groups)}
+    frames = {"coverage": pd.DataFrame(rows)}
     frames |= {"no_band": pd.DataFrame(refused)}
     return replace(simulation, cells=cells, frames=frames)
 
@@ -52,31 +44,9 @@ def test_it_says_what_was_held(banded: ReportContent) -> None:
     assert figure is not None
     assert "bands of 90 % hold 89 % of the test paths" in figure.takeaway
     assert len(views(figure)) == 3
-    groups = bands.coverage_by_group(banded)
-    assert groups is not None
-    assert NASTY in groups.takeaway
-    assert groups.takeaway.startswith("Bands hold least at ")
-    assert "60 % of the paths" in groups.takeaway
-    notes = [row[-1].text for row in groups.rows if row[1].text == "manoeuvre"]
-    assert notes == ["2 runs of this kind calibrated the band: too few"]
-    assert "--kind" not in groups.takeaway, "too few runs of this kind: it has no band"
     table = bands.coverage_table(banded)
     assert table is not None
     assert "needs 9 runs" in table.takeaway
-
-
-@pytest.mark.parametrize(("kinds", "said"), [(("zigzag", "turning"), True), (("zigzag",), False)])
-def test_a_band_for_one_kind_is_named_where_there_is_one(
-    banded: ReportContent, kinds: tuple[str, ...], said: bool
-) -> None:
-    rows = [
-        {"model": "nominal", "by": "kind", "group": kind, "coverage": 0.6, "low": 0.5, "high": 0.7, "width": 1.0}
-        | {"runs": 5, "note": ""}
-        for kind in kinds
-    ]
-    table = bands.coverage_by_group(replace(banded, frames={**banded.frames, "coverage_groups": pd.DataFrame(rows)}))
-    assert table is not None
-    assert ("--kind of shipid predict" in table.takeaway) is said
 
 
 def test_lines_of_the_coverage_are_those_of_a_close_up(banded: ReportContent) -> None:

@@ -26,9 +26,8 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
                     difference = 0.0 if method == "a" else H - 3
                     failed = {"c": 1 if failing else 0, "lost": 4}.get(method, 0)
                     rows.append(
-                        dict(zip(METHOD_COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 0.9 * H,
-                                 1.2 * H,
-                                 2 * H, 1.7 * H, 2.0, 8.0, "a",
+                        dict(zip(METHOD_COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 2 * H,
+                                 1.7 * H, 2.0, 8.0, "a",
                              4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
                              difference + 0.1, np.nan, np.nan, ""], strict=True))
                     )  # fmt: skip

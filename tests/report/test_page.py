@@ -169,10 +169,9 @@ def test_sentences_link_to_what_is_there(page):
     assert {a["href"][1:] for a, _ in parsed.all("a")} <= set(ids)
     answers = [text for _, text in parsed.all("li") if "Figure" in text and "With 30" in text]
     assert len(answers) == 1
-    # A map needs several N_D; no item of the past is drawn without a memory, and a section not without what it needs.
+    # A map needs several N_D; and no section is drawn without what it needs.
     able = {name: one for name, one in SECTIONS.items() if set(one.needs) <= {*vars(content), *content.frames}}
-    lacking = SECTIONS["the-past"].anchors
-    assert declared_anchors(able) - set(ids) - set(lacking) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
+    assert declared_anchors(able) - set(ids) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
 
 
 def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):
