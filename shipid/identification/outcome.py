@@ -470,7 +470,7 @@ def check_identification(
     ahead: float = 0.0,
     profiles: Sequence[str] = (),
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the runs to fit and those held out, as `pick_runs` does, when all arguments of `run_identification` fit.
+    """The runs to fit and those held out, as `pick_runs` does, when all arguments of `run_identification` fit.
 
     Raises what `run_identification` would raise before it simulates.
     """

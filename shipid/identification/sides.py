@@ -189,7 +189,7 @@ def side_table_rows(groups: pd.DataFrame) -> list[list[str]]:
 
 
 def _turning_error_text(turning: float, error: float) -> str:
-    """Return the error of the turning [%] with its standard error, where more than one piece shows it."""
+    """The error of the turning [%] with its standard error, where more than one piece shows it."""
     share = "" if np.isnan(turning) else f"{100 * turning:+.1f}"
     return f"{share} +-{100 * error:.1f}" if share and np.isfinite(error) else share
 

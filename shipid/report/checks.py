@@ -77,7 +77,7 @@ class CheckContent(PageContent):
 
 
 def checks_table(content: CheckContent) -> PageTable:
-    """Return the table of all checks, failed ones first; what these say is shown whole."""
+    """The table of all checks, failed ones first; what these say is shown whole."""
     frame = content.checks.assign(ok=content.checks["ok"].astype(bool)).sort_values("ok", kind="stable")
     rows = [
         {

@@ -143,7 +143,7 @@ def close_up_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
 
 
 def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
-    """Return the rows of the models in the close-up; physics and naive do not depend on N_D and have N_D = 0."""
+    """The rows of the models in the close-up; physics and naive do not depend on N_D and have N_D = 0."""
     frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
     frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
     kept = frame.model.isin(close_up_models(content)) | frame.source.eq("naive")
@@ -151,7 +151,7 @@ def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFra
 
 
 def _models_of_close_up(content: ReportContent) -> str:
-    """Return a sentence on which models are drawn; empty if all are."""
+    """A sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
     names = join_few_names(shown, 6)
     words = f" Of {total} models, the middle one of each family by A, and the best in validation: {names}."

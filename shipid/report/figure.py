@@ -52,7 +52,7 @@ Panel = dict[str, Any]  # a figure as Plotly takes it: `data`, a list of traces,
 
 
 def category_colour(index: int) -> str:
-    """Return the CSS variable of the index-th category colour."""
+    """The CSS variable of the index-th category colour."""
     return f"var(--category-{index % len(OKABE_ITO)})"
 
 

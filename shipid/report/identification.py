@@ -205,7 +205,7 @@ def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> Panel:
 
 
 def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
-    """Return the range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
+    """The range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
     dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
     reach = FARTHEST_INTERVAL * max(float(np.ptp(dots)), 0.25)
     given = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
@@ -221,7 +221,7 @@ def _estimate_words(row: Mapping[Any, Any]) -> str:
 
 
 def estimates_table(content: IdentificationContent) -> PageTable:
-    """Return the table of all estimates in their units."""
+    """The table of all estimates in their units."""
     frame = content.estimates
     words = [row["path"] + (f" (with {row['with']})" if row["with"] else "") for row in frame.to_dict("records")]
     numbers = {name: list(map(_scientific_cell, frame[name])) for name in ("base", "value", "error", "factor")}
@@ -241,7 +241,7 @@ def _scientific_cell(value: float) -> TableCell:
 
 
 def unseen_table(content: IdentificationContent) -> PageTable | None:
-    """Return the table of what is not identified, and why; None if everything is."""
+    """The table of what is not identified, and why; None if everything is."""
     rows = [[word_cell(set_sentence(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
     takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
     return PageTable("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
@@ -368,7 +368,7 @@ def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> Panel:
 
 
 def profiles_figure(content: IdentificationContent) -> PageFigure | None:
-    """Return the figure of the profile likelihoods; None if none was asked for."""
+    """The figure of the profile likelihoods; None if none was asked for."""
     if content.profiles.empty:
         return None
     curves = content.profiles.groupby("path", sort=False)
@@ -396,7 +396,7 @@ def _draw_profile(path: str, mine: pd.DataFrame) -> Panel:
 
 
 def programme_table(content: IdentificationContent) -> PageTable | None:
-    """Return the table of manoeuvres to run next; None if it was not asked for."""
+    """The table of manoeuvres to run next; None if it was not asked for."""
     frame = content.programme
     if frame.empty:
         return None

@@ -150,7 +150,7 @@ def input_ranges(content: ReportContent) -> PageTable | None:
 
 
 def repairs_table(content: ReportContent) -> PageTable | None:
-    """Return the table of repairs by the importer; None if nothing is recorded. Takes the content of any page."""
+    """The table of repairs by the importer; None if nothing is recorded. Takes the content of any page."""
     if content.repairs.empty:
         return None
     kinds = names_in(content.repairs, "kind")

@@ -86,7 +86,7 @@ class ManoeuvreContent(PageContent):
 
     @property
     def answer(self) -> list[AnswerSentence]:
-        """Return sentences: the main measures, and how many criteria are met."""
+        """Sentences: the main measures, and how many criteria are met."""
         known = self.measures[self.measures["measure"].isin(self.first)]
         measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in rows_as_tuples(known)]
         sentences = [AnswerSentence("; ".join(measures).capitalize() + ".", "measures")]
@@ -114,7 +114,7 @@ def measures_table(content: ManoeuvreContent) -> PageTable:
 
 
 def _decimals_of_measure(value: float, unit: str) -> int:
-    """Return the number of decimals for three digits: at most three; none for a count."""
+    """The number of decimals for three digits: at most three; none for a count."""
     if not np.isfinite(value) or abs(value) < 1e-3:
         return 0 if unit == "-" and value == 0 else 2
     return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))

@@ -231,7 +231,7 @@ def _window_chips(content: ReportContent) -> list[Chip]:
 
 
 def _half_pixel(windows: Sequence[WindowSnapshot]) -> float:
-    """Return half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
+    """Half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
     extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
     return float(np.median(extents)) / WINDOW_DETAIL if extents else 0.0
 

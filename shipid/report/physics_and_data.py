@@ -166,7 +166,7 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
 
 
 def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float | None) -> str:
-    """Return the lines of the hover box of one model and N_D, of which there are some cells."""
+    """The lines of the hover box of one model and N_D, of which there are some cells."""
     good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
     accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
     lines = [f"<b>{escape_name(row.model)}</b>, {accuracy}N_D = {row.N_D}"]

@@ -183,7 +183,7 @@ def _yes_or_no(values: pd.Series[float]) -> bool:
 
 
 def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
-    """Return the median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
+    """The median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
     if frame.ratio.isna().all():
         return f"None of {counted_text(len(frame), 'trial')} ended with a value."
     text = (
