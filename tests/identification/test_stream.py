@@ -46,7 +46,7 @@ def sentence(solution: Solution, log: Dataset) -> str:
     return current_fit(solution, log, fit_statistics(LinearFit.of(solution)))
 
 
-@pytest.mark.parametrize(("seed", "more"), [(1, {}), (2, {"horizon": 45})])
+@pytest.mark.parametrize(("seed", "more"), [(2, {"horizon": 45})])
 def test_another_current_in_each_run_is_named_with_the_nuisance_that_estimates_it(seed: int, more: dict) -> None:
     """For a vessel without a current term nothing named it, and intervals were far from the truth."""
     log, currents = log_of(seed, drawn(seed)), drawn(seed)

@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset, flag_bit, stretches_of_runs
 from shipid.errors import DataError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.conftest import CLOCKS, DATES, PLAIN, SPEEDS, as_log, turning
+from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -218,29 +218,6 @@ def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mappi
 def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Write, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"a folder, and the mapping reads one file; .* runs = "):
         import_log(read_mapping(plain_mapping()), tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("head", "zone", "warned"), [("# tz=+01:00\n", "", True), ("# tz=+01:00\n", "+01:00", False), ("", "", False)]
-)
-def test_a_zone_that_only_the_head_says_is_warned_of(
-    head: str, zone: str, warned: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    """Times are counted as UTC; the draft asks, and a mapping may have been written without one."""
-    frame = turning(np.arange(0.0, 60.0, 0.5))
-    log = pd.read_csv(as_log(frame, tmp_path / "plain.csv"))
-    log["time"] = [
-        f"{moment.isoformat()}{zone}" for moment in pd.Timestamp("2024-05-14T08:00") + pd.to_timedelta(frame["t"], "s")
-    ]
-    (tmp_path / "log.csv").write_text(head + log.to_csv(index=False))
-    text = (
-        PLAIN.read_text().replace('from = "time"', 'from = "time"\nunit = "date"')
-        + f"\n[format]\nskip_rows = {len(head.splitlines())}\n"
-    )
-    (tmp_path / "mapping.toml").write_text(text)
-    import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
-    said = "log.csv: clock.from: '2024-05-14T08:00:00' is read as UTC, and the log says 'tz=+01:00'"
-    assert [message.startswith(said) for message in caplog.messages] == [True] * warned
 
 
 PARTED = """

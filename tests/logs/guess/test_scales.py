@@ -150,10 +150,8 @@ RUDDER = BRIDGE["rudder"]
     [
         ("rudder [%]", RUDDER / FULL * 100, "is in per cent: of which angle"),
         ("rudder", RUDDER / FULL * 1000, "per cent or per mille of the largest angle"),
-        ("rudder", RUDDER / FULL, "a share (-1 to 1) of the largest angle"),
         ("rudder", RUDDER.abs(), "is never negative, but the ship turns to both sides"),
         ("motor_erpm", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
-        ("bow thruster erpm", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
     ],
 )
 def test_what_the_log_does_not_say_is_asked(name: str, values: pd.Series, words: str, tmp_path: Path) -> None:
@@ -192,7 +190,6 @@ def test_a_quaternion_is_the_heading(names: str, frame: Frame, tmp_path: Path) -
 
 TEXTS = {
     "P12.5": lambda x: f"{'P' if x < 0 else 'S'}{abs(x):.1f}",
-    "12.5 P": lambda x: f"{abs(x):.1f} {'P' if x < 0 else 'S'}" if round(x, 1) else "0.0",
     "Bb 12,5": lambda x: f"{'Bb' if x < 0 else 'Stb'} {abs(x):.1f}".replace(".", ","),
 }
 
