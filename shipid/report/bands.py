@@ -25,28 +25,28 @@ from shipid.report.figure import (
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
 from shipid.report.section import Section
 from shipid.report.selection import close_styles, close_up_models, figure_sizes, model_chips
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
+from shipid.report.tables import PageTable, TableCell, frame_table, with_cells
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.units import level_text, percent_text, plural_word
 
 GROUP_WORDS = {"kind": "manoeuvre", "ahead": "time ahead"}
 BAND_COLUMNS = {
-    "model": TableColumn("model"),
-    "N_D [1]": TableColumn("N_D", 0),
-    "promised": TableColumn("promised", numeric=True),
-    "held [95 %]": TableColumn("held", numeric=True),
-    "mean radius [m]": TableColumn("width", "length"),
-    "radius at the end [m]": TableColumn("end", "length"),
-    "in lengths [1]": TableColumn("lengths", 3),
+    "model": "model",
+    "N_D [1]": "N_D",
+    "promised": "promised",
+    "held [95 %]": "held",
+    "mean radius [m]": "width",
+    "radius at the end [m]": "end",
+    "in lengths [1]": "lengths",
 }
 BAND_GROUP_COLUMNS = {
-    "model": TableColumn("model"),
-    "by": TableColumn("by"),
-    "group": TableColumn("group"),
-    "held [95 %]": TableColumn("held", numeric=True),
-    "mean radius [m]": TableColumn("width", "length"),
-    "test runs [1]": TableColumn("runs", 0),
-    "note": TableColumn("note"),
+    "model": "model",
+    "by": "by",
+    "group": "group",
+    "held [95 %]": "held",
+    "mean radius [m]": "width",
+    "test runs [1]": "runs",
+    "note": "note",
 }
 
 

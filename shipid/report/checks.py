@@ -25,16 +25,16 @@ from shipid.report.figure import (
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells, word_cell
+from shipid.report.tables import PageTable, TableCell, frame_table, with_cells, word_cell
 from shipid.report.wording import counted_text, join_few_names, scientific_text, set_sentence, short_text
 
 CHECK_COLUMNS = {
-    "run": TableColumn("run"),
-    "check": TableColumn("check"),
-    "result": TableColumn("ok"),
-    "value": TableColumn("value", numeric=True),
-    "limit": TableColumn("limit", numeric=True),
-    "what it says": TableColumn("sentence"),
+    "run": "run",
+    "check": "check",
+    "result": "ok",
+    "value": "value",
+    "limit": "limit",
+    "what it says": "sentence",
 }
 SIGNALS_OF_CHECKS = {
     "rate [deg/s]": {"psi_rate": "rate of the heading", "r": "yaw rate r"},

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import Floats, ReportContent, rows_as_tuples
+from shipid.report.content import ReportContent, rows_as_tuples
 from shipid.report.figure import (
     INK,
     LINE_DASHES,
+    MOST_LINE_POINTS,
     NAIVE,
     Chip,
     Control,
     PageFigure,
     Panel,
     Trace,
+    even_places,
     make_axis,
     make_line,
     make_plot,
@@ -36,14 +37,12 @@ from shipid.report.selection import (
     nothing_learns,
     over_seeds,
     spread_items,
-    thin_lines,
 )
-from shipid.report.tables import PageTable, TableColumn, frame_table
+from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text
 
 LINE_COLUMNS = ["model", "source", "N_D"]
 ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
-PLOT_DETAIL = 540  # twice the height of the error over time
 HORIZON_ERRORS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
     "90th percentile": ("p90", "position error, 90th percentile", "m"),
@@ -57,12 +56,12 @@ BY_AXIS = (
     "where the ship truly makes 0.2 m/s or more."
 )
 KIND_COLUMNS = {
-    "kind of run": TableColumn("kind"),
-    "test runs": TableColumn("runs"),
-    "model": TableColumn("model"),
-    "how": TableColumn("how"),
-    "over the horizon [m]": TableColumn("mean", "length"),
-    "at its end [m]": TableColumn("end", "length"),
+    "kind of run": "kind",
+    "test runs": "runs",
+    "model": "model",
+    "how": "how",
+    "over the horizon [m]": "mean",
+    "at its end [m]": "end",
 }
 HOW_PREDICTED = {"naive": CONSTANT_MOTION, "physics": "physics alone", "cooperative": "with data"}
 
@@ -161,11 +160,11 @@ def _models_of_close_up(content: ReportContent) -> str:
 def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column: str, unit: str = "m") -> list[Trace]:
     """A line for each model and source; what has no physics first: thick ink must not cover the others."""
     looks, pure, traces = close_styles(content), data_driven(content), []
-    every = means[[over, column]].to_numpy(dtype=float)
-    places: dict[Any, Any] = dict(means.groupby(["model", "source"], sort=False).indices)
-    groups = sorted(places, key=lambda key: (key[0] != pure, key[1]))
-    visible = _visible_points([every[places[key]] for key in groups])
-    for (model, given), points in zip(groups, visible, strict=True):
+    groups = sorted(
+        means.groupby(["model", "source"], sort=False), key=lambda group: (group[0][0] != pure, group[0][1])
+    )
+    for (model, given), mine in groups:
+        points = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)]
         source, keys = line_source(content, model, given)
         look = looks.get(model)
         ink = {"color": look.colour, "width": look.width if given == "cooperative" else 1.5} if look else {}
@@ -173,7 +172,7 @@ def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column:
         mark = {"symbol": look.symbol if look else "", "size": 7, "color": ink["color"], "maxdisplayed": 9}
         more: Trace = {"mode": "lines+markers", "marker": mark} if look and given == "cooperative" else {}
         name = name_of_line(content, model, source)
-        traces.append(make_line(name, points[:, 0], points[:, 1], keys, unit, line=ink, **more))
+        traces.append(make_line(name, points[over], points[column], keys, unit, line=ink, **more))
     return traces
 
 
@@ -188,16 +187,6 @@ def name_of_line(content: ReportContent, model: str, source: str) -> str:
     if source == "naive" or model == data_driven(content):
         return CONSTANT_MOTION if source == "naive" else model
     return f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
-
-
-def _visible_points(lines: Sequence[Floats]) -> list[Floats]:
-    """Points of lines (n, 2) that differ visibly at the height of the plot; a line with gaps keeps all."""
-    kept = list(lines)
-    whole = [i for i, points in enumerate(lines) if len(points) and np.isfinite(points).all()]
-    unit = [lines[i] / np.maximum(np.ptp(lines[i], axis=0), 1e-9) for i in whole]
-    for i, chosen in zip(whole, thin_lines(unit, 1 / PLOT_DETAIL), strict=True):
-        kept[i] = lines[i][chosen]
-    return kept
 
 
 def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:

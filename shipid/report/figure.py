@@ -7,9 +7,10 @@ page. `draw_alone` puts colours in their place.
 from __future__ import annotations
 
 import html
+import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any, TypeAlias
@@ -19,10 +20,10 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
+from plotly.utils import PlotlyJSONEncoder
 
 from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, Indices
-from shipid.report.wording import scientific_text
 
 INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
 TRANSPARENT = "rgba(0,0,0,0)"
@@ -161,12 +162,9 @@ def zero_axis(title: str, colour: str = GRID, **options: Any) -> dict[str, Any]:
     return make_axis(title, zeroline=True, zerolinecolor=colour, **options)
 
 
-def log_axis(title: str, steps: Sequence[float] = (1, 2, 5), **options: Any) -> dict[str, Any]:
-    """Make a logarithmic axis with whole numbers at its ticks: Plotly would write 0.5 as 5."""
-    ticks = [float(f"{step}e{decade}") for decade in range(-8, 5) for step in steps]
-    return make_axis(
-        title, type="log", **{"tickvals": ticks, "ticktext": [scientific_text(tick) for tick in ticks], **options}
-    )
+def log_axis(title: str, **options: Any) -> dict[str, Any]:
+    """Make a logarithmic axis; its format writes whole numbers at all ticks: Plotly would write 0.5 as 5."""
+    return make_axis(title, type="log", tickformat="~g", **options)
 
 
 def names_axis(names: Sequence[object], title: str = "", **options: Any) -> dict[str, Any]:
@@ -260,7 +258,7 @@ def spread_places(places: Sequence[float], gap: float, most: float) -> list[floa
 
 def even_places(length: int, most: int) -> Indices:
     """At most so many indices of a sequence at even distances, the first and the last included."""
-    return np.unique(np.linspace(0, length - 1, min(length, most)).round().astype(int))
+    return np.linspace(0, length - 1, min(length, most)).round().astype(int)
 
 
 def names_in(frame: pd.DataFrame, column: str = "run") -> list[str]:
@@ -314,20 +312,9 @@ def dress_panels(figure: PageFigure, panels: Sequence[Panel], *, dark: bool = Fa
     whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
     whole.update_layout(showlegend=bool(figure.chips))
     colours = page_colours("dark" if dark else "light")
-    data = [_put_colours(trace.to_plotly_json(), colours) for trace in whole.data]
-    layout = {**_put_colours(whole.layout.to_plotly_json(), colours), "paper_bgcolor": colours["page"]}
-    return go.Figure(data, layout)
-
-
-def _put_colours(value: Any, colours: Mapping[str, str]) -> Any:
-    """Replace the names of colours, `var(--ink)`, in the options of a figure by colours."""
-    if isinstance(value, str):
-        return re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], value)
-    if isinstance(value, Mapping):
-        return {key: _put_colours(item, colours) for key, item in value.items()}
-    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype.kind in "OU"):
-        return [_put_colours(item, colours) for item in value]
-    return value
+    whole.update_layout(paper_bgcolor=colours["page"])
+    plain = json.dumps(whole.to_plotly_json(), cls=PlotlyJSONEncoder)
+    return go.Figure(json.loads(re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], plain)))
 
 
 def _legend_entry(chip: Chip) -> Trace:

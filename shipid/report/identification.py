@@ -36,8 +36,6 @@ from shipid.report.tables import (
     MISSING,
     PageTable,
     TableCell,
-    TableColumn,
-    decimals_for_median,
     frame_table,
     with_cells,
     word_cell,
@@ -56,32 +54,32 @@ RUN_INKS = {
     AFTER: {"color": category_colour(0), "dash": "solid"},
 }
 ESTIMATE_COLUMNS = {
-    "parameter": TableColumn("words"),
-    "unit": TableColumn("unit"),
-    "base": TableColumn("base", numeric=True),
-    "estimate": TableColumn("value", numeric=True),
-    "standard error": TableColumn("error", numeric=True),
-    "factor": TableColumn("factor", numeric=True),
-    "factor, 95 %": TableColumn("interval", numeric=True),
-    "identified": TableColumn("identified"),
+    "parameter": "words",
+    "unit": "unit",
+    "base": "base",
+    "estimate": "value",
+    "standard error": "error",
+    "factor": "factor",
+    "factor, 95 %": "interval",
+    "identified": "identified",
 }
 MEASURES_BEFORE_AND_AFTER = {
-    "manoeuvre": TableColumn("manoeuvre"),
-    "measure": TableColumn("measure"),
-    BEFORE: TableColumn(BEFORE, numeric=True),
-    AFTER: TableColumn(AFTER, numeric=True),
-    "band from": TableColumn("low", numeric=True),
-    "to": TableColumn("high", numeric=True),
-    "unit": TableColumn("unit"),
-    "why missing": TableColumn("missing"),
+    "manoeuvre": "manoeuvre",
+    "measure": "measure",
+    BEFORE: BEFORE,
+    AFTER: AFTER,
+    "band from": "low",
+    "to": "high",
+    "unit": "unit",
+    "why missing": "missing",
 }
 PROGRAMME_COLUMNS = {
-    "manoeuvre": TableColumn("manoeuvre"),
-    "time [h]": TableColumn("hours", 2),
-    "gain [bit]": TableColumn("gain", 2),
-    "gain [bit/h]": TableColumn("per_hour", 2),
-    "narrows most": TableColumn("narrows"),
-    "by [%]": TableColumn("by", 0),
+    "manoeuvre": "manoeuvre",
+    "time [h]": "hours",
+    "gain [bit]": "gain",
+    "gain [bit/h]": "per_hour",
+    "narrows most": "narrows",
+    "by [%]": "by",
 }
 
 
@@ -296,30 +294,17 @@ def free_runs_figure(content: IdentificationContent) -> PageFigure:
 
 def free_run_errors(content: IdentificationContent) -> PageTable:
     """Root mean square errors of the free runs, run by run: of all runs first, and of those held out before others."""
-    places, words = decimals_for_median(content.errors["position"]), {"fit": "fitted", "test": "held out"}
     factors = {name: factor for name, (_, _, factor) in MOTION_AXES.items()} | {"position": 1.0}
-    by_model = {name: content.errors.pivot(index=["set", "run"], columns="model", values=name) for name in factors}
-    wide = pd.DataFrame(
-        {
-            f"{name} {model}": factor * by_model[name][model].astype(float)
-            for name, factor in factors.items()
-            for model in (BEFORE, AFTER)
-        }
-    )
-    pairs = dict.fromkeys((row["set"], row["run"]) for row in content.errors.to_dict("records"))
+    scaled = content.errors.assign(**{name: factor * content.errors[name] for name, factor in factors.items()})
+    wide = scaled.pivot(index=["set", "run"], columns="model", values=list(factors))
+    wide.columns = wide.columns.map(" ".join)
+    pairs = dict.fromkeys(zip(content.errors["set"], content.errors["run"], strict=True))
     wide = wide.reindex(sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))).reset_index()
-    heads = {
-        f"{name} {model}": TableColumn(f"{name} {model}", places if name == "position" else 3)
-        for name in factors
-        for model in (BEFORE, AFTER)
-    }
-    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map(words))
+    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map({"fit": "fitted", "test": "held out"}))
+    heads = ["run", "set", *(f"{name} {model}" for name in factors for model in (BEFORE, AFTER))]
     title = f"Root mean square errors of free runs {_run_length(content)}"
-    takeaway, columns = (
-        "u, v in m/s, r in deg/s, position in m.",
-        {"run": TableColumn("run"), "set": TableColumn("set"), **heads},
-    )
-    return frame_table("errors", title, takeaway, wide.assign(run=named), columns)
+    takeaway = "u, v in m/s, r in deg/s, position in m."
+    return frame_table("errors", title, takeaway, wide.assign(run=named), dict(zip(heads, heads, strict=True)))
 
 
 def manoeuvres_before_and_after(content: IdentificationContent) -> PageTable | None:

@@ -6,6 +6,7 @@ import pandas as pd
 
 from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.figure import (
+    MOST_LINE_POINTS,
     MUTED,
     Chip,
     PageFigure,
@@ -13,6 +14,7 @@ from shipid.report.figure import (
     Trace,
     category_colour,
     escape_name,
+    even_places,
     make_axis,
     make_chart,
     make_line,
@@ -21,17 +23,15 @@ from shipid.report.figure import (
     names_in,
 )
 from shipid.report.section import Section
-from shipid.report.selection import thin_lines
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, word_cell
+from shipid.report.tables import PageTable, TableCell, frame_table, word_cell
 from shipid.report.wording import counted_text, distance_text, join_few_names, number_text
 
 TRAINING_COLOUR, TEST_COLOUR, VALIDATION_COLOUR = (category_colour(i) for i in range(3))
-TRACK_DETAIL = 2000  # a track needs no more detail than extent / PIXELS
 REPAIR_COLUMNS = {
-    "repair": TableColumn("kind"),
-    "column": TableColumn("column"),
-    "samples [1]": TableColumn("count", 0),
-    "note": TableColumn("note"),
+    "repair": "kind",
+    "column": "column",
+    "samples [1]": "count",
+    "note": "note",
 }
 
 
@@ -54,7 +54,7 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
         id="manoeuvres",
         title="The manoeuvres",
         takeaway=f"{runs} cover {north} from south to north and {east} from west to east.",
-        how="Logged positions, north up, equal axes; points closer to the line than a pixel are left out.",
+        how="Logged positions, north up, equal axes; a run of many rows is drawn by some of them.",
         alternative="Map of the tracks of all manoeuvres, coloured by set.",
         height=520,
         draw=lambda: [_draw_tracks(tracks, bounds)],
@@ -64,14 +64,13 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
 
 def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> Panel:
     """Tracks on a map; those of the test last, so that they lie on top."""
-    detail, traces = max(high - low for low, high in bounds) / TRACK_DETAIL, []
+    traces = []
     for name in sorted(names_in(tracks, "set"), key=lambda name: set_colour(name) == TEST_COLOUR):
         for run, mine in tracks[tracks["set"] == name].groupby("run", sort=False):
-            points = mine[["east", "north"]].to_numpy(dtype=float)
-            points = points[thin_lines([points], detail)[0]]
+            shown = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)]
             ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == TEST_COLOUR else 1.2}
             words = f"{escape_name(run)} ({escape_name(name)})"
-            traces.append(make_line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink, hover=words))
+            traces.append(make_line(str(run), shown.east, shown.north, [f"set:{name}"], line=ink, hover=words))
     return make_chart(traces, "east [m]", "north [m]", bounds)
 
 
@@ -142,11 +141,9 @@ def input_ranges(content: ReportContent) -> PageTable | None:
     sets = sorted(names_in(frame, "set"), key=lambda name: name == PUBLISHED)
     units = dict(zip(frame["quantity"], frame["unit"], strict=True))
     rows = {name: [ranges.get((of, name), word_cell(None)) for of in sets] for name in units}
-    columns = {f"{name} [{unit}]": TableColumn(name, numeric=True) for name, unit in units.items()}
+    columns = {f"{name} [{unit}]": name for name, unit in units.items()}
     shown = pd.DataFrame({"the set": sets, **rows})
-    return frame_table(
-        "envelope-table", "Minimum / mean / maximum", "", shown, {"set": TableColumn("the set"), **columns}
-    )
+    return frame_table("envelope-table", "Minimum / mean / maximum", "", shown, {"set": "the set", **columns})
 
 
 def repairs_table(content: ReportContent) -> PageTable | None:

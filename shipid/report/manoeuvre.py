@@ -28,7 +28,7 @@ from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.paths import outline_at
 from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableColumn, frame_table, number_cell, with_cells, word_cell
+from shipid.report.tables import PageTable, frame_table, number_cell, with_cells, word_cell
 from shipid.report.wording import distance_text, number_text
 
 MOST_ROWS = 2000  # of the log: a line needs no more
@@ -39,19 +39,19 @@ CONSTANT_WITHIN = (
     1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
 )
 MEASURE_COLUMNS = {
-    "measure": TableColumn("measure"),
-    "value": TableColumn("value", numeric=True),
-    "unit": TableColumn("unit"),
-    "ship lengths": TableColumn("lengths", 2),
-    "why missing": TableColumn("missing"),
+    "measure": "measure",
+    "value": "value",
+    "unit": "unit",
+    "ship lengths": "lengths",
+    "why missing": "missing",
 }
 CRITERION_COLUMNS = {
-    "criterion": TableColumn("criterion"),
-    "value": TableColumn("value", 2),
-    "limit": TableColumn("limit", 2),
-    "unit": TableColumn("unit"),
-    "verdict": TableColumn("verdict"),
-    "note": TableColumn("note"),
+    "criterion": "criterion",
+    "value": "value",
+    "limit": "limit",
+    "unit": "unit",
+    "verdict": "verdict",
+    "note": "note",
 }
 MANOEUVRE_LINES = {  # key -> name, unit, index of the colour, whether it is held from order to order
     "heading": ("heading", "deg", 0, False),

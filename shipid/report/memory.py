@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -27,21 +26,20 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.section import Section
-from shipid.report.selection import in_words, spread_items
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
-from shipid.report.wording import counted_text, difference_text, join_few_names, number_text
+from shipid.report.selection import FEW_MODELS, in_words, spread_items
+from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells
+from shipid.report.wording import counted_text, difference_text, join_few_names
 
-MOST_MEMORY_LINES = 6  # models that have a line in a figure
 COMPARISON_COLUMNS = {
-    "without": TableColumn("without"),
-    "with": TableColumn("with"),
-    "N_D [1]": TableColumn("N_D", 0),
-    "A [m]": TableColumn("A", "length"),
-    "H without [m]": TableColumn("H_without", "length"),
-    "H with [m]": TableColumn("H_with", "length"),
-    "difference [m]": TableColumn("difference", "length"),
-    "95 % interval [m]": TableColumn("interval", numeric=True),
-    "better runs": TableColumn("better", numeric=True),
+    "without": "without",
+    "with": "with",
+    "N_D [1]": "N_D",
+    "A [m]": "A",
+    "H without [m]": "H_without",
+    "H with [m]": "H_with",
+    "difference [m]": "difference",
+    "95 % interval [m]": "interval",
+    "better runs": "better",
 }
 
 
@@ -52,13 +50,9 @@ def memory_gain(content: ReportContent) -> PageFigure | None:
         return None
     # By rising A, mean over N_D; without physics last.
     accuracy = frame.groupby("model", sort=False).A.mean().sort_values(kind="stable", na_position="last")
-    models, compared = (
-        spread_items([str(name) for name in accuracy.index], MOST_MEMORY_LINES),
-        names_in(frame, "comparison"),
-    )
+    models, total = spread_items([str(name) for name in accuracy.index], FEW_MODELS), len(accuracy)
     uneven = frame[frame.differs.ne("")].drop_duplicates("comparison")
     differing = [f"{row.comparison} ({row.differs})" for row in rows_as_tuples(uneven)]
-    total = len(accuracy)
     return PageFigure(
         id="memory-gain",
         title="What memory and observer bought",
@@ -75,7 +69,7 @@ def memory_gain(content: ReportContent) -> PageFigure | None:
         "observer; below, the difference of each pair with an interval. The numbers are in the table below.",
         height=640,
         draw=lambda one: [_draw_memory(frame[frame.comparison.eq(one)], models)],
-        controls=[Control("Compared", compared)],
+        controls=[Control("Compared", names_in(frame, "comparison"))],
         chips=[
             *(Chip(f"model:{name}", name, category_colour(i)) for i, name in enumerate(models)),
             Chip("side:with", "with", INK),
@@ -91,23 +85,17 @@ def _draw_memory(frame: pd.DataFrame, models: Sequence[str]) -> Panel:
         mine = frame[frame.model.eq(name)].sort_values("N_D")
         shift = 0.09 * (i - (len(models) - 1) / 2)  # intervals of several models would hide each other
         x = np.array([amounts.index(int(value)) for value in mine.N_D], dtype=float)
-        ink, keys = {"color": category_colour(i), "width": 2}, [f"model:{name}"]
-        mark = {"marker": {"color": ink["color"], "size": 6}}
+        ink, keys = {"color": category_colour(i)}, [f"model:{name}"]
         for side, dash in (("without", "dot"), ("with", "solid")):
-            look: Trace = {"mode": "lines+markers", "line": {**ink, "dash": dash}, **mark}
+            look: Trace = {"mode": "lines+markers", "line": {**ink, "dash": dash}}
             traces.append(make_line(f"{name}, {side}", x, mine[f"H_{side}"], [*keys, f"side:{side}"], **look))
         middle, low, high = (mine[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         words = [f"{escape_name(name)}: {difference_text(*ends)}" for ends in zip(middle, low, high, strict=True)]
-        looks: Trace = {
-            "mode": "markers",
-            **mark,
-            "yaxis": "y2",
-            "error_y": error_bars(middle, low, high, category_colour(i)),
-        }
+        bars = error_bars(middle, low, high, category_colour(i))
+        looks: Trace = {"mode": "markers", "marker": {"color": category_colour(i)}, "yaxis": "y2", "error_y": bars}
         traces.append(make_line(f"{name}, difference", x + shift, middle, keys, hover=words, **looks))
     names = [str(amount) if amount else "physics alone" for amount in amounts]
-    title = "manoeuvres, N_D [1]" if amounts != [0] else ""
-    x_axis = names_axis(names, title, anchor="y2", range=[-0.5, len(amounts) - 0.5], showgrid=False)
+    x_axis = names_axis(names, "manoeuvres, N_D [1]" if amounts != [0] else "", anchor="y2", showgrid=False)
     below = zero_axis("difference of H [m]", INK, domain=[0.0, 0.44], anchor="x")
     return make_plot(traces, x_axis, make_axis("position error, H [m]", domain=[0.52, 1.0]), yaxis2=below)
 
@@ -127,15 +115,13 @@ def memory_table(content: ReportContent) -> PageTable | None:
     frame = content.frame("memory")
     if frame.empty:
         return None
-    ends = [
-        TableCell(f"{number_text(row.low)} to {number_text(row.high)}" if math.isfinite(row.low) else "–", row.low)
-        for row in rows_as_tuples(frame)
-    ]
-    better = [TableCell(f"{row.better} of {row.runs}", row.better) for row in rows_as_tuples(frame)]
+    rows = rows_as_tuples(frame)
+    ends = [range_cell(row.low, row.high) for row in rows]
+    better = [TableCell(f"{row.better} of {row.runs}", row.better) for row in rows]
     takeaway = f"{counted_text(len(frame), 'comparison')}; N_D = 0 is physics alone; "
     takeaway += f"means over {counted_text(int(frame.seeds.max()), 'seed')} at most."
     shown = with_cells(frame, interval=ends, better=better)
-    return frame_table("memory-table", "Every comparison", takeaway, shown, COMPARISON_COLUMNS, like="H_without")
+    return frame_table("memory-table", "Every comparison", takeaway, shown, COMPARISON_COLUMNS)
 
 
 THE_PAST = Section(

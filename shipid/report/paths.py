@@ -40,14 +40,14 @@ from shipid.report.selection import (
     figure_sizes,
     in_words,
     spread_items,
-    thin_lines,
 )
 from shipid.report.wording import counted_text, metres_text
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
 MOST_SHOWN_WINDOWS = 600  # in all
 MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
-WINDOW_DETAIL = 1000  # a window is drawn about half as large
+MOST_POINTS = 40  # of a path or of the outline of a band
+PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
 HOW_WINDOWS = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
@@ -106,18 +106,16 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     runs, counts = windows_of(content), window_sizes(content)
     lines: dict[tuple[str, str], int] = {}
     shots = [window for windows in runs.values() for window in windows]
-    detail = _half_pixel(shots)
-    # All paths are thinned together: it takes a fifth of the time.
-    every = [track for window in shots for track in (window.truth, *window.paths.values(), *window.bands.values())]
-    columns = dict(zip(map(id, every), _thinned_columns(every, detail), strict=True))
+    extents = [np.ptp(np.vstack([window.truth, window.outline]), axis=0).max() for window in shots]
+    places = max(0, PLACES_OF_METRE - math.floor(math.log10(np.median(extents)))) if shots else 0
 
     def path_of(window: WindowSnapshot, key: PathKey) -> list[Any]:
         model, source, size = key
         which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
         error = round(_end_error(window, window.paths[key]), 6)
-        band = columns[id(window.bands[key])] if key in window.bands else []
-        at = counts.index(size) if source == "cooperative" else -1
-        return [which, at, *columns[id(window.paths[key])], error if math.isfinite(error) else None, *band]
+        band = _rounded_columns(window.bands[key], places) if key in window.bands else []
+        at, path = counts.index(size) if source == "cooperative" else -1, _rounded_columns(window.paths[key], places)
+        return [which, at, *path, error if math.isfinite(error) else None, *band]
 
     packed = [
         [
@@ -125,7 +123,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                 "t": window.t,
                 "psi": round(window.psi_end, 4),
                 "wind": None if window.wind is None else [round(value, 3) for value in window.wind],
-                "truth": columns[id(window.truth)],
+                "truth": _rounded_columns(window.truth, places),
                 "paths": [path_of(window, key) for key in window.paths if _is_drawn(content, key, counts)],
             }
             for window in windows
@@ -230,22 +228,12 @@ def _window_chips(content: ReportContent) -> list[Chip]:
     return [*chips, *[Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)]
 
 
-def _half_pixel(windows: Sequence[WindowSnapshot]) -> float:
-    """Half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
-    extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
-    return float(np.median(extents)) / WINDOW_DETAIL if extents else 0.0
-
-
-def _thinned_columns(paths: Sequence[Floats], detail: float) -> list[list[list[float | None]]]:
-    """Columns x and y of paths (n, 2), of the points that differ by `detail` [m]; one that diverged keeps its gaps."""
-    kept = [np.asarray(path, dtype=float) for path in paths]
-    sound = [i for i, path in enumerate(kept) if detail > 0 and np.isfinite(path).all()]
-    for i, chosen in zip(sound, thin_lines([kept[i] for i in sound], detail), strict=True):
-        kept[i] = kept[i][chosen]
-    places = max(0, math.ceil(-math.log10(detail or 0.001)))
-    with np.errstate(over="ignore"):  # a path that diverged: its points are left out
-        columns = [np.round(path.T, places).tolist() for path in kept]
-    return [[[value if math.isfinite(value) else None for value in column] for column in pair] for pair in columns]
+def _rounded_columns(path: Floats, places: int) -> list[list[float | None]]:
+    """Columns x and y [m] of a path (n, 2), of some points where it has many; None where it diverged."""
+    some = np.asarray(path, dtype=float)[even_places(len(path), MOST_POINTS)]
+    with np.errstate(over="ignore"):
+        columns = np.round(some.T, places).tolist()
+    return [[value if math.isfinite(value) else None for value in column] for column in columns]
 
 
 def _end_error(window: WindowSnapshot, points: Floats) -> float:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.ndimage import gaussian_filter
 
 from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -52,11 +53,9 @@ HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
 NAME_HEIGHT = 13  # of a row [px]
 INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
-MOST_LEVELS = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
-NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a level may have
-TICKS_OF_A = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
+ROUND_DIGITS = (1, 2, 5)  # of the ticks of A
 MOST_LETTERS_BESIDE = 12  # characters of a name beside a row
 MOST_LINES, FAR_APART = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
@@ -84,35 +83,24 @@ def map_figure(content: ReportContent) -> PageFigure | None:
     if shown is None or nothing_learns(content):
         return None
     rows, cells = shown
-    lines, bounded = _isolines(shown, content.frame("intervals"))
-    many = [f"{FEWEST_RADII * width:.0f}" for width in NEIGHBOURS]
-    lined = f" Lines of equal error follow H [m], averaged over neighbouring models where there are {many[0]} or more, "
-    lined += f"and over neighbouring N_D where there are {many[1]} or more. No line is drawn beside a cell without a "
-    lined += "result."
-    if bounded:
-        lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
-        lined += "two dotted lines of a level the data do not say on which side of the level H lies; one that is "
-        lined += "missing lies beyond the cells."
+    hatched = f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
+    lined = " Lines of equal error follow H [m], averaged over neighbouring models where there are {:.0f} or more, and "
+    lined += "over neighbouring N_D where there are {:.0f} or more. No line is drawn beside a cell without a result."
     return PageFigure(
         id="map",
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
-        + (
-            f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
-            if cells.worse.any()
-            else ""
-        )
-        + (lined if lines else "")
+        + (hatched if cells.worse.any() else "")
+        + lined.format(*(FEWEST_RADII * width for width in NEIGHBOURS))
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
         alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
         "The numbers are in the table of cells.",
         height=HEIGHT,
-        draw=lambda: [draw_map(shown, lines)],
-        chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [])
-        + ([Chip("bounds", "ends of the 95 % interval", INK, "dot", 1.5)] if bounded else []),
+        draw=lambda: [draw_map(shown, [_isolines(shown)])],
+        chips=[Chip("iso", "lines of equal H", INK, width=1.5)],
         scale=ColourScale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
     )
 
@@ -244,55 +232,33 @@ def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
 
 
 def _ticks_of_map(rows: pd.DataFrame) -> dict[str, list[Any]]:
-    """Ticks of A where the rows are, far enough apart to read; a row without A has its name there."""
+    """Round ticks of A, those near 0 left out: there is no room for them; a row without A has its name there."""
     largest, strips = float(rows.A.max()), rows[rows.A.isna()]
-    decade = math.floor(math.log10(max(largest, 1e-6)))
-    scale = decade - 1 if decade < 0 else max(decade - 3, 0)  # a model in a basin errs by centimetres
-    values = [0.0]
-    for tick in (float(f"{tick}e{scale}") for tick in TICKS_OF_A):
-        apart = all(abs(math.sqrt(tick) - math.sqrt(other)) > 0.06 * rows.y.max() for other in values)
-        values += [tick] * (tick <= largest and apart)
+    decades = range(math.floor(math.log10(max(largest, 1e-6))) - 1, math.ceil(math.log10(max(largest, 1e-6))) + 1)
+    ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
+    values = [0.0, *(tick for tick in ticks if largest / 40 <= tick <= largest)]
     names = [escape_name(shorten_name(name, MOST_LETTERS_BESIDE)) for name in strips.short]
     return {"tickvals": [*np.sqrt(values), *strips.y], "ticktext": [*(f"{value:g}" for value in values), *names]}
 
 
-def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
-    """Lines of equal H through the models with physics, and whether there are those of the ends of its intervals.
-
-    ends : model, N_D, low, high [m]; may be empty.
-    """
-    physics, ends = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], ends.dropna()
-
-    def grid(frame: pd.DataFrame, column: str) -> Floats:
-        table = frame.pivot(index="model", columns="N_D", values=column)
-        return smooth_cells(
-            table.reindex(index=physics.model, columns=np.unique(shown.cells.N_D)).to_numpy(), NEIGHBOURS
-        )
-
-    mean = grid(shown.cells[shown.cells.model.isin(physics.model)], "H")
-    base = {"type": "contour", "x": np.unique(shown.cells.N_D).tolist(), "y": physics.y.tolist(), "hoverinfo": "skip"}
-    base |= {"showscale": False, "autocontour": False, "xaxis": "x2", "yaxis": "y2"}  # Plotly draws bars over contours
-    inks = {"rim": {"color": "var(--page)", "width": 4}, "iso": {"color": INK, "width": 1.5}}
-    inks |= {"low": {"color": INK, "width": 1.2, "dash": "dot"}, "high": {"color": INK, "width": 1.2, "dash": "dot"}}
-    heights = {"rim": mean, "iso": mean, **({side: grid(ends, side) for side in ("low", "high")} if len(ends) else {})}
-    traces = []
-    for (kind, z), level in [(item, level) for item in heights.items() for level in nice_levels(mean, MOST_LEVELS)]:
-        label = {"showlabels": kind == "iso", "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
-        lines = {"start": level, "end": level, "size": level, "coloring": "none", **label}
-        keys = ["bounds"] if kind in ends else ["iso"]
-        traces.append({**base, "z": z, "contours": lines, "line": {**inks[kind], "smoothing": 0}, "meta": keys})
-    return traces, len(ends) > 0 and len(traces) > 0
-
-
-def nice_levels(values: Floats, most: int) -> list[float]:
-    """At most `most` round levels inside the middle three fifths of the finite values."""
-    finite = values[np.isfinite(values) & (values > 0)]
-    if finite.size < 4:
-        return []
-    low, high = np.quantile(finite, [0.2, 0.8])
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    inside = [digit * 10.0**decade for decade in decades for digit in NICE if low < digit * 10.0**decade < high]
-    return [inside[i] for i in even_places(len(inside), most)] if inside else []
+def _isolines(shown: CellMap) -> Trace:
+    """Lines of equal H through the models with physics."""
+    physics, sizes = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], np.unique(shown.cells.N_D)
+    H = shown.cells.pivot(index="model", columns="N_D", values="H").reindex(index=physics.model, columns=sizes)
+    lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
+    base = {
+        "type": "contour",
+        "x": sizes.tolist(),
+        "y": physics.y.tolist(),
+        "z": smooth_cells(H.to_numpy(), NEIGHBOURS),
+    }
+    base |= {"ncontours": 5, "contours": lines, "line": {"color": INK, "width": 1.5, "smoothing": 0}, "meta": ["iso"]}
+    return base | {
+        "hoverinfo": "skip",
+        "showscale": False,
+        "xaxis": "x2",
+        "yaxis": "y2",
+    }  # Plotly draws bars over lines
 
 
 def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
@@ -302,13 +268,10 @@ def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
     smoothed along them.
     """
     finite = np.isfinite(values) & (values > 0)
-    total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
-    for side, width in enumerate(radius):
-        count = values.shape[side]
-        if count >= FEWEST_RADII * width:
-            bell = np.exp(-((np.subtract.outer(np.arange(count), np.arange(count)) / width) ** 2) / 2)
-            total, weight = (np.moveaxis(np.tensordot(bell, part, (1, side)), 0, side) for part in (total, weight))
-    return np.where(finite, np.exp(total / np.where(weight > 0, weight, 1.0)), np.nan)
+    widths = [width if count >= FEWEST_RADII * width else 0 for count, width in zip(values.shape, radius, strict=True)]
+    logs = np.log(values, where=finite, out=np.zeros(values.shape))
+    total, weight = (gaussian_filter(part, widths, mode="constant") for part in (logs, finite.astype(float)))
+    return np.where(finite, np.exp(total / np.where(finite, weight, 1.0)), np.nan)
 
 
 def _not_on_map(content: ReportContent) -> str:

@@ -12,17 +12,17 @@ from shipid.report.figure import INK, PageFigure, category_colour
 from shipid.report.motion import DEGREES, LOG_SERIES, motion_figure
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableColumn, frame_table
+from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import number_text
 
 REPLAYED = "replayed"
 REPLAY_INKS = {LOG_SERIES: {"color": INK, "dash": "solid"}, REPLAYED: {"color": category_colour(0), "dash": "solid"}}
 REPLAY_ERRORS = {
-    "run": TableColumn("run"),
-    "u [m/s]": TableColumn("u", 3),
-    "v [m/s]": TableColumn("v", 3),
-    "r [deg/s]": TableColumn("r", 3),
-    "position [m]": TableColumn("position", "digits"),
+    "run": "run",
+    "u [m/s]": "u",
+    "v [m/s]": "v",
+    "r [deg/s]": "r",
+    "position [m]": "position",
 }
 
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent, rows_as_tuples
-from shipid.report.figure import INK, MARKERS, MUTED, OKABE_ITO, Chip, category_colour, colour_level
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, ReportContent, rows_as_tuples
+from shipid.report.figure import INK, MARKERS, MUTED, OKABE_ITO, Chip, category_colour, colour_level, even_places
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
@@ -40,9 +40,7 @@ class Style:
 
 def spread_items(items: Sequence[str], count: int) -> list[str]:
     """At most `count` items at even distances, first and last included."""
-    if len(items) <= count:
-        return list(items)
-    return [items[i] for i in np.linspace(0, len(items) - 1, count).round().astype(int)]
+    return [items[i] for i in even_places(len(items), count)]
 
 
 @lru_cache(maxsize=4)  # every figure asks for it
@@ -182,7 +180,7 @@ def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping
 def figure_sizes(values: pd.Series[int], count: int = 3) -> list[int]:
     """Small, middle and large N_D among those present; physics alone (N_D = 0) counts only if there is nothing else."""
     present = sorted({int(value) for value in values if value > 0}) or [0]
-    return [int(size) for size in spread_items([str(size) for size in present], count)]
+    return [present[i] for i in even_places(len(present), count)]
 
 
 def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.DataFrame:
@@ -195,32 +193,3 @@ def errors_over_seeds(content: ReportContent) -> pd.DataFrame:
     good = content.cells[content.cells.status.eq("ok") & content.cells.H.notna()]
     means = over_seeds(good, ["model", "N_D"], ["H", "H_90", "rms"])
     return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
-
-
-def thin_lines(lines: Sequence[Floats], tolerance: float) -> list[Indices]:
-    """Find the points of each line, by index, that differ visibly on a screen (Ramer 1972; Douglas and Peucker 1973).
-
-    Parameters
-    ----------
-    lines : points (n, 2) of each, in the same unit as tolerance; at least one point a line.
-    tolerance : largest distance of a dropped point from the line that is kept.
-    """
-    if not lines:
-        return []
-    points, ends = np.concatenate(lines), np.cumsum([len(line) for line in lines])
-    keep = np.zeros(len(points), dtype=bool)
-    keep[ends - 1] = keep[np.concatenate([[0], ends[:-1]])] = True
-    while True:  # all pieces between points that are kept at once; from one line to the next there is nothing between
-        kept = np.flatnonzero(keep)
-        piece = np.cumsum(keep) - 1
-        along = np.diff(points[kept], axis=0, append=points[-1:])
-        from_start, mine = points - points[kept[piece]], along[piece]
-        # Distance from the segment, not from its line: a track may come back to where it began.
-        share = (from_start * mine).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)[piece]
-        apart = from_start - np.clip(share, 0.0, 1.0)[:, None] * mine
-        away = np.sqrt(np.square(apart).sum(axis=1))
-        worst = np.maximum.reduceat(away, kept)[piece]
-        far = np.flatnonzero((away == worst) & (worst > tolerance))
-        if not len(far):
-            return [np.flatnonzero(one) for one in np.split(keep, ends[:-1])]
-        keep[far[np.unique(piece[far], return_index=True)[1]]] = True  # of equal distances the first

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from shipid.report.wording import fixed_text
+from shipid.report.wording import ends_text, fixed_text
 
 LONG_TEXT = 30  # characters that a column shows of a text
 MISSING = 1e300  # sorts after every number (page.js knows it)
@@ -38,54 +38,27 @@ class PageTable:
     rows: Sequence[Sequence[TableCell]]
 
 
-@dataclass(frozen=True)
-class TableColumn:
-    """A column of a table.
+def frame_table(id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, str]) -> PageTable:
+    """Make a table of a frame of values, or of cells as they are.
 
-    Parameters
-    ----------
-    source : column of the frame.
-    decimals : of its numbers; "length" for what leaves two digits to the median length [m], two decimals at least;
-        "digits" for three digits of the median, three decimals at most; None for words.
-    numeric : whether cells are set flush right; default: if there are decimals.
+    Lengths, whose heading ends with [m], have as many decimals as leave two digits to their median, two at least; whole
+    numbers none; others three digits of their median, three decimals at most.
+
+    columns : heading -> column of the frame; one that it lacks is left out.
     """
-
-    source: str
-    decimals: int | str | None = None
-    numeric: bool | None = None
-
-
-def frame_table(
-    id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, TableColumn], *, like: str = ""
-) -> PageTable:
-    """Make a table of a frame.
-
-    Parameters
-    ----------
-    frame : values, or cells as they are.
-    columns : heading -> column; one that the frame lacks is left out.
-    like : column whose lengths give the decimals of all columns of lengths, if not each its own.
-    """
-    known = {heading: column for heading, column in columns.items() if column.source in frame}
-    places = {column.source: _decimals_of_column(frame, column, like) for column in known.values()}
-    rows = [
-        [_cell_of_value(record[column.source], places[column.source]) for column in known.values()]
-        for record in frame.to_dict("records")
-    ]
-    numeric = [column.decimals is not None if column.numeric is None else column.numeric for column in known.values()]
-    return PageTable(id, title, takeaway, list(known), numeric, rows)
+    known = {heading: source for heading, source in columns.items() if source in frame}
+    lengths = frame[[source for heading, source in known.items() if heading.endswith("[m]")]]
+    cells = [_column_cells(frame[source], lengths) for source in known.values()]
+    numeric = [any(isinstance(cell.key, float | int) for cell in column) for column in cells]
+    return PageTable(id, title, takeaway, list(known), numeric, list(zip(*cells, strict=True)))
 
 
-def _decimals_of_column(frame: pd.DataFrame, column: TableColumn, like: str) -> int | None:
-    if column.decimals == "length":
-        return decimals_for_median(frame[like or column.source], 2, 2, 6)
-    return decimals_for_median(frame[column.source]) if isinstance(column.decimals, str) else column.decimals
-
-
-def _cell_of_value(value: Any, places: int | None) -> TableCell:
-    if isinstance(value, TableCell):
-        return value
-    return word_cell(value) if places is None else number_cell(value, places)
+def _column_cells(values: pd.Series[Any], lengths: pd.DataFrame) -> list[TableCell]:
+    if values.dtype == object or values.dtype == bool or not pd.api.types.is_numeric_dtype(values):
+        return [value if isinstance(value, TableCell) else word_cell(value) for value in values]
+    places = decimals_for_median(lengths, 2, 2, 6) if values.name in lengths else decimals_for_median(values)
+    places = 0 if values.dropna().mod(1).eq(0).all() else places
+    return [number_cell(value, places) for value in values]
 
 
 def with_cells(frame: pd.DataFrame, **cells: Sequence[TableCell]) -> pd.DataFrame:
@@ -119,6 +92,11 @@ def number_cell(value: object, decimals: int) -> TableCell:
     """Make a cell with a number of fixed decimals, so that points align; NaN is a dash and sorts last."""
     amount = math.nan if value is None or value is pd.NA else float(str(value))
     return TableCell(fixed_text(amount, decimals), amount) if math.isfinite(amount) else TableCell("–", MISSING)
+
+
+def range_cell(low: float, high: float) -> TableCell:
+    """Make a cell of two lengths [m], sorted by the lower; a dash where one is not finite."""
+    return TableCell(ends_text(low, high), low) if math.isfinite(high - low) else TableCell("–", MISSING)
 
 
 def decimals_for_median(values: pd.DataFrame | pd.Series[Any], digits: int = 3, least: int = 0, most: int = 3) -> int:
