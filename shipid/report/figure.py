@@ -313,7 +313,8 @@ def dress_panels(figure: PageFigure, panels: Sequence[Panel], *, dark: bool = Fa
     whole.update_layout(showlegend=bool(figure.chips))
     colours = page_colours("dark" if dark else "light")
     whole.update_layout(paper_bgcolor=colours["page"])
-    plain = json.dumps(whole.to_plotly_json(), cls=PlotlyJSONEncoder)
+    parts = {"data": [trace.to_plotly_json() for trace in whole.data], "layout": whole.layout.to_plotly_json()}
+    plain = json.dumps(parts, cls=PlotlyJSONEncoder)
     return go.Figure(json.loads(re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], plain)))
 
 

@@ -47,17 +47,16 @@ def frame_table(id: str, title: str, takeaway: str, frame: pd.DataFrame, columns
     columns : heading -> column of the frame; one that it lacks is left out.
     """
     known = {heading: source for heading, source in columns.items() if source in frame}
-    lengths = frame[[source for heading, source in known.items() if heading.endswith("[m]")]]
-    cells = [_column_cells(frame[source], lengths) for source in known.values()]
+    cells = [_column_cells(frame[source], heading.endswith("[m]")) for heading, source in known.items()]
     numeric = [any(isinstance(cell.key, float | int) for cell in column) for column in cells]
     return PageTable(id, title, takeaway, list(known), numeric, list(zip(*cells, strict=True)))
 
 
-def _column_cells(values: pd.Series[Any], lengths: pd.DataFrame) -> list[TableCell]:
+def _column_cells(values: pd.Series[Any], lengths: bool) -> list[TableCell]:
     if values.dtype == object or values.dtype == bool or not pd.api.types.is_numeric_dtype(values):
         return [value if isinstance(value, TableCell) else word_cell(value) for value in values]
-    places = decimals_for_median(lengths, 2, 2, 6) if values.name in lengths else decimals_for_median(values)
-    places = 0 if values.dropna().mod(1).eq(0).all() else places
+    places = decimals_for_median(values, 2, 2, 6) if lengths else decimals_for_median(values)
+    places = 0 if not lengths and values.dropna().mod(1).eq(0).all() else places
     return [number_cell(value, places) for value in values]
 
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from shipid.report.section import Section, declared_anchors, draw_sections
+from shipid.report.section import Section, draw_sections
 from shipid.report.tables import PageTable
 
 EMPTY = pd.DataFrame()
@@ -28,13 +28,6 @@ def test_it_says_which_section_is_drawn():
     assert said == ["drawing: First"]
 
 
-def test_nothing_is_drawn_of_a_section_that_is_left_out():
-    def fails(_):
-        raise AssertionError
-
-    assert draw_sections({"a": Section("A", fails, needs=("absent",))}, SimpleNamespace()) == []
-
-
 def test_order_and_gaps():
     sections = {
         "b": Section("B", lambda _: [None, table("b")]),
@@ -45,8 +38,3 @@ def test_order_and_gaps():
         ("b", "B", ["b"]),
         ("a", "A", ["a"]),
     ]
-
-
-def test_declared_anchors():
-    sections = {"a": Section("A", lambda _: [], anchors=("x", "y")), "b": Section("B", lambda _: [], anchors=("z",))}
-    assert declared_anchors(sections) == {"x", "y", "z", "findings", "provenance"}

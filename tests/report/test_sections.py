@@ -48,7 +48,7 @@ def test_the_section_of_the_page_on_adding_is_drawn(simulation, monkeypatch):
     (section,) = draw_sections({"time": slow.SECTION}, simulation)
     (table,) = section.items
     longest = sorted(simulation.cells["seconds"], reverse=True)[:5]
-    assert [row[1].text for row in table.rows] == [f"{seconds:.0f}" for seconds in longest]
+    assert [row[1].text for row in table.rows] == [f"{seconds:.1f}" for seconds in longest]
     frame = module("A section of the report", "bias_of_the_page", monkeypatch, number=2).bias_frame
     future, off = np.zeros((3, 4, 2)), np.array([2.0, -1.0])
     cells = [{"cell": "a", "model": "one", "N_D": 5}, {"cell": "failed", "model": "two", "N_D": 5}]

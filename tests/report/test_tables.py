@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipid.report.cells import cells_table as cells
-from shipid.report.factors import models_table as models
 from shipid.report.logs import input_ranges as envelope
 from shipid.report.logs import repairs_table as repairs
 from shipid.report.tables import TableCell, cell_html, number_cell, word_cell
@@ -36,12 +35,6 @@ def test_the_failed_cell_gives_its_reason(full_scale):
     bad = [cell.text for row in table.rows for cell in row if cell.bad]
     assert bad == ["diverged: 4 % of the test windows left the sea"]
     assert table.takeaway == "4 cells in 3 min of computing; 1 cell gave no result."
-
-
-def test_models_are_ordered_by_accuracy(simulation):
-    table = models(simulation)
-    assert [row[0].text for row in table.rows][:2] == ["nominal", "moderate-1"]
-    assert table.takeaway == "A runs from 0.90 m (nominal) to 13.0 m (high-2)."
 
 
 def test_cells_count_their_trials(simulation):
