@@ -39,7 +39,7 @@ def replay_command(
     from shipid.identification.outcome import pick_runs
     from shipid.identification.segments import too_short
     from shipid.identification.settings import Identify
-    from shipid.report.replay import REPLAYED, ReplayContent, write_replay
+    from shipid.report.motion import REPLAYED, ReplayContent, write_replay
     from shipid.version import __version__
     from shipid.vessel.load import load_vessel
 

@@ -25,8 +25,8 @@ from shipid.report.figure import (
 from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableCell, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, join_few_names, scientific_text, set_sentence, short_text
+from shipid.report.tables import PageTable, TableCell, digits_cell, frame_table, with_cells, word_cell
+from shipid.report.wording import counted_text, join_few_names, scientific_text, set_sentence
 
 CHECK_COLUMNS = {
     "run": "run",
@@ -79,18 +79,14 @@ class CheckContent(PageContent):
 def checks_table(content: CheckContent) -> PageTable:
     """The table of all checks, failed ones first; what these say is shown whole."""
     frame = content.checks.assign(ok=content.checks["ok"].astype(bool)).sort_values("ok", kind="stable")
-    rows = [
-        {
-            "ok": word_cell("passed" if row.ok else "failed", bad=not row.ok),
-            "value": TableCell(
-                scientific_text(row.value, 3) + (f" {row.unit}" if row.unit != "1" else ""), float(row.value)
-            ),
-            "limit": TableCell(scientific_text(row.limit, 3), float(row.limit)),
-            "sentence": word_cell(set_sentence(row.sentence), bad=not row.ok),
-        }
-        for row in rows_as_tuples(frame)
-    ]
-    cells = {name: [row[name] for row in rows] for name in ("ok", "value", "limit", "sentence")}
+    units = frame["unit"].mask(frame["unit"].eq("1"), "")
+    values = zip(frame["value"], units, strict=True)
+    cells = {
+        "ok": [word_cell("passed" if ok else "failed", bad=not ok) for ok in frame["ok"]],
+        "value": [TableCell(f"{scientific_text(value, 3)} {unit}".rstrip(), float(value)) for value, unit in values],
+        "limit": [digits_cell(limit, 3) for limit in frame["limit"]],
+        "sentence": [word_cell(set_sentence(row.sentence), bad=not row.ok) for row in rows_as_tuples(frame)],
+    }
     return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECK_COLUMNS)
 
 
@@ -104,7 +100,7 @@ def checked_motion(series: pd.DataFrame) -> PageFigure | None:
     return PageFigure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {short_text(worst.max())} m.",
+        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {scientific_text(worst.max(), 2)} m.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",

@@ -36,11 +36,13 @@ from shipid.report.tables import (
     MISSING,
     PageTable,
     TableCell,
+    digits_cell,
     frame_table,
+    note_cells,
     with_cells,
     word_cell,
 )
-from shipid.report.wording import counted_text, join_few_names, number_text, scientific_text, set_sentence
+from shipid.report.wording import counted_text, join_few_names, number_text, set_sentence
 from shipid.units import interval_text
 
 PARAMETER_HEIGHT, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
@@ -222,7 +224,7 @@ def estimates_table(content: IdentificationContent) -> PageTable:
     """The table of all estimates in their units."""
     frame = content.estimates
     words = [row["path"] + (f" (with {row['with']})" if row["with"] else "") for row in frame.to_dict("records")]
-    numbers = {name: list(map(_scientific_cell, frame[name])) for name in ("base", "value", "error", "factor")}
+    numbers = {name: list(map(digits_cell, frame[name])) for name in ("base", "value", "error", "factor")}
     intervals = [
         TableCell(interval_text(low, high, " … ").replace("-", "−"), float(low))
         if np.isfinite(high - low)
@@ -232,10 +234,6 @@ def estimates_table(content: IdentificationContent) -> PageTable:
     identified = [word_cell("yes" if known else "no", bad=not known) for known in frame["identified"]]
     shown = with_cells(frame.assign(words=words), interval=intervals, identified=identified, **numbers)
     return frame_table("numbers", "Every estimate", "", shown, ESTIMATE_COLUMNS)
-
-
-def _scientific_cell(value: float) -> TableCell:
-    return TableCell(scientific_text(value), float(value)) if np.isfinite(value) else TableCell("–", MISSING)
 
 
 def unseen_table(content: IdentificationContent) -> PageTable | None:
@@ -313,9 +311,9 @@ def manoeuvres_before_and_after(content: IdentificationContent) -> PageTable | N
     if performed.empty:
         return None
     numbers = [name for name in (BEFORE, AFTER, "low", "high") if name in performed]
-    shown = with_cells(performed, **{name: list(map(_scientific_cell, performed[name])) for name in numbers})
+    shown = with_cells(performed, **{name: list(map(digits_cell, performed[name])) for name in numbers})
     if performed["note"].ne("").any():
-        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in performed["note"]])
+        shown = with_cells(shown, missing=note_cells(performed["note"]))
     takeaway = "Simulated in calm deep water, from U_0 of the vessel or a Froude number of 0.2."
     takeaway += "".join(f" Extrapolated: {sentence}." for sentence in content.beyond)
     takeaway += " The band is what the uncertainty of the estimates leaves open." if "low" in performed else ""

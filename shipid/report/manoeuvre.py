@@ -28,7 +28,7 @@ from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.paths import outline_at
 from shipid.report.section import Section
-from shipid.report.tables import PageTable, frame_table, number_cell, with_cells, word_cell
+from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells, with_cells, word_cell
 from shipid.report.wording import distance_text, number_text
 
 MOST_ROWS = 2000  # of the log: a line needs no more
@@ -106,18 +106,10 @@ def _amount_words(value: float, unit: str) -> str:
 def measures_table(content: ManoeuvreContent) -> PageTable:
     """Every measure; one that is missing says why."""
     frame = content.measures
-    values = [number_cell(row.value, _decimals_of_measure(row.value, row.unit)) for row in rows_as_tuples(frame)]
-    shown = with_cells(frame, value=values)
+    shown = with_cells(frame, value=[digits_cell(round(value, 3), 3) for value in frame["value"]])
     if frame["note"].ne("").any():
-        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in frame["note"]])
+        shown = with_cells(shown, missing=note_cells(frame["note"]))
     return frame_table("measures", "Measures", "", shown, MEASURE_COLUMNS)
-
-
-def _decimals_of_measure(value: float, unit: str) -> int:
-    """The number of decimals for three digits: at most three; none for a count."""
-    if not np.isfinite(value) or abs(value) < 1e-3:
-        return 0 if unit == "-" and value == 0 else 2
-    return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
 
 
 def criteria_table(content: ManoeuvreContent) -> PageTable | None:

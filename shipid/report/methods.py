@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -29,6 +30,7 @@ from shipid.report.figure import (
     names_in,
     zero_axis,
 )
+from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells, word_cell
 from shipid.report.wording import counted_text, difference_text, ends_text, join_few_names, number_text, shorten_name
@@ -241,3 +243,4 @@ THE_METHODS = Section(
     needs=("methods",),
     anchors=("methods", "methods-table"),
 )
+write_comparison = partial(write_page, "methods", {"the-methods": THE_METHODS})

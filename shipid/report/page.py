@@ -19,12 +19,10 @@ from plotly.io.json import to_json_plotly
 
 from shipid.errors import ResultError
 from shipid.files import write_text
-from shipid.report.content import AnswerSentence, ReportContent
+from shipid.report.content import AnswerSentence
 from shipid.report.figure import PageFigure, Panel, page_colours
 from shipid.report.glossary import mark_short_names
-from shipid.report.paths import window_data
 from shipid.report.section import OF_EVERY_PAGE, Section, declared_anchors, draw_sections
-from shipid.report.sections import SECTIONS
 from shipid.report.tables import cell_html
 from shipid.report.wording import number_text, set_sentence
 
@@ -65,7 +63,10 @@ def render_page(
         numbers={figure.id: i for i, figure in enumerate(figures, start=1)},
         views={figure.id: _draw_views(figure) for figure in figures if not figure.browser},
         windows=pack_text(json.dumps(windows, separators=(",", ":"), allow_nan=False)) if windows else "",
-        palette={theme: Markup(_declare_colours(theme)) for theme in ("light", "dark")},
+        palette={
+            theme: Markup(" ".join(f"--{name}: {colour};" for name, colour in page_colours(theme).items()))
+            for theme in ("light", "dark")
+        },
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
         plotly=_plotly() if figures else None,
@@ -81,12 +82,6 @@ def _check_links(answer: Sequence[AnswerSentence], known: set[str]) -> None:
 def write_page(kind: str, sections: Mapping[str, Section], content: Any, file: Path) -> Path:
     """Write a page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
     return write_whole(render_page(kind, sections, content), file)
-
-
-def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
-    """Write the page of a study as one HTML file that makes no request; returns the file, or raises ResultError."""
-    windows = window_data(content) if content.snapshots else None
-    return write_whole(render_page("study", SECTIONS, content, windows, say), file)
 
 
 def write_whole(text: str, file: Path) -> Path:
@@ -125,10 +120,6 @@ def _panel_json(panel: Panel) -> str:
 def pack_text(text: str) -> Markup:
     """Compress a text (zlib, base64) for a script element: no character in it can end the element or start a tag."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
-
-
-def _declare_colours(theme: str) -> str:
-    return " ".join(f"--{name}: {colour};" for name, colour in page_colours(theme).items())
 
 
 @cache

@@ -27,7 +27,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import figure_sizes
 from shipid.report.tables import PageTable, frame_table
-from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, short_text
+from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, scientific_text
 
 MOST_DOTS = 1200  # of a kind in one panel: more hide each other
 MEDIAN_BINS = 9  # of the middle line
@@ -201,7 +201,7 @@ def search_table(content: ReportContent) -> PageTable:
     tried = []
     for name in names:
         unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        span = f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
+        span = f"{scientific_text(frame[name].min(), 2)} to {scientific_text(frame[name].max(), 2)}{unit}"
         tried.append(f"{name.replace('_', ' ')} {'yes or no' if _yes_or_no(frame[name]) else span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
     takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: "

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 from shipid.report import bands, cells, errors_over, factors, logs, memory, methods, paths, physics_and_data, search
+from shipid.report.content import ReportContent
+from shipid.report.page import render_page, write_whole
 from shipid.report.section import Section
 
 SECTIONS: dict[str, Section] = {
@@ -17,3 +22,9 @@ SECTIONS: dict[str, Section] = {
     "the-search": search.THE_SEARCH,
     "all-cells": cells.THE_CELLS,
 }
+
+
+def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
+    """Write the page of a study as one HTML file that makes no request; returns the file, or raises ResultError."""
+    windows = paths.window_data(content) if content.snapshots else None
+    return write_whole(render_page("study", SECTIONS, content, windows, say), file)

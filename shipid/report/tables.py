@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from shipid.report.wording import ends_text, fixed_text
+from shipid.report.wording import ends_text, fixed_text, scientific_text
 
 LONG_TEXT = 30  # characters that a column shows of a text
 MISSING = 1e300  # sorts after every number (page.js knows it)
@@ -91,6 +91,16 @@ def number_cell(value: object, decimals: int) -> TableCell:
     """Make a cell with a number of fixed decimals, so that points align; NaN is a dash and sorts last."""
     amount = math.nan if value is None or value is pd.NA else float(str(value))
     return TableCell(fixed_text(amount, decimals), amount) if math.isfinite(amount) else TableCell("–", MISSING)
+
+
+def digits_cell(value: float, digits: int = 4) -> TableCell:
+    """Make a cell with a number of so many digits; a dash that sorts last where it is not finite."""
+    return TableCell(scientific_text(value, digits), float(value)) if math.isfinite(value) else TableCell("–", MISSING)
+
+
+def note_cells(notes: Sequence[str]) -> list[TableCell]:
+    """Make cells of notes on what is missing, empty for none."""
+    return [word_cell(note, bad=bool(note)) for note in notes]
 
 
 def range_cell(low: float, high: float) -> TableCell:

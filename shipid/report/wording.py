@@ -31,19 +31,6 @@ def fixed_text(value: float, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
-def short_text(value: float) -> str:
-    """Two digits, never with an exponent between 1e-6 and 1e6: 13, 0.51, 0.00001."""
-    if not math.isfinite(value) or value == 0:
-        return "0" if value == 0 else "–"
-    size = math.floor(math.log10(abs(value)))
-    if not -6 <= size < 6:
-        return f"{value:.1e}".replace("-", "−")
-    rounded = round(value, 1 - size)
-    return (f"{rounded:.{max(0, 1 - size)}f}".rstrip("0").rstrip(".") if size < 1 else f"{rounded:.0f}").replace(
-        "-", "−"
-    )
-
-
 def scientific_text(value: float, digits: int = 4) -> str:
     """So many digits, with a power of ten where the number is very large or small: 803, 1.175 × 10⁵, 10⁻⁶."""
     text = f"{value:.{digits}g}".replace("-", "−")

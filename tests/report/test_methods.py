@@ -9,8 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS
-from shipid.report.comparison import write_comparison
-from shipid.report.methods import MethodsContent, methods_figure, methods_table, sentences_on_methods
+from shipid.report.methods import MethodsContent, methods_figure, methods_table, sentences_on_methods, write_comparison
 from tests.report.views import views
 
 
