@@ -167,11 +167,6 @@ def _draw_along(content: AboardContent, run: str) -> Panel:
 
 
 ABOARD_PAGE = {
-    "aboard": Section(
-        "As if at sea",
-        lambda content: (paths_figure(content), along_run_figure(content)),
-        needs=("instants",),
-        anchors=("seen", "along"),
-    ),
+    "aboard": Section("As if at sea", {"seen": (paths_figure, "instants"), "along": (along_run_figure, "instants")})
 }
 write_aboard = partial(write_page, "aboard", ABOARD_PAGE)

@@ -58,7 +58,7 @@ def _level_of_sentences(frame: pd.DataFrame) -> float:
 def coverage_figure(content: ReportContent) -> PageFigure | None:
     """Nominal against measured coverage, with intervals; None where no model of a close-up has a band."""
     frame = content.frame("coverage")
-    names = [name for name in close_up_models(content) if len(frame) and name in set(frame.model)]
+    names = [name for name in close_up_models(content) if name in set(frame.model)]
     if not names:
         return None
     counts, banded = figure_sizes(frame.N_D), frame.model.nunique()
@@ -140,12 +140,11 @@ def width_figure(content: ReportContent) -> PageFigure | None:
         for row in rows_as_tuples(shown.cells)
     ]
     shown = shown._replace(cells=shown.cells.assign(words=words))
-    low, high = ends_of_map(shown.cells)
     hatched = " Hatched: not narrower than the band of no physics at the same N_D." if shown.cells.worse.any() else ""
     return PageFigure(
         id="width-map",
         title="Better physics, narrower promise",
-        takeaway=f"The mean radius of the band goes from {low} to {high}.",
+        takeaway=f"The mean radius of the band goes from {ends_of_map(shown.cells)}.",
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
         f"left out.{hatched}",
@@ -159,11 +158,9 @@ def width_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def coverage_table(content: ReportContent) -> PageTable | None:
+def coverage_table(content: ReportContent) -> PageTable:
     """Coverage and width by model, N_D and level."""
     frame, refused = content.frame("coverage"), content.frame("no_band")
-    if frame.empty:
-        return None
     reasons = [
         f"{join_few_names([f'{row.model} at N_D = {row.N_D}' for row in rows_as_tuples(part)])}: {reason}"
         for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
@@ -184,11 +181,9 @@ def _coverage_cells(frame: pd.DataFrame) -> pd.DataFrame:
     return with_cells(frame, held=[TableCell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
 
 
-def coverage_by_group(content: ReportContent) -> PageTable | None:
+def coverage_by_group(content: ReportContent) -> PageTable:
     """Coverage at one level by kind of manoeuvre and time ahead."""
     frame = content.frame("coverage_groups")
-    if frame.empty:
-        return None
     frame = frame[frame.model.isin(close_up_models(content))]
     shown = _coverage_cells(frame).assign(by=frame.by.map(GROUP_WORDS), note=frame.note.where(frame.note.ne(""), None))
     return frame_table(
@@ -208,12 +203,10 @@ def _least_held(frame: pd.DataFrame) -> str:
 
 HOW_FAR_OFF = Section(
     "How far off it may be",
-    draw=lambda content: (
-        coverage_figure(content),
-        coverage_table(content),
-        width_figure(content),
-        coverage_by_group(content),
-    ),
-    needs=("coverage",),
-    anchors=("coverage", "coverage-table", "width-map", "coverage-groups"),
+    {
+        "coverage": (coverage_figure, "coverage"),
+        "coverage-table": (coverage_table, "coverage"),
+        "width-map": (width_figure, "coverage"),
+        "coverage-groups": (coverage_by_group, "coverage_groups"),
+    },
 )

@@ -44,4 +44,4 @@ def cells_table(content: ReportContent) -> PageTable:
     return frame_table("cells", "Every cell", takeaway, with_failures(frame), CELLS)
 
 
-THE_CELLS = Section("The cells", draw=lambda content: (cells_table(content),), needs=("cells",), anchors=("cells",))
+THE_CELLS = Section("The cells", {"cells": (cells_table, "cells")})

@@ -26,7 +26,7 @@ from shipid.report.motion import DEGREES
 from shipid.report.page import write_page
 from shipid.report.section import Section
 from shipid.report.tables import PageTable, TableCell, digits_cell, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, join_few_names, scientific_text, set_sentence
+from shipid.report.wording import counted_text, join_few_names, metres_text, scientific_text, set_sentence
 
 CHECK_COLUMNS = {
     "run": "run",
@@ -83,24 +83,22 @@ def checks_table(content: CheckContent) -> PageTable:
     values = zip(frame["value"], units, strict=True)
     cells = {
         "ok": [word_cell("passed" if ok else "failed", bad=not ok) for ok in frame["ok"]],
-        "value": [TableCell(f"{scientific_text(value, 3)} {unit}".rstrip(), float(value)) for value, unit in values],
+        "value": [TableCell(f"{scientific_text(one, 3)} {unit}".rstrip(), float(one)) for one, unit in values],
         "limit": [digits_cell(limit, 3) for limit in frame["limit"]],
         "sentence": [word_cell(set_sentence(row.sentence), bad=not row.ok) for row in rows_as_tuples(frame)],
     }
     return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECK_COLUMNS)
 
 
-def checked_motion(series: pd.DataFrame) -> PageFigure | None:
+def checked_motion(content: CheckContent) -> PageFigure:
     """Rate of the heading and yaw rate, drift of the position, and velocities, over time, one run at a time."""
-    runs = names_in(series)
-    if not runs:
-        return None
+    series, runs = content.series, names_in(content.series)
     worst = series.groupby("run")["drift"].max()
     names = [name for columns in SIGNALS_OF_CHECKS.values() for name in columns.items()]
     return PageFigure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {scientific_text(worst.max(), 2)} m.",
+        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {metres_text(worst.max())}.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",
@@ -134,14 +132,10 @@ def _draw_checked(rows: pd.DataFrame) -> list[Panel]:
 
 
 CHECK_PAGE = {
-    "motion": Section(
-        "What the checks compare", lambda content: (checked_motion(content.series),), ("series",), ("motion-figure",)
-    ),
-    "checks": Section("The checks", lambda content: (checks_table(content),), ("checks",), ("all-checks",)),
+    "motion": Section("What the checks compare", {"motion-figure": (checked_motion, "series")}),
+    "checks": Section("The checks", {"all-checks": (checks_table, "checks")}),
     "data": Section(
-        "The data",
-        lambda content: (logs.tracks_figure(content), logs.repairs_table(content)),
-        anchors=("manoeuvres", "repairs"),
+        "The data", {"manoeuvres": (logs.tracks_figure, "tracks"), "repairs": (logs.repairs_table, "repairs")}
     ),
 }
 write_checks = partial(write_page, "data check", CHECK_PAGE)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from shipid.report.content import ReportContent, rows_as_tuples
@@ -42,7 +41,7 @@ from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text
 
 LINE_COLUMNS = ["model", "source", "N_D"]
-ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
+ERROR_HEIGHT, COMMAND_HEIGHT = 326, 134  # of the error over time and of a row of commands below it [px]
 HORIZON_ERRORS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
     "90th percentile": ("p90", "position error, 90th percentile", "m"),
@@ -66,10 +65,8 @@ KIND_COLUMNS = {
 HOW_PREDICTED = {"naive": CONSTANT_MOTION, "physics": "physics alone", "cooperative": "with data"}
 
 
-def horizon_figure(content: ReportContent) -> PageFigure | None:
-    """Mean and 90th percentile of the error at each second ahead; None without rows."""
-    if content.horizon.empty:
-        return None
+def horizon_figure(content: ReportContent) -> PageFigure:
+    """Mean and 90th percentile of the error at each second ahead."""
     frame = _rows_of_close_up(content.horizon, content)
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
     columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], figure_sizes(frame.N_D)
@@ -121,7 +118,7 @@ def time_figure(content: ReportContent) -> PageFigure | None:
         + _models_of_close_up(content)
         + (f" {counted_text(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
-        height=AROUND + ERROR_HEIGHT + (COMMAND_HEIGHT + COMMAND_GAP) * len(units),
+        height=ERROR_HEIGHT + COMMAND_HEIGHT * len(units),
         draw=lambda run: [_draw_time(content, means[means.run == run], content.commands[content.commands.run == run])],
         controls=[Control("Test run", runs, 0 if worst is None else runs.index(worst.run))],
         chips=[*close_up_chips(content, set(means.source)), *chips],
@@ -164,29 +161,23 @@ def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column:
         means.groupby(["model", "source"], sort=False), key=lambda group: (group[0][0] != pure, group[0][1])
     )
     for (model, given), mine in groups:
-        points = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)]
-        source, keys = line_source(content, model, given)
-        look = looks.get(model)
-        ink = {"color": look.colour, "width": look.width if given == "cooperative" else 1.5} if look else {}
-        ink = {"color": NAIVE, "width": 1.5, **ink, "dash": SOURCE_DASHES[source]}
-        mark = {"symbol": look.symbol if look else "", "size": 7, "color": ink["color"], "maxdisplayed": 9}
-        more: Trace = {"mode": "lines+markers", "marker": mark} if look and given == "cooperative" else {}
-        name = name_of_line(content, model, source)
-        traces.append(make_line(name, points[over], points[column], keys, unit, line=ink, **more))
+        points, look = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)], line_look(content, model, given)
+        mark = {"symbol": looks[model].symbol, "size": 7, "maxdisplayed": 9} if model in looks else {}
+        more: Trace = {"mode": "lines+markers", "marker": mark} if mark and given == "cooperative" else {}
+        ends = points[over], points[column], look["keys"], unit
+        traces.append(make_line(look["name"], *ends, line=look["line"], **more))
     return traces
 
 
-def line_source(content: ReportContent, model: str, source: str) -> tuple[str, list[str]]:
-    """Source that a line of a close-up is called by, and the keys of the chips that hide it."""
-    called = drawn_source(content, model, source)
-    return called, [f"source:{called}", *([f"model:{model}"] if model else [])]
-
-
-def name_of_line(content: ReportContent, model: str, source: str) -> str:
-    """Name of a line of a close-up, of a source as it is called."""
-    if source == "naive" or model == data_driven(content):
-        return CONSTANT_MOTION if source == "naive" else model
-    return f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
+def line_look(content: ReportContent, model: str, given: str) -> dict[str, Any]:
+    """`name`, `keys` of the chips that hide it, and `line` of a path or an error of a close-up."""
+    source, look = drawn_source(content, model, given), close_styles(content).get(model)
+    name = f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
+    name = model if model == data_driven(content) else name
+    ink = {"color": look.colour if look else NAIVE, "dash": SOURCE_DASHES[source]}
+    ink |= {"width": look.width if look and given == "cooperative" else 1.5}
+    keys = [f"source:{source}", *[f"model:{model}"] * bool(model)]
+    return {"name": CONSTANT_MOTION if source == "naive" else name, "keys": keys, "line": ink}
 
 
 def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
@@ -199,27 +190,19 @@ def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
 
 def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> Panel:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
-    units = _commands_by_unit(commands)
-    traces, total, axes = (
-        _error_lines(content, means, "t", "error"),
-        ERROR_HEIGHT + (COMMAND_HEIGHT + COMMAND_GAP) * len(units),
-        {},
-    )
+    units, traces = _commands_by_unit(commands), _error_lines(content, means, "t", "error")
+    share, axes = COMMAND_HEIGHT / (ERROR_HEIGHT + COMMAND_HEIGHT * len(units)), {}
     for row, (unit, columns) in enumerate(units.items(), start=2):
         for i, column in enumerate(columns):
-            changed = np.flatnonzero(np.diff(commands[column]) != 0)
-            held = commands.iloc[np.unique([0, *changed, *(changed + 1), len(commands) - 1])]  # what a step line needs
             ink = {"color": INK, "width": 1.5, "dash": LINE_DASHES[i % 4], "shape": "hv"}
             name, place = column.partition("[")[0].strip(), {"xaxis": "x", "yaxis": f"y{row}"}
-            traces.append(make_line(name, held.t, held[column], [f"command:{column}"], unit, line=ink, **place))
-        low = (len(units) - row + 1) * (COMMAND_HEIGHT + COMMAND_GAP) / total
+            traces.append(make_line(name, commands.t, commands[column], [f"command:{column}"], unit, line=ink, **place))
+        low = (len(units) - row + 1) * share
         shared = ", ".join(sorted({column.partition("[")[0].split()[-1] for column in columns}))
-        axes[f"yaxis{row}"] = make_axis(
-            f"{shared} [{unit}]", domain=[low, low + COMMAND_HEIGHT / total], anchor="x", nticks=4
-        )
+        axes[f"yaxis{row}"] = make_axis(f"{shared} [{unit}]", domain=[low, low + 0.78 * share], anchor="x", nticks=4)
     # The time axis belongs to the lowest row, so that it is drawn at the bottom and shared by all.
     x = make_axis("time in the run [s]", anchor=f"y{len(units) + 1}" if units else "y")
-    y = make_axis("position error [m]", rangemode="tozero", domain=[1 - ERROR_HEIGHT / total, 1.0])
+    y = make_axis("position error [m]", rangemode="tozero", domain=[len(units) * share, 1.0])
     return make_plot(traces, x, y, hovermode="x unified", **axes)
 
 
@@ -228,16 +211,13 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     together, alone = (end[end.source == source].set_index("model")["mean"] for source in ("cooperative", "physics"))
     if together.empty:
         return "No compensated model gave a prediction."
-    pure, known = data_driven(content), content.best in together.index
-    best = content.best if known else str(together.idxmin())
-    of = "" if known or len(together) < 2 else f", the least of {len(together)} models"
-    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is "
-    text += f"{metres_text(together[best])} off on average{of}"
-    text += f", its physics alone {metres_text(alone[best])}" if best in alone.index else ""
-    other = (
-        f"; {in_words(pure)} {metres_text(together[pure])}" if pure and pure != best and pure in together.index else ""
+    pure, best = data_driven(content), content.best if content.best in together.index else str(together.idxmin())
+    text = (
+        f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is {metres_text(together[best])} off "
     )
-    return f"{text}{other}."
+    text += "on average" + (f", its physics alone {metres_text(alone[best])}" if best in alone.index else "")
+    rival = pure and pure != best and pure in together.index
+    return text + (f"; {in_words(pure)} {metres_text(together[pure])}." if rival else ".")
 
 
 def _worst_instant(content: ReportContent, means: pd.DataFrame) -> Any | None:
@@ -253,18 +233,14 @@ def _takeaway_time(worst: Any | None, means: pd.DataFrame) -> str:
     if worst is None:
         return "No compensated model gave a prediction."
     text = f"{in_words(worst.model)} errs most in {worst.run} at t = {worst.t:g} s: {metres_text(worst.error)}"
-    same = means[
-        means.model.eq(worst.model) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)
-    ]
+    same = means[means.source.eq("physics")].merge(worst.to_frame().T[["model", "run", "t"]].astype({"t": float}))
     alone = f", where its physics alone errs by {metres_text(float(same.error.iloc[0]))}" if len(same) else ""
     return f"{text} on average over the horizon{alone}."
 
 
-def error_by_kind(content: ReportContent) -> PageTable | None:
-    """Error over the horizon and at its end, by kind of test run; None without rows."""
+def error_by_kind(content: ReportContent) -> PageTable:
+    """Error over the horizon and at its end, by kind of test run."""
     frame = content.frame("kinds")
-    if frame.empty:
-        return None
     how = [
         HOW_PREDICTED[row.source] + (f", {counted_text(int(row.N_D), 'run')}" if row.N_D else "")
         for row in rows_as_tuples(frame[["source", "N_D"]])
@@ -283,6 +259,9 @@ def error_by_kind(content: ReportContent) -> PageTable | None:
 
 WHERE_ERRORS_GROW = Section(
     "Where the error grows",
-    draw=lambda content: (horizon_figure(content), error_by_kind(content), time_figure(content)),
-    anchors=("horizon", "kinds", "over-time"),
+    {
+        "horizon": (horizon_figure, "horizon"),
+        "kinds": (error_by_kind, "kinds"),
+        "over-time": (time_figure, "over_time"),
+    },
 )

@@ -156,9 +156,4 @@ def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
     return with_cells(frame, status=cells)
 
 
-THE_MODELS = Section(
-    "The models",
-    draw=lambda content: (factors_figure(content), models_table(content)),
-    needs=("models",),
-    anchors=("factors", "models"),
-)
+THE_MODELS = Section("The models", {"factors": (factors_figure, "factors"), "models": (models_table, "models")})

@@ -20,6 +20,7 @@ from shipid.report.figure import (
     Panel,
     Trace,
     category_colour,
+    error_bars,
     escape_name,
     make_axis,
     make_line,
@@ -50,6 +51,10 @@ WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [
 MOST_NAMED = 16  # estimates whose names have room below the columns on a phone
 FARTHEST_INTERVAL = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
 BEFORE, AFTER = "before", "after"
+ESTIMATE_CHIPS = (
+    Chip("identified", "identified", category_colour(0), symbol="circle"),
+    Chip("vague", "not identified", MUTED, symbol="circle-open"),
+)
 RUN_INKS = {
     LOG_SERIES: {"color": INK, "dash": "solid"},
     BEFORE: {"color": category_colour(1), "dash": "dot"},
@@ -127,10 +132,8 @@ class IdentificationContent(PageContent):
     def answer(self) -> list[AnswerSentence]:
         """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
-        sentences = [
-            AnswerSentence(f"{known} of {counted_text(count, 'parameter')} are identified by these runs.", "estimates")
-        ]
-        sentences.append(AnswerSentence(_errors_before_and_after(self), "free-runs"))
+        first = f"{known} of {counted_text(count, 'parameter')} are identified by these runs."
+        sentences = [AnswerSentence(first, "estimates"), AnswerSentence(_errors_before_and_after(self), "free-runs")]
         return [*sentences, *(AnswerSentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
@@ -174,10 +177,7 @@ def estimates_figure(content: IdentificationContent) -> PageFigure:
         alternative="Estimates with intervals; the table below has the numbers.",
         height=PARAMETER_HEIGHT * len(frame) + HEAD,
         draw=lambda: [_draw_estimates(frame, low, high)],
-        chips=[
-            Chip("identified", "identified", category_colour(0), symbol="circle"),
-            Chip("vague", "not identified", MUTED, symbol="circle-open", width=1.2),
-        ],
+        chips=ESTIMATE_CHIPS,
     )
 
 
@@ -185,19 +185,14 @@ def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> Panel:
     base_ink = {"color": INK, "width": 1, "dash": "dot"}
     traces = [make_line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line=base_ink, hover="")]
     numbered = frame.assign(row=np.arange(len(frame), dtype=float))
-    for known, key, ink, width, symbol in (
-        (True, "identified", category_colour(0), 2.5, "circle"),
-        (False, "vague", MUTED, 1.2, "circle-open"),
-    ):
-        mine = numbered[frame["identified"].astype(bool) == known]
-        ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
-        x = np.column_stack([ends, np.full(len(mine), np.nan)]).ravel()
-        bars: Trace = {"line": {"color": ink, "width": width}, "hover": ""}
-        traces.append(make_line("interval", x, np.repeat(mine["row"], 3), [key], **bars))
-        marker = {"symbol": symbol, "color": ink, "size": 9, "line": {"color": ink, "width": 2}}
+    for chip in ESTIMATE_CHIPS:
+        mine = numbered[frame["identified"].astype(bool) == (chip.key == "identified")]
+        ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high).T
+        marker = {"symbol": chip.symbol, "color": chip.colour, "size": 9, "line": {"color": chip.colour, "width": 2}}
+        look: Trace = {"marker": marker, "error_x": error_bars(mine["factor"].to_numpy(float), *ends, chip.colour)}
         words = [_estimate_words(row) for row in mine.to_dict("records")]
         traces.append(
-            make_line("estimate", mine["factor"], mine["row"], [key], mode="markers", marker=marker, hover=words)
+            make_line("estimate", mine["factor"], mine["row"], [chip.key], mode="markers", hover=words, **look)
         )
     y = names_axis(list(frame["name"]), showgrid=False, range=[len(frame) - 0.4, -0.6])
     x_axis = make_axis("factor on the base value [1]", nticks=9, range=[low, high])
@@ -236,11 +231,11 @@ def estimates_table(content: IdentificationContent) -> PageTable:
     return frame_table("numbers", "Every estimate", "", shown, ESTIMATE_COLUMNS)
 
 
-def unseen_table(content: IdentificationContent) -> PageTable | None:
-    """The table of what is not identified, and why; None if everything is."""
+def unseen_table(content: IdentificationContent) -> PageTable:
+    """The table of what is not identified, and why."""
     rows = [[word_cell(set_sentence(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
     takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
-    return PageTable("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
+    return PageTable("unseen", "What is not identified", takeaway, ["why"], [False], rows)
 
 
 def correlations_figure(content: IdentificationContent) -> PageFigure | None:
@@ -320,11 +315,9 @@ def manoeuvres_before_and_after(content: IdentificationContent) -> PageTable | N
     return frame_table("manoeuvres", "Standard manoeuvres", takeaway, shown, MEASURES_BEFORE_AND_AFTER)
 
 
-def residuals_figure(content: IdentificationContent) -> PageFigure | None:
-    """Autocorrelation of the residuals; None without any."""
+def residuals_figure(content: IdentificationContent) -> PageFigure:
+    """Autocorrelation of the residuals."""
     frame = content.colours
-    if frame.empty:
-        return None
     parts = {name: frame[frame["signal"] == name] for name in names_in(frame, "signal")}
     first = [f"{name} {number_text(([*mine['correlation'], 0.0, 0.0])[1])}" for name, mine in parts.items()]
     return PageFigure(
@@ -350,10 +343,8 @@ def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> Panel:
     return make_plot(traces, make_axis("lag [s]", nticks=9), y)
 
 
-def profiles_figure(content: IdentificationContent) -> PageFigure | None:
-    """The figure of the profile likelihoods; None if none was asked for."""
-    if content.profiles.empty:
-        return None
+def profiles_figure(content: IdentificationContent) -> PageFigure:
+    """The figure of the profile likelihoods."""
     curves = content.profiles.groupby("path", sort=False)
     return PageFigure(
         id="profiles",
@@ -378,18 +369,16 @@ def _draw_profile(path: str, mine: pd.DataFrame) -> Panel:
     return make_plot(traces, make_axis(f"factor of {escape_name(path)} [1]", nticks=6), y)
 
 
-def programme_table(content: IdentificationContent) -> PageTable | None:
-    """The table of manoeuvres to run next; None if it was not asked for."""
+def programme_table(content: IdentificationContent) -> PageTable:
+    """The table of manoeuvres to run next."""
     frame = content.programme
-    if frame.empty:
-        return None
     takeaway = f"Most information per hour about these parameters: {frame['manoeuvre'].iloc[0]}."
     shown = frame.assign(by=100 * (1 - frame["after"] / frame["before"]))
     return frame_table("programme", "Candidates", takeaway, shown, PROGRAMME_COLUMNS)
 
 
-def errors_by_side(content: IdentificationContent) -> PageTable | None:
-    """Errors by side, helm and speed; None without rows."""
+def errors_by_side(content: IdentificationContent) -> PageTable:
+    """Errors by side, helm and speed."""
     runs = "Runs held out" if content.held_out else "Fitted runs"
     return group_errors(content.groups, f"{runs}, over the horizon of the fit.")
 
@@ -397,31 +386,29 @@ def errors_by_side(content: IdentificationContent) -> PageTable | None:
 IDENTIFICATION_PAGE = {
     "what-is-known": Section(
         "What is known",
-        lambda content: (
-            estimates_figure(content),
-            estimates_table(content),
-            unseen_table(content),
-            correlations_figure(content),
-        ),
-        needs=("estimates",),
-        anchors=("estimates", "numbers", "unseen", "correlations"),
+        {
+            "estimates": (estimates_figure, "estimates"),
+            "numbers": (estimates_table, "estimates"),
+            "unseen": (unseen_table, "unseen"),
+            "correlations": (correlations_figure, "estimates"),
+        },
     ),
     "what-it-buys": Section(
         "What it buys",
-        lambda content: (free_runs_figure(content), free_run_errors(content), manoeuvres_before_and_after(content)),
-        needs=("series", "errors"),
-        anchors=("free-runs", "errors", "manoeuvres"),
+        {
+            "free-runs": (free_runs_figure, "series"),
+            "errors": (free_run_errors, "errors"),
+            "manoeuvres": (manoeuvres_before_and_after, "manoeuvres"),
+        },
     ),
     "what-is-left": Section(
         "What is left over",
-        lambda content: (errors_by_side(content), residuals_figure(content), profiles_figure(content)),
-        anchors=("sides", "residuals", "profiles"),
+        {
+            "sides": (errors_by_side, "groups"),
+            "residuals": (residuals_figure, "colours"),
+            "profiles": (profiles_figure, "profiles"),
+        },
     ),
-    "next": Section(
-        "What to run next",
-        lambda content: (programme_table(content),),
-        needs=("programme",),
-        anchors=("programme",),
-    ),
+    "next": Section("What to run next", {"programme": (programme_table, "programme")}),
 }
 write_identification = partial(write_page, "identification", IDENTIFICATION_PAGE)

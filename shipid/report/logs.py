@@ -41,11 +41,9 @@ def set_colour(name: str) -> str:
     return next((colour for start, colour in starts.items() if name.lower().startswith(start)), TRAINING_COLOUR)
 
 
-def tracks_figure(content: ReportContent) -> PageFigure | None:
-    """Tracks of all manoeuvres by set, north up, equal axes; None without rows. Takes the content of any page."""
+def tracks_figure(content: ReportContent) -> PageFigure:
+    """Tracks of all manoeuvres by set, north up, equal axes. Takes the content of any page."""
     tracks = content.tracks
-    if tracks.empty:
-        return None
     bounds = [(float(tracks[column].min()), float(tracks[column].max())) for column in ("east", "north")]
     names, counts = names_in(tracks, "set"), tracks.groupby("set").run.nunique()
     east, north = (distance_text(high - low) for low, high in bounds)
@@ -74,11 +72,9 @@ def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> Pan
     return make_chart(traces, "east [m]", "north [m]", bounds)
 
 
-def envelope_figure(content: ReportContent) -> PageFigure | None:
-    """Range and mean of every input per set, one panel per quantity; None without rows."""
+def envelope_figure(content: ReportContent) -> PageFigure:
+    """Range and mean of every input per set, one panel per quantity."""
     frame = content.envelope
-    if frame.empty:
-        return None
     by_count = frame["set"].str.fullmatch(r"D_\d+").any()  # sets called by their number of runs
     return PageFigure(
         id="envelope",
@@ -129,11 +125,9 @@ def _beyond_words(frame: pd.DataFrame) -> str:
     return f"The test reaches outside what the other sets cover in {reach}: {join_few_names(outside)}."
 
 
-def input_ranges(content: ReportContent) -> PageTable | None:
-    """Smallest, mean and largest value of every input, a row per set; None without rows."""
+def input_ranges(content: ReportContent) -> PageTable:
+    """Smallest, mean and largest value of every input, a row per set."""
     frame = content.envelope
-    if frame.empty:
-        return None
     ranges = {
         (row["set"], row["quantity"]): TableCell(_range_words(row["min"], row["mean"], row["max"]), float(row["mean"]))
         for row in frame.to_dict("records")
@@ -146,10 +140,8 @@ def input_ranges(content: ReportContent) -> PageTable | None:
     return frame_table("envelope-table", "Minimum / mean / maximum", "", shown, {"set": "the set", **columns})
 
 
-def repairs_table(content: ReportContent) -> PageTable | None:
-    """The table of repairs by the importer; None if nothing is recorded. Takes the content of any page."""
-    if content.repairs.empty:
-        return None
+def repairs_table(content: ReportContent) -> PageTable:
+    """The table of repairs by the importer. Takes the content of any page."""
     kinds = names_in(content.repairs, "kind")
     takeaway = f"{counted_text(len(content.repairs), 'repair')}: {join_few_names(kinds)}."
     return frame_table("repairs", "What the importer repaired", takeaway, content.repairs, REPAIR_COLUMNS)
@@ -157,11 +149,10 @@ def repairs_table(content: ReportContent) -> PageTable | None:
 
 THE_DATA = Section(
     "The data",
-    draw=lambda content: (
-        tracks_figure(content),
-        envelope_figure(content),
-        input_ranges(content),
-        repairs_table(content),
-    ),
-    anchors=("manoeuvres", "envelope", "envelope-table", "repairs"),
+    {
+        "manoeuvres": (tracks_figure, "tracks"),
+        "envelope": (envelope_figure, "envelope"),
+        "envelope-table": (input_ranges, "envelope"),
+        "repairs": (repairs_table, "repairs"),
+    },
 )

@@ -112,11 +112,9 @@ def measures_table(content: ManoeuvreContent) -> PageTable:
     return frame_table("measures", "Measures", "", shown, MEASURE_COLUMNS)
 
 
-def criteria_table(content: ManoeuvreContent) -> PageTable | None:
-    """Criteria of IMO MSC.137(76) that apply to this kind of manoeuvre; None without."""
+def criteria_table(content: ManoeuvreContent) -> PageTable:
+    """Criteria of IMO MSC.137(76) that apply to this kind of manoeuvre."""
     frame = content.criteria
-    if frame.empty:
-        return None
     shown = with_cells(frame, verdict=[word_cell(verdict, bad=verdict == "not met") for verdict in frame["verdict"]])
     return frame_table("criteria", "Criteria of IMO MSC.137(76)", "", shown, CRITERION_COLUMNS)
 
@@ -207,10 +205,8 @@ def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
     return float(values.iloc[0]) if len(values) else float("nan")
 
 
-def spiral_figure(content: ManoeuvreContent) -> PageFigure | None:
-    """Steady yaw rate over helm; None where no level was held."""
-    if content.levels.empty:
-        return None
+def spiral_figure(content: ManoeuvreContent) -> PageFigure:
+    """Steady yaw rate over helm."""
     levels = np.rad2deg(content.levels[["helm", "rate"]].astype(float))
     look: Trace = {
         "line": {"color": category_colour(3), "width": 2},
@@ -231,15 +227,11 @@ def spiral_figure(content: ManoeuvreContent) -> PageFigure | None:
 
 MANOEUVRE_PAGE = {
     "results": Section(
-        "What was measured",
-        lambda content: (measures_table(content), criteria_table(content)),
-        anchors=("measures", "criteria"),
+        "What was measured", {"measures": (measures_table, "measures"), "criteria": (criteria_table, "criteria")}
     ),
     "motion": Section(
         "What the ship did",
-        lambda content: (track_figure(content), histories_figure(content), spiral_figure(content)),
-        needs=("log",),
-        anchors=("track", "histories", "spiral"),
+        {"track": (track_figure, "log"), "histories": (histories_figure, "log"), "spiral": (spiral_figure, "levels")},
     ),
 }
 write_manoeuvre = partial(write_page, "manoeuvre", MANOEUVRE_PAGE)

@@ -43,11 +43,9 @@ COMPARISON_COLUMNS = {
 }
 
 
-def memory_gain(content: ReportContent) -> PageFigure | None:
-    """H of both rivals over N_D, and their difference with its interval; None where nothing is compared."""
+def memory_gain(content: ReportContent) -> PageFigure:
+    """H of both rivals over N_D, and their difference with its interval."""
     frame = content.frame("memory")
-    if frame.empty:
-        return None
     # By rising A, mean over N_D; without physics last.
     accuracy = frame.groupby("model", sort=False).A.mean().sort_values(kind="stable", na_position="last")
     models, total = spread_items([str(name) for name in accuracy.index], FEW_MODELS), len(accuracy)
@@ -110,11 +108,9 @@ def _takeaway_memory(frame: pd.DataFrame) -> str:
     return f"{text} free of 0; the lowest difference is that of {which}."
 
 
-def memory_table(content: ReportContent) -> PageTable | None:
+def memory_table(content: ReportContent) -> PageTable:
     """Every comparison with its interval."""
     frame = content.frame("memory")
-    if frame.empty:
-        return None
     rows = rows_as_tuples(frame)
     ends = [range_cell(row.low, row.high) for row in rows]
     better = [TableCell(f"{row.better} of {row.runs}", row.better) for row in rows]
@@ -125,7 +121,5 @@ def memory_table(content: ReportContent) -> PageTable | None:
 
 
 THE_PAST = Section(
-    "What the past shows",
-    draw=lambda content: (memory_gain(content), memory_table(content)),
-    anchors=("memory-gain", "memory-table"),
+    "What the past shows", {"memory-gain": (memory_gain, "memory"), "memory-table": (memory_table, "memory")}
 )

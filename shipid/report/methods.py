@@ -237,10 +237,5 @@ def _paired_cell(row: Mapping[Any, Any], name: str) -> TableCell:
     return word_cell(None)
 
 
-THE_METHODS = Section(
-    "Methods",
-    draw=lambda content: (methods_figure(content), methods_table(content)),
-    needs=("methods",),
-    anchors=("methods", "methods-table"),
-)
+THE_METHODS = Section("Methods", {"methods": (methods_figure, "methods"), "methods-table": (methods_table, "methods")})
 write_comparison = partial(write_page, "methods", {"the-methods": THE_METHODS})

@@ -151,10 +151,7 @@ def replay_errors(content: ReplayContent) -> PageTable:
 
 REPLAY_PAGE = {
     "replay": Section(
-        "Recorded and replayed",
-        lambda content: (replayed_motion(content), replay_errors(content)),
-        needs=("series",),
-        anchors=("motion", "errors"),
-    ),
+        "Recorded and replayed", {"motion": (replayed_motion, "series"), "errors": (replay_errors, "series")}
+    )
 }
 write_replay = partial(write_page, "replay", REPLAY_PAGE)

@@ -14,10 +14,9 @@ import pandas as pd
 
 from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, PathKey, ReportContent, WindowSnapshot
-from shipid.report.errors_over import close_up_chips, line_source, name_of_line
+from shipid.report.errors_over import close_up_chips, line_look
 from shipid.report.figure import (
     MUTED,
-    NAIVE,
     TRUTH,
     Chip,
     Control,
@@ -32,8 +31,6 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import (
     FEW_RUNS,
-    SOURCE_DASHES,
-    close_styles,
     close_up_models,
     data_driven,
     drawn_source,
@@ -44,7 +41,6 @@ from shipid.report.selection import (
 from shipid.report.wording import counted_text, metres_text
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_SHOWN_WINDOWS = 600  # in all
 MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 MOST_POINTS = 40  # of a path or of the outline of a band
 PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
@@ -62,8 +58,8 @@ def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
         by_run.setdefault(snapshot.run, []).append(snapshot)
     shown = set(close_up_models(content))
     paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
-    windows = min(MOST_SHOWN_WINDOWS, MOST_PATHS // max(1, paths))
-    result, most = {}, min(MOST_INSTANTS, max(1, windows // max(1, min(FEW_RUNS, len(by_run)))))
+    runs = max(1, min(FEW_RUNS, len(by_run)))
+    result, most = {}, min(MOST_INSTANTS, max(1, MOST_PATHS // (runs * max(1, paths))))
     for run in spread_items(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
         result[run] = [ordered[i] for i in even_places(len(ordered), most)]
@@ -134,7 +130,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     return {
         "runs": packed,
         "outline": outline,
-        "lines": [_line_style(content, model, source) for model, source in lines],
+        "lines": [line_look(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
         "layout": make_chart([], TO_STARBOARD, AHEAD)["layout"],
     }
@@ -159,20 +155,14 @@ def draw_window(
         fill: Trace = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
         traces.append(_path_line("ship", hull, ["ship"], hover="", **fill))
     for key in (key for key in window.paths if _is_drawn(content, key, [size])):
-        look = _line_style(content, "" if key[1] == "naive" else key[0], key[1])
+        look = line_look(content, "" if key[1] == "naive" else key[0], key[1])
         if key in window.bands:
-            shade: Trace = {
-                "line": {**look["line"], "width": 0.5},
-                "fill": "toself",
-                "fillcolor": look["line"]["color"],
-            }
+            colour = look["line"]["color"]
+            shade: Trace = {"line": {"color": colour, "width": 0.5}, "fill": "toself", "fillcolor": colour}
             keys = [*look["keys"], "band"]
             traces.append(_path_line(look["name"], window.bands[key], keys, hover="", opacity=0.15, **shade))
-        traces.append(
-            _path_line(
-                look["name"], window.paths[key], look["keys"], line=look["line"], hover=escape_name(look["name"])
-            )
-        )
+        words, ink = escape_name(look["name"]), look["line"]
+        traces.append(_path_line(look["name"], window.paths[key], look["keys"], line=ink, hover=words))
     return make_chart(traces, TO_STARBOARD, AHEAD)
 
 
@@ -211,14 +201,6 @@ def find_window(
     windows = runs[run or next(iter(runs))]
     window = windows[len(windows) // 2] if t is None else min(windows, key=lambda shot: abs(shot.t - t))
     return window, N_D or counts[-1]
-
-
-def _line_style(content: ReportContent, model: str, given: str) -> dict[str, Any]:
-    style, cell = close_styles(content).get(model), given == "cooperative"
-    source, keys = line_source(content, model, given)
-    ink = {"color": style.colour if style else NAIVE, "dash": SOURCE_DASHES[source]}
-    width = style.width if style and cell else 1.5
-    return {"name": name_of_line(content, model, source), "keys": keys, "line": {**ink, "width": width}}
 
 
 def _window_chips(content: ReportContent) -> list[Chip]:
@@ -261,9 +243,4 @@ def _takeaway_windows(content: ReportContent, size: int) -> str:
     return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
-PREDICTIONS = Section(
-    "The predictions",
-    draw=lambda content: (browser_figure(content),),
-    needs=("snapshots",),
-    anchors=("browser",),
-)
+PREDICTIONS = Section("The predictions", {"browser": (browser_figure, "snapshots")})

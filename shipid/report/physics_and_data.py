@@ -57,7 +57,7 @@ NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines 
 FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
 ROUND_DIGITS = (1, 2, 5)  # of the ticks of A
 MOST_LETTERS_BESIDE = 12  # characters of a name beside a row
-MOST_LINES, FAR_APART = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
+MOST_LINES = 12  # models with physics that have a line
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
     "mean": ("H", "mean"),
     "90th percentile": ("H_90", "p90"),
@@ -129,13 +129,9 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
     cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
     cells = cells.merge(errors_over_seeds(content)[["model", "N_D", "H"]], how="left")
     learned = cells.N_D.map(cells[cells.model.eq(data_driven(content) or "")].set_index("N_D").H)
-    worse = cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned)
     groups = {key: mine.to_dict("records") for key, mine in content.cells.groupby(["model", "N_D"])}
-    words = [
-        _cell_words(groups[row.model, row.N_D], row, learned[row.Index] if worse[row.Index] else None)
-        for row in rows_as_tuples(cells)
-    ]
-    return CellMap(rows, cells.assign(worse=worse, words=words))
+    words = [_cell_words(groups[row.model, row.N_D], row) for row in rows_as_tuples(cells)]
+    return CellMap(rows, cells.assign(worse=cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned), words=words))
 
 
 def _rows_of_map(content: ReportContent) -> pd.DataFrame:
@@ -153,7 +149,7 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
     return frame.assign(y=np.sqrt(frame.A).where(frame.A.notna(), strips), short=short)
 
 
-def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float | None) -> str:
+def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
     """The lines of the hover box of one model and N_D, of which there are some cells."""
     good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
     accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
@@ -167,19 +163,14 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float |
         lines.append(f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}")
     if len(good) < len(cells):
         lines.append(f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result")
-    if learned is not None:
-        lines.append(f"no better than no physics, {metres_text(learned)}")
-    return "<br>".join([*lines, escape_name(best["hyperparameters"])] if best.get("hyperparameters") else lines)
+    return "<br>".join([*lines, escape_name(best.get("hyperparameters", ""))])
 
 
 def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
     rows, cells = shown
     top, counts = float(rows.y.max()) * 1.04, np.unique(cells.N_D)
-    # Most of the way to the nearer neighbour, but no cell much wider than another.
-    gaps = np.diff(counts)
-    nearest = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
-    widths = dict(zip(counts.tolist(), 0.86 * np.minimum(nearest, 1.5 * gaps.min()), strict=True))
+    width = 0.86 * float(np.diff(counts).min())
     good, bad = cells[cells.H.notna()], cells[cells.H.isna()]
     span = float(good.H.min()), float(good.H.max())
     shades = [f"var(--heat-{colour_level(value, span)})" for value in good.H]
@@ -188,11 +179,11 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     hatched = {"marker": {"color": TRANSPARENT, "line": {"width": 1.2, "color": INK}, "pattern": lattice}}
     cross = {"symbol": "x-thin", "size": 8, "line": {"width": 2, "color": "var(--bad)"}}
     traces: list[Trace] = [
-        {**_cell_bars(good, widths), **box, "hovertemplate": "%{customdata}<extra></extra>"},
-        {**_cell_bars(good[good.worse], widths), **hatched, "hoverinfo": "skip"},
+        {**_cell_bars(good, width), **box, "hovertemplate": "%{customdata}<extra></extra>"},
+        {**_cell_bars(good[good.worse], width), **hatched, "hoverinfo": "skip"},
         make_line("no result", bad.N_D, bad.y, [], mode="markers", marker=cross, hover=list(bad.words)),
     ]
-    ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
+    ends = [counts[0] - 0.75 * width, counts[-1] + 0.75 * width]
     x = make_axis("manoeuvres, N_D [1]", tickvals=counts.tolist(), range=ends, showgrid=False)
     y = make_axis("error of the physics alone, A [m]", range=[0, top], **_ticks_of_map(rows))
     edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
@@ -203,11 +194,10 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     return make_plot([*traces, *lines], x, y, barmode="overlay", **more)
 
 
-def _cell_bars(cells: pd.DataFrame, widths: dict[int, float]) -> Trace:
+def _cell_bars(cells: pd.DataFrame, width: float) -> Trace:
     """Bars around each cell."""
-    size = {"y": (cells.low + cells.high).round(4), "width": cells.N_D.map(widths)}
-    columns = {"x": cells.N_D, "base": (cells.y - cells.low).round(4), **size}
-    return {"type": "bar", **{name: values.tolist() for name, values in columns.items()}}
+    columns = {"x": cells.N_D, "y": (cells.low + cells.high).round(4), "base": (cells.y - cells.low).round(4)}
+    return {"type": "bar", "width": width, **{name: values.tolist() for name, values in columns.items()}}
 
 
 def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
@@ -285,17 +275,16 @@ def _model_without_physics(rows: pd.DataFrame) -> str:
     return next(iter(rows.model[rows.family == DATA_DRIVEN]), NO_PHYSICS)
 
 
-def ends_of_map(cells: pd.DataFrame) -> tuple[str, str]:
-    """The least and the greatest H, each with its model and N_D."""
+def ends_of_map(cells: pd.DataFrame) -> str:
+    """The least and the greatest H, each with its model and N_D, as `least to greatest`."""
     ends = rows_as_tuples(cells.loc[[cells.H.idxmin(), cells.H.idxmax()]])
-    least, greatest = (f"{metres_text(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
-    return least, greatest
+    return " to ".join(f"{metres_text(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
 
 
 def _takeaway_map(shown: CellMap) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
     good, rival = shown.cells[shown.cells.H.notna()], _model_without_physics(shown.rows)
-    text = "H runs from {} to {}".format(*ends_of_map(good))
+    text = f"H runs from {ends_of_map(good)}"
     pure = good.family.eq(DATA_DRIVEN)
     physics = good[~pure & good.N_D.isin(good.N_D[pure])]
     if physics.empty:
@@ -342,7 +331,6 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         alone = content.models.assign(N_D=0).rename(columns={"A": "H", "A_90": "H_90", "A_rms": "rms"})
         means = pd.concat([alone[["model", "N_D", "H", "H_90", "rms"]], means])
     looks, span, (order, drawn) = model_styles(content), accuracy_range(content), _models_with_line(content)
-    heights = means.H[means.model.isin(order) & means.H.gt(0)]
     accuracy = content.cells.groupby("model").A.first()
     words = {name: f"{name}, A {metres_text(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
     return PageFigure(
@@ -361,13 +349,11 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         + cells_without_result(content),
         alternative=f"Lines of the position error over N_D for {counted_text(len(order), 'model')}. "
         "The numbers are in the table of cells.",
-        height=460 if len(order) <= 10 else 560,
+        height=460,
         draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],
         controls=[
             Control("Position error", list(ERROR_STATISTICS)),
-            Control(
-                "Axis", ["linear", "logarithmic"], int(len(heights) > 0 and heights.max() > FAR_APART * heights.min())
-            ),
+            Control("Axis", ["linear", "logarithmic"]),
         ],
         chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT_MOTION, NAIVE, "dash")],
         scale=ColourScale("error of the physics alone, A [m]", *span) if span else None,
@@ -382,11 +368,10 @@ def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
     kept = {*spread_items(physics, MOST_LINES), content.best, *frame.model[pure]}
     order = [str(name) for name in frame.model if name in kept]
     few = len(order) - int(pure.sum())
-    if few == len(physics):
-        return order, ""
-    words = f" Of {len(physics)} models with physics, {few} have a line: some spread over A"
-    words += " and the best in validation" if content.best else ""
-    return order, f"{words}; the others are in the map and in the table of cells."
+    words = (
+        f" Of {len(physics)} models with physics, {few} spread over A have a line; the others are in the map and in "
+    )
+    return order, f"{words}the table of cells." if few < len(physics) else ""
 
 
 def _draw_sizes(
@@ -395,8 +380,7 @@ def _draw_sizes(
     """Lines over N_D; what has no physics first: it must not cover the others."""
     column, looks = ERROR_STATISTICS[statistic][0], model_styles(content)
     sizes = sorted({*content.cells.N_D, *means.N_D})
-    ended = content.cells[content.cells.status.eq("ok")]
-    traces = []
+    ended, traces = content.cells[content.cells.status.eq("ok")], []
     for name in (name for name in reversed(order) if means.model.eq(name).any()):
         look, keys, seeds = looks[name], [f"model:{name}"], ended[ended.model.eq(name)]
         marker = {"symbol": look.symbol, "size": 8, "color": look.colour}
@@ -431,8 +415,5 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
 
 
 WHAT_PHYSICS_AND_DATA_BUY = Section(
-    "What physics and data buy",
-    draw=lambda content: (map_figure(content), gain_figure(content)),
-    needs=("cells",),
-    anchors=("map", "gain"),
+    "What physics and data buy", {"map": (map_figure, "cells"), "gain": (gain_figure, "cells")}
 )

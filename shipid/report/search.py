@@ -213,9 +213,4 @@ def search_table(content: ReportContent) -> PageTable:
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
 
 
-THE_SEARCH = Section(
-    "The search",
-    draw=lambda content: (search_figure(content), search_table(content)),
-    needs=("trials",),
-    anchors=("search", "search-table"),
-)
+THE_SEARCH = Section("The search", {"search": (search_figure, "trials"), "search-table": (search_table, "trials")})

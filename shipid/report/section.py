@@ -17,19 +17,19 @@ OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
 class Section:
     """A section of a page, as a registry such as `sections.SECTIONS` holds it.
 
-    Parameters
-    ----------
     title : heading.
-    draw : content of the page -> figures and tables in order; None in place of one that has nothing to show.
-    needs : names of parts of the content (fields, or keys of its `frames`). The section is left out where one of them
-        is absent or empty.
-    anchors : ids of the figures and tables that `draw` may return; a sentence may link to each of them.
+    items : id of a figure or table, to which a sentence may link -> what draws it from the content of the page, or
+        returns None where there is nothing to show, and the part of the content (a field, or a key of its `frames`)
+        without which it is left out; empty for none.
     """
 
     title: str
-    draw: Callable[[Any], Sequence[Item | None]]
-    needs: Sequence[str] = ()
-    anchors: Sequence[str] = ()
+    items: Mapping[str, tuple[Callable[[Any], Item | None], str]]
+
+    def draw_item(self, name: str, content: object) -> Item | None:
+        """Draw an item; None where the content lacks what it needs, or has nothing to show."""
+        draw, need = self.items[name]
+        return draw(content) if not need or _has_part(content, need) else None
 
 
 @dataclass(frozen=True)
@@ -43,25 +43,19 @@ class DrawnSection:
 
 def declared_anchors(sections: Mapping[str, Section]) -> set[str]:
     """Ids that a sentence of a page with these sections may link to."""
-    return {anchor for section in sections.values() for anchor in section.anchors} | set(OF_EVERY_PAGE)
+    return {name for section in sections.values() for name in section.items} | set(OF_EVERY_PAGE)
 
 
 def draw_sections(
     sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None
 ) -> list[DrawnSection]:
-    """Draw the sections that have something to show, in the order of the registry.
-
-    say : called with the heading of each before it is drawn.
-    """
+    """Draw the sections that have something to show, in order; `say` is called with the heading of each before."""
     result = []
     for name, section in sections.items():
-        if not all(_has_part(content, need) for need in section.needs):
-            continue
-        if say is not None:
+        if say and any(not need or _has_part(content, need) for _, need in section.items.values()):
             say(f"drawing: {section.title}")
-        items = [item for item in section.draw(content) if item is not None]
-        if items:
-            result.append(DrawnSection(name, section.title, items))
+        items = [item for one in section.items if (item := section.draw_item(one, content)) is not None]
+        result += [DrawnSection(name, section.title, items)] if items else []
     return result
 
 

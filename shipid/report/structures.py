@@ -119,10 +119,13 @@ def _measure_cell(row: Mapping[Any, Any]) -> TableCell:
     return TableCell(fixed_text(value, places) + ends, value)
 
 
-def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable | None:
-    """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`; None without rows."""
-    if frame.empty:
-        return None
+def structure_sides(content: StructuresContent) -> PageTable:
+    """Errors of the structure chosen by side, helm and speed."""
+    return group_errors(content.groups, f"{content.chosen}, on runs that the fit has not seen.")
+
+
+def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable:
+    """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`."""
     shown = frame.assign(r=DEGREES * frame["r"], turning=100 * frame["turning"], error=100 * frame["error"])
     takeaway += " Turning: predicted change of heading over the measured one, less 1."
     return frame_table("sides", "Errors by side, helm and speed", takeaway, shown, GROUP_ERRORS)
@@ -130,22 +133,11 @@ def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable | None:
 
 STRUCTURES_PAGE = {
     "structures": Section(
-        "Which structure",
-        lambda content: (structures_table(content), runs_table(content)),
-        needs=("table", "errors"),
-        anchors=("structures", "runs"),
+        "Which structure", {"structures": (structures_table, "table"), "runs": (runs_table, "errors")}
     ),
     "manoeuvres": Section(
-        "What each says of standard manoeuvres",
-        lambda content: (structure_manoeuvres(content),),
-        needs=("manoeuvres",),
-        anchors=("manoeuvres",),
+        "What each says of standard manoeuvres", {"manoeuvres": (structure_manoeuvres, "manoeuvres")}
     ),
-    "sides": Section(
-        "Where it is wrong",
-        lambda content: (group_errors(content.groups, f"{content.chosen}, on runs that the fit has not seen."),),
-        needs=("groups",),
-        anchors=("sides",),
-    ),
+    "sides": Section("Where it is wrong", {"sides": (structure_sides, "groups")}),
 }
 write_structures = partial(write_page, "structures", STRUCTURES_PAGE)

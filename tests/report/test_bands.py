@@ -99,6 +99,4 @@ def test_the_map_of_the_width(banded: ReportContent) -> None:
 
 
 def test_without_bands_nothing_is_drawn(simulation: ReportContent) -> None:
-    assert bands.coverage_figure(simulation) is None
-    assert bands.width_figure(simulation) is None
     assert draw_sections({"how-far-off": SECTIONS["how-far-off"]}, simulation) == []

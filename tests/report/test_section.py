@@ -17,22 +17,22 @@ def table(name: str) -> PageTable:
 @pytest.mark.parametrize(("need", "shown"), [("full", True), ("empty", False), ("absent", False), ("number", True)])
 def test_a_section_needs_its_parts(need, shown):
     content = SimpleNamespace(full=FULL, empty=EMPTY, number=0.0)
-    section = Section("A", lambda _: [table("a")], needs=("full", need))
+    section = Section("A", {"a": (lambda _: table("a"), need)})
     assert [one.id for one in draw_sections({"a": section}, content)] == ["a"] * shown
 
 
 def test_it_says_which_section_is_drawn():
     said = []
-    sections = {"a": Section("First", lambda _: [table("a")]), "b": Section("Second", lambda _: [], needs=("absent",))}
+    sections = {"a": Section("First", {"a": (table, "")}), "b": Section("Second", {"b": (table, "absent")})}
     draw_sections(sections, SimpleNamespace(), said.append)
     assert said == ["drawing: First"]
 
 
 def test_order_and_gaps():
     sections = {
-        "b": Section("B", lambda _: [None, table("b")]),
-        "none": Section("Nothing", lambda _: [None]),
-        "a": Section("A", lambda _: (table("a"),)),
+        "b": Section("B", {"none": (lambda _: None, ""), "b": (lambda _: table("b"), "")}),
+        "none": Section("Nothing", {"nothing": (lambda _: None, "")}),
+        "a": Section("A", {"a": (lambda _: table("a"), "")}),
     }
     assert [(one.id, one.title, [i.id for i in one.items]) for one in draw_sections(sections, None)] == [
         ("b", "B", ["b"]),
