@@ -28,7 +28,6 @@ from shipid.report.tables import PageTable, frame_table, with_cells, word_cell
 from shipid.report.wording import counted_text, join_few_names, metres_text, number_text, shorten_name
 
 STRIP_HEIGHT = 42  # height of a model [px]
-MOST_LETTERS_OF_ROW = 11  # characters of a name that fit beside its errors on a phone
 MODEL_COLUMNS = {
     "model": "model",
     "family": "family",
@@ -101,7 +100,7 @@ def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) 
 
 def _words_of_row(content: ReportContent, name: str) -> str:
     """Name of a model and its accuracy."""
-    words = f"<b>{escape_name(shorten_name(name, MOST_LETTERS_OF_ROW))}</b>"
+    words = f"<b>{escape_name(shorten_name(name))}</b>"
     mine = content.models[content.models.model == name]
     if mine.empty:
         return words
@@ -116,16 +115,12 @@ def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:
     """How many numbers, how far from 1, and which model is farthest from its base."""
     positive, removed = frame[frame.factor > 0], int((frame.factor == 0).sum())
     kept, models = frame.factor[frame.factor != 0], counted_text(len(names), "model")
-    text = f"{models} changed"
-    if len(kept):
-        low, high = number_text(kept.min()), number_text(kept.max())
-        text = f"{counted_text(len(kept), 'number')} in {models}, times "
-        text += low if low == high else f"factors from {low} to {high}"
+    span = " to ".join(dict.fromkeys((number_text(kept.min()), number_text(kept.max()))))
+    text = f"{counted_text(len(kept), 'number')} in {models}, times {span}" if len(kept) else f"{models} changed"
     text += f"; {counted_text(removed, 'term')} removed" if removed else ""
     if positive.model.nunique() > 1:
-        away = positive.factor.map(lambda factor: math.log(factor) ** 2).groupby(positive.model).mean()
-        text += f"; {away.idxmax()} is farthest from its base, by a factor of {math.exp(math.sqrt(away.max())):.2f}"
-        text += f" (root mean square{' of those not removed' if removed else ''})"
+        away = np.exp(np.sqrt((np.log(positive.factor) ** 2).groupby(positive.model).mean()))
+        text += f"; {away.idxmax()} is farthest from its base, by a factor of {away.max():.2f} (root mean square)"
     return f"{text}."
 
 

@@ -97,10 +97,8 @@ def _draw_ranges(mine: pd.DataFrame) -> Panel:
         dot: Trace = {"color": set_colour(name), "size": 11}
         traces.append(make_line(name, [low, high], [row, row], [], hover=words, **bar))
         traces.append(make_line(name, [mean], [row], [], mode="markers", marker=dot, hover=words))
-    low, high = float(mine["min"].min()), float(mine["max"].max())
-    room = 0.06 * (high - low) or 1.0
     y_axis = names_axis(names_in(mine, "set"), showgrid=False, range=[len(mine) - 0.4, -0.6])
-    x_axis = make_axis(f"{escape_name(quantity)} [{escape_name(unit)}]", nticks=6, range=[low - room, high + room])
+    x_axis = make_axis(f"{escape_name(quantity)} [{escape_name(unit)}]", nticks=6)
     return make_plot(traces, x_axis, y_axis, margin={"l": 8, "r": 12, "t": 4, "b": 44})
 
 

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
+    MOST_LINE_POINTS,
     MUTED,
     Chip,
     PageFigure,
     Panel,
     Trace,
     category_colour,
+    even_places,
     make_axis,
     make_chart,
     make_line,
@@ -31,13 +32,9 @@ from shipid.report.section import Section
 from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells, with_cells, word_cell
 from shipid.report.wording import distance_text, number_text
 
-MOST_ROWS = 2000  # of the log: a line needs no more
 OUTLINES = 12  # ships drawn along the track
 EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
 MOST_HEADING_WITH_HELM = 120.0  # deg: a heading that stays within this is drawn with the helm
-CONSTANT_WITHIN = (
-    1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
-)
 MEASURE_COLUMNS = {
     "measure": "measure",
     "value": "value",
@@ -53,13 +50,13 @@ CRITERION_COLUMNS = {
     "verdict": "verdict",
     "note": "note",
 }
-MANOEUVRE_LINES = {  # key -> name, unit, index of the colour, whether it is held from order to order
-    "heading": ("heading", "deg", 0, False),
-    "helm": ("helm", "deg", 1, True),
-    "u": ("ahead, u", "m/s", 0, False),
-    "v": ("to starboard, v", "m/s", 2, False),
-    "r": ("yaw rate, r", "deg/s", 3, False),
-    "shaft": ("shaft", "rpm", 4, True),
+MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
+    "heading": ("heading", "deg", False),
+    "helm": ("helm", "deg", True),
+    "u": ("ahead, u", "m/s", False),
+    "v": ("to starboard, v", "m/s", False),
+    "r": ("yaw rate, r", "deg/s", False),
+    "shaft": ("shaft", "rpm", True),
 }
 
 
@@ -121,7 +118,7 @@ def criteria_table(content: ManoeuvreContent) -> PageTable:
 
 def track_figure(content: ManoeuvreContent) -> PageFigure:
     """Path of the ship with its outline to scale, north up, equal axes."""
-    log = content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)]
+    log = content.log.iloc[even_places(len(content.log), MOST_LINE_POINTS)]
     poses = log[["north", "east", "psi"]].iloc[np.linspace(0, len(log) - 1, OUTLINES).astype(int)]
     gap = np.full((1, 2), np.nan)
     hulls = [np.vstack([outline_at(content.outline, pose), gap]) for pose in poses.to_numpy()]
@@ -152,14 +149,10 @@ def track_figure(content: ManoeuvreContent) -> PageFigure:
 
 def histories_figure(content: ManoeuvreContent) -> PageFigure:
     """Heading, helm, speeds, yaw rate and shaft over time."""
-    log, executed = (
-        content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)],
-        _value_of_measure(content, EXECUTE_HEADING),
-    )
-    degrees = DEGREES * log[["psi", "helm", "r"]]
-    values = log[["u", "v"]].assign(
-        heading=degrees["psi"] - degrees["psi"].iloc[0], helm=degrees["helm"], r=degrees["r"], shaft=60 * log["shaft"]
-    )
+    log = content.log.iloc[even_places(len(content.log), MOST_LINE_POINTS)]
+    executed, degrees = _value_of_measure(content, EXECUTE_HEADING), DEGREES * log[["psi", "helm", "r"]]
+    values = degrees.assign(heading=degrees["psi"] - degrees["psi"].iloc[0], shaft=60 * log["shaft"])
+    values = values.assign(u=log["u"], v=log["v"]).round(6)  # an axis is no picture of the rounding of a constant
     panels = {"heading, helm [deg]": ["heading", "helm"]}
     if np.ptp(values["heading"]) >= MOST_HEADING_WITH_HELM:
         panels = {"heading [deg]": ["heading"], "helm [deg]": ["helm"]}
@@ -175,12 +168,12 @@ def histories_figure(content: ManoeuvreContent) -> PageFigure:
         alternative="Heading, helm, speeds and yaw rate over time.",
         height=270,
         draw=lambda: [_draw_history(log["t"], values[keys], title, executed) for title, keys in panels.items()],
-        chips=[
-            Chip(key, MANOEUVRE_LINES[key][0], category_colour(MANOEUVRE_LINES[key][2]))
-            for keys in panels.values()
-            for key in keys
-        ],
+        chips=[Chip(key, MANOEUVRE_LINES[key][0], _line_colour(key)) for keys in panels.values() for key in keys],
     )
+
+
+def _line_colour(key: str) -> str:
+    return category_colour([*MANOEUVRE_LINES].index(key))
 
 
 def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, executed: float) -> Panel:
@@ -190,13 +183,10 @@ def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, execute
         rule = {"color": MUTED, "width": 1, "dash": "dot"}
         traces.append(make_line(f"{level:g} deg", [t.iloc[0], t.iloc[-1]], [level] * 2, ["heading"], "deg", line=rule))
     for key in values:
-        name, unit, colour, held = MANOEUVRE_LINES[str(key)]
-        ink = {"color": category_colour(colour), "width": 2} | ({"shape": "hv"} if held else {})
+        name, unit, held = MANOEUVRE_LINES[str(key)]
+        ink = {"color": _line_colour(str(key)), "shape": "hv" if held else "linear"}
         traces.append(make_line(name, t, values[key], [str(key)], unit, line=ink))
-    drawn = np.concatenate([trace["y"] for trace in traces])
-    low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
-    span: dict[str, Any] = {"range": [low - 1, high + 1]} if high - low < CONSTANT_WITHIN else {}
-    return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6, **span))
+    return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6))
 
 
 def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
@@ -208,11 +198,8 @@ def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
 def spiral_figure(content: ManoeuvreContent) -> PageFigure:
     """Steady yaw rate over helm."""
     levels = np.rad2deg(content.levels[["helm", "rate"]].astype(float))
-    look: Trace = {
-        "line": {"color": category_colour(3), "width": 2},
-        "marker": {"color": category_colour(3), "size": 7},
-    }
-    trace = make_line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", **look)
+    ink = {"color": category_colour(3)}
+    trace = make_line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", line=ink)
     axes = zero_axis("helm [deg]", nticks=9), zero_axis("yaw rate [deg/s]", nticks=8)
     return PageFigure(
         id="spiral",

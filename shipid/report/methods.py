@@ -39,7 +39,6 @@ from shipid.units import plural_word
 ALL_WITH_PHYSICS = "with physics"
 METHOD_HEIGHT, METHODS_MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
 ALIKE_ERRORS = 1e-9  # relative: errors that differ by rounding
-MOST_LETTERS_OF_METHOD = 20  # characters of a name at the axis: half of a narrow window
 METHOD_COLUMNS = {
     "condition": "condition",
     "family": "family",
@@ -183,7 +182,7 @@ def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[s
         dots = _dots_of_family(family, families, paired, paired.difference, order, shift, words)
         middle, low, high = (paired[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         differences.append(dots | {"error_x": error_bars(middle, low, high, dots["marker"]["color"])})
-    y = names_axis([shorten_name(name, MOST_LETTERS_OF_METHOD) for name in order], range=[-0.6, len(order) - 0.4])
+    y = names_axis([shorten_name(name, 20) for name in order], range=[-0.6, len(order) - 0.4])
     return [
         make_plot(errors, log_axis("position error, H [m]"), y),
         make_plot(differences, zero_axis("difference of H [m]", INK), y),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
 from itertools import product
@@ -19,7 +19,6 @@ from plotly.io.json import to_json_plotly
 
 from shipid.errors import ResultError
 from shipid.files import write_text
-from shipid.report.content import AnswerSentence
 from shipid.report.figure import PageFigure, Panel, page_colours
 from shipid.report.glossary import mark_short_names
 from shipid.report.section import OF_EVERY_PAGE, Section, declared_anchors, draw_sections
@@ -51,7 +50,9 @@ def render_page(
     parts = draw_sections(sections, content, say)
     items = [item for part in parts for item in part.items]
     figures = [item for item in items if isinstance(item, PageFigure)]
-    _check_links(content.answer, {item.id for item in items} | set(OF_EVERY_PAGE) | declared_anchors(sections))
+    known = {item.id for item in items} | declared_anchors(sections)
+    if unknown := {sentence.figure for sentence in content.answer} - known - {""}:
+        raise ValueError(f"no figure is called {min(unknown)!r}; valid: {', '.join(sorted(known))}")
     return _template().render(
         content=content,
         kicker=kind,
@@ -71,12 +72,6 @@ def render_page(
         script=Markup(_resource("page.js")),
         plotly=_plotly() if figures else None,
     )
-
-
-def _check_links(answer: Sequence[AnswerSentence], known: set[str]) -> None:
-    for sentence in answer:
-        if sentence.figure and sentence.figure not in known:
-            raise ValueError(f"no figure is called {sentence.figure!r}; valid: {', '.join(sorted(known))}")
 
 
 def write_page(kind: str, sections: Mapping[str, Section], content: Any, file: Path) -> Path:

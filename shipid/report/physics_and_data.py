@@ -35,6 +35,7 @@ from shipid.report.figure import (
 from shipid.report.section import Section
 from shipid.report.selection import (
     FEW_MODELS,
+    MOST_MODELS,
     accuracy_range,
     data_driven,
     errors_over_seeds,
@@ -56,8 +57,6 @@ INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
 ROUND_DIGITS = (1, 2, 5)  # of the ticks of A
-MOST_LETTERS_BESIDE = 12  # characters of a name beside a row
-MOST_LINES = 12  # models with physics that have a line
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
     "mean": ("H", "mean"),
     "90th percentile": ("H_90", "p90"),
@@ -214,7 +213,7 @@ def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
         {
             **place,
             "y": height,
-            "text": escape_name(shorten_name(name, MOST_LETTERS_BESIDE)),
+            "text": escape_name(shorten_name(name)),
             "font": {"size": 11, "color": INK},
         }
         for height, name in zip(heights, known.short[some], strict=True)
@@ -227,7 +226,7 @@ def _ticks_of_map(rows: pd.DataFrame) -> dict[str, list[Any]]:
     decades = range(math.floor(math.log10(max(largest, 1e-6))) - 1, math.ceil(math.log10(max(largest, 1e-6))) + 1)
     ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
     values = [0.0, *(tick for tick in ticks if largest / 40 <= tick <= largest)]
-    names = [escape_name(shorten_name(name, MOST_LETTERS_BESIDE)) for name in strips.short]
+    names = [escape_name(shorten_name(name)) for name in strips.short]
     return {"tickvals": [*np.sqrt(values), *strips.y], "ticktext": [*(f"{value:g}" for value in values), *names]}
 
 
@@ -365,7 +364,7 @@ def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
     frame = overview_models(content)
     pure = frame.family.eq(DATA_DRIVEN)
     physics = [str(name) for name in frame.model[~pure]]
-    kept = {*spread_items(physics, MOST_LINES), content.best, *frame.model[pure]}
+    kept = {*spread_items(physics, MOST_MODELS), content.best, *frame.model[pure]}
     order = [str(name) for name in frame.model if name in kept]
     few = len(order) - int(pure.sum())
     words = (

@@ -92,11 +92,6 @@ def searched_names(content: ReportContent) -> list[str]:
     return [str(name) for name in frame.columns if name not in TRIAL_COLUMNS and frame[name].nunique() > 1]
 
 
-def _hyperparameter_title(name: str) -> str:
-    """Name of a hyperparameter in words, with its unit; most have none."""
-    return f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
-
-
 def trial_rank_correlation(frame: pd.DataFrame, name: str) -> float:
     """Rank correlation of the error with a hyperparameter within cells, mean over cells; NaN where nothing varies."""
     cells = frame[frame.value.notna() & frame[name].notna() & frame.cell.notna()].groupby("cell")
@@ -153,7 +148,8 @@ def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     axis = log_axis if ends[0] > 0 and ends[1] / ends[0] > WIDE_RANGE else make_axis
     low, high = np.log10(ends) if axis is log_axis else ends
     room = 0.04 * (high - low)
-    return axis(escape_name(_hyperparameter_title(name)), range=[low - room, high + room], nticks=3)
+    title = f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
+    return axis(escape_name(title), range=[low - room, high + room], nticks=3)
 
 
 def _correlation_words(frame: pd.DataFrame, name: str) -> str:

@@ -16,17 +16,6 @@ FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn i
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
 FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
 SOURCE_DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
-# Of the second, third, ... model without physics: all are ink.
-FURTHER_MARKERS = (
-    "cross",
-    "circle-open",
-    "square-open",
-    "diamond-open",
-    "triangle-up-open",
-    "star",
-    "square",
-    "diamond",
-)
 
 
 @dataclass(frozen=True)
@@ -164,8 +153,8 @@ def close_styles(content: ReportContent) -> Mapping[str, Style]:
 
 def _styles_without_physics(names: Sequence[str]) -> dict[str, Style]:
     """Ink: thick for the first model without physics, thin and with other markers for others."""
-    looks = [Style(INK, "x", 3.0), *(Style(INK, symbol, 1.5) for symbol in FURTHER_MARKERS)]
-    return {name: looks[min(i, 1 + (i - 1) % len(FURTHER_MARKERS))] for i, name in enumerate(names)}
+    thin = [Style(INK, f"{symbol}-open", 1.5) for symbol in MARKERS]
+    return {name: thin[i % len(thin)] if i else Style(INK, "x", 3.0) for i, name in enumerate(names)}
 
 
 def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping[str, str] | None = None) -> list[Chip]:

@@ -36,7 +36,7 @@ def test_takeaway_counts_and_finds_the_farthest(simulation):
     squared = np.log(simulation.factors.factor) ** 2
     away = np.exp(np.sqrt(squared.groupby(simulation.factors.model).mean()))
     text = factors_figure(simulation).takeaway
-    assert text.startswith(f"{len(simulation.factors)} numbers in 5 models, times factors from ")
+    assert text.startswith(f"{len(simulation.factors)} numbers in 5 models, times ")
     assert f"{away.idxmax()} is farthest from its base, by a factor of {away.max():.2f}" in text
 
 
@@ -47,7 +47,7 @@ def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
         [{**row, "path": path, "factor": factor} for path, factor in zip("abc", (0.0, 0.6, 0.7), strict=True)]
     )
     assert factors_figure(replace(full_scale, factors=frame)).takeaway == (
-        "2 numbers in 1 model, times factors from 0.60 to 0.70; 1 term removed."
+        "2 numbers in 1 model, times 0.60 to 0.70; 1 term removed."
     )
     same = factors_figure(replace(full_scale, factors=frame.assign(factor=0.6))).takeaway
     assert same == "3 numbers in 1 model, times 0.60."

@@ -13,6 +13,7 @@ from shipid.measures.criteria import judge_criteria
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.measures.spiral import helm_levels
 from shipid.report import manoeuvre
+from shipid.report.figure import MOST_LINE_POINTS, even_places
 from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
 from shipid.report.paths import outline_at
 from shipid.simulation.standard import standard_manoeuvres
@@ -101,7 +102,7 @@ def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     shown = replace(shown, log=shown.log.assign(psi=shown.log["psi"] + 1.0, shaft=np.linspace(-1, 2, len(shown.log))))
     panels = views(manoeuvre.histories_figure(shown))[""]
     lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.data}
-    log = shown.log
+    log = shown.log.iloc[even_places(len(shown.log), MOST_LINE_POINTS)]
     expected = {"heading": np.degrees(log["psi"] - log["psi"].iloc[0]), "helm": np.degrees(log["helm"])}
     expected |= {"ahead, u": log["u"], "to starboard, v": log["v"], "yaw rate, r": np.degrees(log["r"])}
     for name, values in {**expected, "shaft": 60 * log["shaft"]}.items():
