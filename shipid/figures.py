@@ -25,8 +25,8 @@ from shipid.report.content import PageContent, ReportContent
 from shipid.report.figure import PageFigure, draw_alone, dress_panels
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
 from shipid.report.manoeuvre import MANOEUVRE_PAGE, ManoeuvreContent
+from shipid.report.page import Section
 from shipid.report.physics_and_data import gain_lack, map_lack
-from shipid.report.section import Section
 from shipid.report.sections import SECTIONS
 
 if TYPE_CHECKING:

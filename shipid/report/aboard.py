@@ -24,8 +24,7 @@ from shipid.report.figure import (
     make_plot,
     names_in,
 )
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.selection import FEW_RUNS, spread_items
 from shipid.report.wording import metres_text
 
@@ -46,14 +45,10 @@ MOMENTS = 6  # instants of a run whose paths are drawn
 class AboardContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : in words, and the predictor.
-    lines : the lines of the summary, in the order of the terminal.
+    lines : the summary, in the order of the terminal. track : run, t [s], north, east [m], as measured.
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
-        [m] and band_course [rad, clockwise from north].
-    track : run, t [s], north, east [m], as measured.
+    [m] and band_course [rad, clockwise from north].
     """
 
     lines: Sequence[SummaryLine]

@@ -22,8 +22,8 @@ from shipid.report.figure import (
     make_line,
     make_plot,
 )
+from shipid.report.page import Section
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
-from shipid.report.section import Section
 from shipid.report.selection import close_styles, close_up_models, figure_sizes, model_chips
 from shipid.report.tables import PageTable, TableCell, frame_table, with_cells
 from shipid.report.wording import counted_text, join_few_names, metres_text
@@ -128,7 +128,7 @@ def width_figure(content: ReportContent) -> PageFigure | None:
     cells, frame = content.cells, content.frame("coverage")
     if "width" not in cells:
         return None
-    if cells.width.notna().sum() < 2 and len(frame):  # too few runs for the level of the study: the highest there is
+    if cells.width.notna().sum() < 2:  # too few runs for the level of the study: the highest there is
         top = frame[frame.level.eq(_level_of_sentences(frame))][["model", "N_D", "width"]]
         cells = cells.drop(columns="width").merge(top, how="left", on=["model", "N_D"])
     cells = cells[cells.width.notna()]

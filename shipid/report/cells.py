@@ -6,7 +6,7 @@ import pandas as pd
 
 from shipid.report.content import ReportContent
 from shipid.report.factors import with_failures
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import counted_text, duration_text
 

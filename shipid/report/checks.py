@@ -23,8 +23,7 @@ from shipid.report.figure import (
     names_in,
 )
 from shipid.report.motion import DEGREES
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.tables import PageTable, TableCell, digits_cell, frame_table, with_cells, word_cell
 from shipid.report.wording import counted_text, join_few_names, metres_text, scientific_text, set_sentence
 
@@ -48,13 +47,8 @@ SIGNALS_OF_CHECKS = {
 class CheckContent(PageContent):
     """Everything the page of a checked log shows.
 
-    Parameters
-    ----------
-    name : short name of the log.
-    checks : check, run, value, unit, limit, ok, sentence.
-    series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s].
-    tracks : run, set, north, east [m].
-    repairs : kind, column, count, note; may be empty.
+    checks : check, run, value, unit, limit, ok, sentence. tracks : run, set, north, east [m].
+    series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s]. repairs : kind, column, count, note.
     """
 
     checks: pd.DataFrame

@@ -22,7 +22,7 @@ from shipid.report.figure import (
     make_line,
     make_plot,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import (
     FEW_RUNS,
     SOURCE_DASHES,

@@ -22,7 +22,7 @@ from shipid.report.figure import (
     make_plot,
     row_name,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import models_by_accuracy
 from shipid.report.tables import PageTable, frame_table, with_cells, word_cell
 from shipid.report.wording import counted_text, join_few_names, metres_text, number_text, shorten_name

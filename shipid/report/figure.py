@@ -1,7 +1,6 @@
 """What every figure is made of: colours, axes, lines, the legend, and the words around it.
 
-A figure of a page names CSS variables, `var(--ink)`, instead of colours: one serves a light, a dark and a printed
-page. `draw_alone` puts colours in their place.
+A figure of a page names CSS variables, `var(--ink)`: one serves a light, a dark and a printed page.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ def category_colour(index: int) -> str:
 def page_colours(theme: str) -> dict[str, str]:
     """Name of a CSS variable -> colour of the `light` or `dark` page, with viridis and the Okabe-Ito colours.
 
-    `scale-0` to `scale-23` are for lines: those of viridis with contrast to the page; `heat-0` on are all of it.
+    `scale-0` on are for lines: those of viridis with contrast to the page; `heat-0` on are all of it.
     """
     dark = theme == "dark"
     # Dark blue has contrast to white but not to black: the dark page takes sky blue instead, and the reverse.
@@ -74,10 +73,7 @@ def page_colours(theme: str) -> dict[str, str]:
 
 
 def least_coloured(span: tuple[float, float]) -> float:
-    """Where a scale of colours begins: at its least magnitude; where that is nothing or rounding, at 1e-4 of its end.
-
-    Above 0, also for a scale of zeros alone.
-    """
+    """Where a scale of colours begins, above 0: at its least magnitude; where that is rounding, at 1e-4 of its end."""
     low, high = span
     return (low if low >= ROUNDING_SHARE * high else 1e-4 * high) or 1.0
 
@@ -123,12 +119,8 @@ class ColourScale:
 class PageFigure:
     """A figure of the page.
 
-    Parameters
-    ----------
-    id, title, takeaway, how, alternative : texts; the alternative says what a reader who cannot see it would miss.
-    height : of one panel [px].
-    draw : an option of each control -> panels, as many for all options.
-    captions : of the panels; empty for none.
+    alternative : what a reader who cannot see it would miss. height : of one panel [px].
+    draw : an option of each control -> panels, as many for all options. captions : of the panels; empty for none.
     browser : whether the page draws the window that a reader picks, instead of `draw`.
     """
 
@@ -212,11 +204,7 @@ def make_line(
 ) -> Trace:
     """One line or its points, in single precision.
 
-    Parameters
-    ----------
-    name : in the hover box and in what a reader saves.
-    keys : of the chips that hide it.
-    unit : of y.
+    name : in the hover box and in what a reader saves. keys : of the chips that hide it. unit : of y.
     hover : template of the hover box, or the text of each point; empty for no box, None for name and y.
     """
     template = "%{customdata}" if not isinstance(hover, str | None) else hover
@@ -269,12 +257,7 @@ def names_in(frame: pd.DataFrame, column: str = "run") -> list[str]:
 def draw_alone(figure: PageFigure, chosen: Sequence[object] = (), *, dark: bool = False) -> go.Figure:
     """Draw a figure of a page as one Plotly figure with title, legend and real colours.
 
-    Parameters
-    ----------
-    chosen : an option of each control of the figure, in order; None for the one that the page shows first.
-    dark : light ink on a dark ground.
-
-    Raises ShipidError for an option that does not exist.
+    chosen : an option of each control, in order; None for the one that the page shows first; ShipidError for another.
     """
     given = [*chosen, *[None] * (len(figure.controls) - len(chosen))]
     options = [_find_option(control, value) for control, value in zip(figure.controls, given, strict=True)]

@@ -30,8 +30,7 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.motion import LOG_SERIES, MOTION_AXES, motion_figure
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.structures import group_errors
 from shipid.report.tables import (
     MISSING,
@@ -94,23 +93,19 @@ PROGRAMME_COLUMNS = {
 class IdentificationContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : the vessel in words, and a short name.
     estimates : `name`, `path`, `with`, `unit`, `base`, `value`, `error`, `factor`, `factor_low`, `factor_high`,
-        `identified`, `reason`; infinite where nothing is known.
-    correlations : (n, n) of the estimates, in their order.
-    unseen, warnings : sentences.
+    `identified`, `reason`; infinite where nothing is known. correlations : (n, n) of them.
     errors : `set` (`fit`, `test`), `run` (`all` at first), `model` (`before`, `after`), root mean squares `u`, `v`
-        [m/s], `r` [rad/s], `position` [m].
+    [m/s], `r` [rad/s], `position` [m].
     series : `run`, `piece`, `t` [s], `model` (`measured`, `before`, `after`), `north`, `east` [m], `psi` [rad],
-        `u`, `v` [m/s], `r` [rad/s], of runs held out; of fitted ones where `held_out` is empty.
-    held_out, ahead : runs, and length of a free run [s], 0 for whole runs.
-    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
+    `u`, `v` [m/s], `r` [rad/s], of runs held out; of fitted ones where `held_out` is empty.
+    ahead : length of a free run [s], 0 for whole runs. manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`,
+    `note`.
     colours : `signal`, `lag` [s], `correlation` of the residuals.
-    profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point; without rows there is no figure.
-    groups : errors by side, helm and speed. beyond : sentences on manoeuvres that go farther than the data.
-    programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`; may be empty.
+    profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point. groups : errors by side, helm and
+    speed.
+    beyond : sentences on manoeuvres that go farther than the data.
+    programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`.
     """
 
     estimates: pd.DataFrame

@@ -22,7 +22,7 @@ from shipid.report.figure import (
     names_axis,
     names_in,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.tables import PageTable, TableCell, frame_table, word_cell
 from shipid.report.wording import counted_text, distance_text, join_few_names, number_text
 

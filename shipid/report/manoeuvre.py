@@ -26,9 +26,8 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.motion import DEGREES
-from shipid.report.page import write_page
+from shipid.report.page import Section, write_page
 from shipid.report.paths import outline_at
-from shipid.report.section import Section
 from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells, with_cells, word_cell
 from shipid.report.wording import distance_text, number_text
 
@@ -64,14 +63,11 @@ MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
 class ManoeuvreContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : the manoeuvre in words, and its kind.
     first : names of the measures that the answer says.
     log : `t` [s], `north`, `east` [m], `psi`, `helm` [rad], `u`, `v` [m/s], `r` [rad/s], `shaft` [rev/s].
     measures, criteria : rows from `shipid.measures.rows`.
-    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed; without rows there is no figure.
-    outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
+    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed.
+    outline : (k, 2) of the ship from above, body axes x ahead, y to starboard [m].
     """
 
     first: Sequence[str]

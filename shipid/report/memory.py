@@ -25,7 +25,7 @@ from shipid.report.figure import (
     names_in,
     zero_axis,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import FEW_MODELS, in_words, spread_items
 from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells
 from shipid.report.wording import counted_text, difference_text, join_few_names

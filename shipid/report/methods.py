@@ -30,8 +30,7 @@ from shipid.report.figure import (
     names_in,
     zero_axis,
 )
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells, word_cell
 from shipid.report.wording import counted_text, difference_text, ends_text, join_few_names, number_text, shorten_name
 from shipid.units import plural_word
@@ -59,13 +58,7 @@ METHOD_COLUMNS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MethodsContent(PageContent):
-    """The page of a study of several parts.
-
-    Parameters
-    ----------
-    title, name : the question, and the short name of the study.
-    frames : `methods_figure`, as in the page of a study.
-    """
+    """The page of a study of several parts; `frames` has `methods`, as in the page of a study."""
 
     frames: Mapping[str, pd.DataFrame]
 
@@ -151,10 +144,7 @@ def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
 
 
 def _order_of_methods(frame: pd.DataFrame) -> list[str]:
-    """Methods by falling mean H, so that the best is at the top; those without any result first.
-
-    The mean is that with physics, or without where a method has none.
-    """
+    """Methods by falling mean H with physics (or without), the best last; those without any result first."""
     pure, physics = (
         frame[frame.family.eq(family)].groupby("method").H.mean() for family in (DATA_DRIVEN, ALL_WITH_PHYSICS)
     )

@@ -26,8 +26,7 @@ from shipid.report.figure import (
     names_in,
     zero_axis,
 )
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import number_text
 
@@ -54,12 +53,8 @@ def motion_figure(
 ) -> PageFigure:
     """Panels of a run that a reader picks: u, v, r over time, and the map, north up with equal axes.
 
-    Parameters
-    ----------
     series : `run`, `model`, `piece`, `t` [s], `north`, `east` [m], `u`, `v` [m/s], `r` [rad/s].
-    inks : model -> colour and dash of its line.
-    framed : models that the map shows whole; the others may leave it.
-    texts : of the figure.
+    inks : model -> colour and dash of its line. framed : models that the map shows whole. texts : of the figure.
     """
     runs = names_in(series)
     return PageFigure(
@@ -104,11 +99,8 @@ def _with_gaps(mine: pd.DataFrame) -> pd.DataFrame:
 class ReplayContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : in words, and the vessel.
     series : `run`, `piece`, `t` [s], `model` (`measured`, `replayed`), `north`, `east` [m], `u`, `v` [m/s], `r`
-        [rad/s].
+    [rad/s].
     errors : `run` (`all` at first), root mean squares `u`, `v` [m/s], `r` [rad/s], `position` [m].
     ahead : length of each simulation [s]; 0 for whole runs.
     """

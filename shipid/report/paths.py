@@ -28,7 +28,7 @@ from shipid.report.figure import (
     make_chart,
     make_line,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import (
     FEW_RUNS,
     close_up_models,
@@ -93,11 +93,10 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
 
 
 def window_data(content: ReportContent) -> dict[str, Any]:
-    """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
+    """What page.js draws: layout, line styles, ship outline and the windows by run.
 
-    A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one;
-    `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
-    are metres, angles radians.
+    A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one; `line` is an index into
+    `lines`, `size` into the N_D offered or -1. Lengths are metres, angles radians.
     """
     runs, counts = windows_of(content), window_sizes(content)
     lines: dict[tuple[str, str], int] = {}
@@ -181,14 +180,9 @@ def outline_at(outline: Floats, pose: Floats) -> Floats:
 def find_window(
     content: ReportContent, run: str | None, t: float | None, N_D: int | None
 ) -> tuple[WindowSnapshot, int]:
-    """A window of a test run, and the N_D to draw it with.
+    """A window of a test run (default: the first), and the N_D to draw it with (default: the most).
 
-    Parameters
-    ----------
-    run : test run; default: the first.
     t : instant of prediction [s], the nearest recorded one is taken; default: the middle of the run.
-    N_D : manoeuvres that compensated models were trained on; default: the most that were recorded.
-
     Raises ShipidError for a run or an N_D that no window holds.
     """
     runs, counts = windows_of(content), window_sizes(content)

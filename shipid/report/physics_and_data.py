@@ -32,7 +32,7 @@ from shipid.report.figure import (
     make_plot,
     spread_places,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import (
     FEW_MODELS,
     MOST_MODELS,
@@ -134,10 +134,7 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
 
 
 def _rows_of_map(content: ReportContent) -> pd.DataFrame:
-    """The models of the cells as `CellMap.rows`.
-
-    Of several methods on the same physics, which have one place, the first: the one judged, where it is among them.
-    """
+    """The models of the cells as `CellMap.rows`; of several methods on the same physics the first."""
     frame = overview_models(content)
     frame = frame[~same_physics(frame)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
@@ -200,10 +197,7 @@ def _cell_bars(cells: pd.DataFrame, width: float) -> Trace:
 
 
 def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
-    """Names of the models with an A, right of their cells; of more than have room there, some at even distances.
-
-    A few always have their names, even where their cells cover each other.
-    """
+    """Names of the models with an A, right of their cells; of more than have room there, some at even distances."""
     known = rows[rows.A.notna()].reset_index(drop=True)
     room = 1 + int(np.ptp(known.y) / top * INSIDE / NAME_HEIGHT)
     some = even_places(len(known), max(room, FEW_MODELS))
@@ -253,8 +247,7 @@ def _isolines(shown: CellMap) -> Trace:
 def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
     """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
 
-    Values that are not finite stay so and have no weight. A grid with fewer rows or columns than six radii is not
-    smoothed along them.
+    Values that are not finite stay so and have no weight. Rows or columns fewer than six radii are not smoothed along.
     """
     finite = np.isfinite(values) & (values > 0)
     widths = [width if count >= FEWEST_RADII * width else 0 for count, width in zip(values.shape, radius, strict=True)]

@@ -24,7 +24,7 @@ from shipid.report.figure import (
     make_line,
     make_plot,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import figure_sizes
 from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, scientific_text

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from shipid.report import bands, cells, errors_over, factors, logs, memory, methods, paths, physics_and_data, search
 from shipid.report.content import ReportContent
-from shipid.report.page import render_page, write_whole
-from shipid.report.section import Section
+from shipid.report.page import Section, render_page, write_whole
 
 SECTIONS: dict[str, Section] = {
     "results": physics_and_data.WHAT_PHYSICS_AND_DATA_BUY,

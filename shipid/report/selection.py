@@ -34,10 +34,7 @@ def spread_items(items: Sequence[str], count: int) -> list[str]:
 
 @lru_cache(maxsize=4)  # every figure asks for it
 def models_by_accuracy(content: ReportContent) -> pd.DataFrame:
-    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, those without last.
-
-    The frame is cached and shared: do not change it.
-    """
+    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, those without last."""
     known = content.models[["model", "family", "A"]]
     trained = content.cells[["model", "family", "A"]]
     joined = pd.concat([known, trained]).astype({"model": str, "family": str, "A": float})
@@ -104,10 +101,7 @@ def words_on_left_out(content: ReportContent) -> str:
 
 @lru_cache(maxsize=4)
 def close_up_models(content: ReportContent) -> list[str]:
-    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation.
-
-    The list is shared by all who ask: not to be changed.
-    """
+    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation."""
     names = [str(name) for name in models_by_accuracy(content).model]
     middle = {*middle_models(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
@@ -138,10 +132,7 @@ def model_styles(content: ReportContent) -> Mapping[str, Style]:
 
 @lru_cache(maxsize=4)
 def close_styles(content: ReportContent) -> Mapping[str, Style]:
-    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink.
-
-    When all colours are used, they come again with other markers: 36 models are told apart.
-    """
+    """Style of the models of a close-up: a colour and a marker each (36 are told apart); no physics in ink."""
     of_family = dict(zip(*models_by_accuracy(content)[["model", "family"]].to_numpy().T, strict=True))
     physics = [name for name in close_up_models(content) if of_family[name] != DATA_DRIVEN]
     result = _styles_without_physics([name for name in close_up_models(content) if name not in physics])

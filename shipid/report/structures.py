@@ -12,8 +12,7 @@ import pandas as pd
 
 from shipid.report.content import AnswerSentence, PageContent, rows_as_tuples
 from shipid.report.motion import DEGREES
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells, word_cell
 from shipid.report.wording import fixed_text
 from shipid.units import digit_decimals

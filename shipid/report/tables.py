@@ -68,7 +68,7 @@ def with_cells(frame: pd.DataFrame, **cells: Sequence[TableCell]) -> pd.DataFram
 def cell_html(cell: TableCell, numeric: bool, first: bool) -> Markup:
     """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text.
 
-    Of a long text the begin is shown. A long name is shown whole: names of models often differ at the end alone.
+    Of a long text the begin is shown, a long name whole: names of models often differ at the end alone.
     """
     long = len(cell.text) > LONG_TEXT
     name = long and (" + " in cell.text or max(map(len, cell.text.split()), default=0) > LONG_TEXT)

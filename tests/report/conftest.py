@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.report import AnswerSentence, ReportContent, ReportFinding, WindowSnapshot
-from shipid.report.section import DrawnSection, draw_sections
+from shipid.report.page import DrawnSection, draw_sections
 from shipid.report.sections import SECTIONS
 
 NASTY = "<script>alert('x')</script>"

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent, bands
-from shipid.report.section import draw_sections
+from shipid.report.page import draw_sections
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 

@@ -15,9 +15,8 @@ from plotly.offline import get_plotlyjs_version
 from shipid.errors import ResultError
 from shipid.report import AnswerSentence, ReportContent, write_report
 from shipid.report.figure import PageFigure
-from shipid.report.page import render_page
+from shipid.report.page import declared_anchors, render_page
 from shipid.report.paths import window_data
-from shipid.report.section import declared_anchors
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 

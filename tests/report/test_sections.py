@@ -6,8 +6,7 @@ import pytest
 
 from shipid.answer.pages import REPORT_FRAMES
 from shipid.report import ReportContent, checks, identification, manoeuvre
-from shipid.report.page import render_page
-from shipid.report.section import OF_EVERY_PAGE, Section, draw_sections
+from shipid.report.page import OF_EVERY_PAGE, Section, draw_sections, render_page
 from shipid.report.sections import SECTIONS
 from tests.documented import module
 from tests.report import test_checks, test_identification, test_manoeuvre

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from shipid.report.section import Section, draw_sections
+from shipid.report.page import Section, draw_sections
 from shipid.report.tables import PageTable
 
 EMPTY = pd.DataFrame()
