@@ -157,10 +157,8 @@ def _models_of_close_up(content: ReportContent) -> str:
 def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column: str, unit: str = "m") -> list[Trace]:
     """A line for each model and source; what has no physics first: thick ink must not cover the others."""
     looks, pure, traces = close_styles(content), data_driven(content), []
-    groups = sorted(
-        means.groupby(["model", "source"], sort=False), key=lambda group: (group[0][0] != pure, group[0][1])
-    )
-    for (model, given), mine in groups:
+    groups: list[Any] = list(means.groupby(["model", "source"], sort=False))
+    for (model, given), mine in sorted(groups, key=lambda group: (group[0][0] != pure, group[0][1])):
         points, look = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)], line_look(content, model, given)
         mark = {"symbol": looks[model].symbol, "size": 7, "maxdisplayed": 9} if model in looks else {}
         more: Trace = {"mode": "lines+markers", "marker": mark} if mark and given == "cooperative" else {}
@@ -174,8 +172,8 @@ def line_look(content: ReportContent, model: str, given: str) -> dict[str, Any]:
     source, look = drawn_source(content, model, given), close_styles(content).get(model)
     name = f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
     name = model if model == data_driven(content) else name
-    ink = {"color": look.colour if look else NAIVE, "dash": SOURCE_DASHES[source]}
-    ink |= {"width": look.width if look and given == "cooperative" else 1.5}
+    width = look.width if look and given == "cooperative" else 1.5
+    ink = {"color": look.colour if look else NAIVE, "dash": SOURCE_DASHES[source], "width": width}
     keys = [f"source:{source}", *[f"model:{model}"] * bool(model)]
     return {"name": CONSTANT_MOTION if source == "naive" else name, "keys": keys, "line": ink}
 
@@ -211,7 +209,7 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     together, alone = (end[end.source == source].set_index("model")["mean"] for source in ("cooperative", "physics"))
     if together.empty:
         return "No compensated model gave a prediction."
-    pure, best = data_driven(content), content.best if content.best in together.index else str(together.idxmin())
+    pure, best = data_driven(content) or "", content.best if content.best in together.index else str(together.idxmin())
     text = (
         f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is {metres_text(together[best])} off "
     )
@@ -223,10 +221,8 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
 def _worst_instant(content: ReportContent, means: pd.DataFrame) -> Any | None:
     """Row of the run and instant at which the best model, compensated, errs most; None without one."""
     together = means[means.source == "cooperative"]
-    if together.empty:
-        return None
-    best = content.best if content.best in set(together.model) else str(together.model.iloc[0])
-    return together[together.model == best].nlargest(1, "error").iloc[0]
+    known = together[together.model == content.best] if content.best in set(together.model) else together
+    return None if known.empty else known.nlargest(1, "error").iloc[0]
 
 
 def _takeaway_time(worst: Any | None, means: pd.DataFrame) -> str:

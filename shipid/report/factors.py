@@ -20,7 +20,6 @@ from shipid.report.figure import (
     make_axis,
     make_line,
     make_plot,
-    row_name,
 )
 from shipid.report.page import Section
 from shipid.report.selection import models_by_accuracy
@@ -91,7 +90,8 @@ def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) 
     room, ends = 0.03 * math.log10(high / low), np.log10([edge if removed else low, high])
     x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room])
     y_axis = make_axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, tickvals=list(range(len(names))))
-    texts = [row_name(row, _words_of_row(content, name)) for row, name in enumerate(names)]
+    place = {"x": 0, "xref": "paper", "xanchor": "left", "yshift": 17, "showarrow": False, "bgcolor": "var(--page)"}
+    texts = [{**place, "y": row, "text": _words_of_row(content, name)} for row, name in enumerate(names)]
     rule = {"type": "line", "layer": "below", "yref": "paper", "x0": 1, "x1": 1, "y0": 0, "y1": 1}
     rule |= {"line": {"color": INK, "width": 1}}
     margin = {"l": 12, "r": 12, "t": 4, "b": 44}

@@ -228,12 +228,6 @@ def error_bars(middle: Floats, low: Floats, high: Floats, colour: str) -> dict[s
     return {"type": "data", "symmetric": False, "color": colour, "thickness": 1.5, "width": 4, **reach}
 
 
-def row_name(row: int, words: str) -> dict[str, Any]:
-    """Annotation above a row of a figure, at its left edge: long names need no margin there."""
-    place = {"x": 0, "xref": "paper", "xanchor": "left", "y": row, "yshift": 17, "showarrow": False}
-    return {**place, "text": words, "font": {"size": 12}, "bgcolor": "var(--page)", "borderpad": 0}
-
-
 def spread_places(places: Sequence[float], gap: float, most: float) -> list[float]:
     """Move rising places at least `gap` apart and none beyond `most`, each as little as those before it allow."""
     moved: list[float] = []

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from textwrap import wrap
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame
+from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MUTED,
@@ -182,10 +181,14 @@ def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> Panel:
     numbered = frame.assign(row=np.arange(len(frame), dtype=float))
     for chip in ESTIMATE_CHIPS:
         mine = numbered[frame["identified"].astype(bool) == (chip.key == "identified")]
-        ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high).T
+        near, far = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high).T
         marker = {"symbol": chip.symbol, "color": chip.colour, "size": 9, "line": {"color": chip.colour, "width": 2}}
-        look: Trace = {"marker": marker, "error_x": error_bars(mine["factor"].to_numpy(float), *ends, chip.colour)}
-        words = [_estimate_words(row) for row in mine.to_dict("records")]
+        look: Trace = {"marker": marker, "error_x": error_bars(mine["factor"].to_numpy(float), near, far, chip.colour)}
+        words = [
+            f"<b>{escape_name(row.path)}</b> x {row.factor:.4g}, 95 % {interval_text(row.factor_low, row.factor_high)}"
+            f"<br>{'<br>'.join(wrap(escape_name(row.reason), 70))}"
+            for row in rows_as_tuples(mine)
+        ]
         traces.append(
             make_line("estimate", mine["factor"], mine["row"], [chip.key], mode="markers", hover=words, **look)
         )
@@ -202,12 +205,6 @@ def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
     ends = np.append(given[np.isfinite(given)], dots)
     low, high = max(float(ends.min()), dots.min() - reach), min(float(ends.max()), dots.max() + reach)
     return low - 0.04 * (high - low), high + 0.04 * (high - low)
-
-
-def _estimate_words(row: Mapping[Any, Any]) -> str:
-    interval = interval_text(row["factor_low"], row["factor_high"])
-    words = [f"<b>{escape_name(row['path'])}</b> x {row['factor']:.4g}, 95 % {interval}"]
-    return "<br>".join([*words, *wrap(escape_name(row["reason"]), 70)])
 
 
 def estimates_table(content: IdentificationContent) -> PageTable:

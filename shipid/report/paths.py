@@ -216,22 +216,17 @@ def _end_error(window: WindowSnapshot, points: Floats) -> float:
     return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
 
 
-def _mean_end_error(windows: Sequence[WindowSnapshot], keys: set[PathKey]) -> float:
-    errors = [_end_error(w, points) for w in windows for key, points in w.paths.items() if key in keys]
-    return float(np.mean(errors)) if errors else float("nan")
-
-
 def _takeaway_windows(content: ReportContent, size: int) -> str:
     """Mean end errors over all windows, per source."""
     pure, drawn, windows = data_driven(content), close_up_models(content), content.snapshots
-    keys = {key for window in windows for key in window.paths if key[0] in drawn and key[2] in (0, size)}
-    called = {key: drawn_source(content, key[0], key[1]) if key[0] != pure else "pure" for key in keys}
     words = {"cooperative": "the compensated paths", "physics": "physics alone", "pure": in_words(pure or "")}
-    errors = []
-    for source, word in words.items():
-        mine = {key for key, name in called.items() if name == source and (source != "pure" or key[2] == size)}
-        value = _mean_end_error(windows, mine)
-        errors += [f"{word} by {metres_text(value)}"] * bool(np.isfinite(value))
+    ends: dict[str, list[float]] = {source: [] for source in words}
+    for window, (model, source, N_D) in [(shot, key) for shot in windows for key in shot.paths]:
+        if model in drawn and N_D in ([size] if model == pure else [0, size]):
+            error = _end_error(window, window.paths[model, source, N_D])
+            ends["pure" if model == pure else drawn_source(content, model, source)].append(error)
+    means = {source: float(np.mean(some)) for source, some in ends.items() if some}
+    errors = [f"{words[source]} by {metres_text(mean)}" for source, mean in means.items() if math.isfinite(mean)]
     where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
     text = f"In the {counted_text(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
     return f"{text}the end of the horizon on average: {'; '.join(errors)}."

@@ -154,12 +154,11 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
         first = cells[0]
         return "<br>".join([*lines, escape_name(f"{first['status']}: {first['sentence']}".rstrip(": "))])
     best, worst = good[0], good[-1]
-    lines.append(f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}")
-    if len(cells) > 1:
-        lines.append(f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}")
-    if len(good) < len(cells):
-        lines.append(f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result")
-    return "<br>".join([*lines, escape_name(best.get("hyperparameters", ""))])
+    spread = f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}"
+    lost = f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result"
+    lines += [f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}"]
+    lines += [spread] * (len(cells) > 1) + [lost] * (len(good) < len(cells))
+    return "<br>".join(filter(None, [*lines, escape_name(best.get("hyperparameters", ""))]))
 
 
 def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
@@ -290,13 +289,13 @@ def _takeaway_map(shown: CellMap) -> str:
 
 def cells_without_result(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
-    names, by = [], ["model", "N_D"]
-    every = content.cells.groupby(by, sort=False).size().to_dict()
+    by, every = ["model", "N_D"], content.cells.groupby(["model", "N_D"]).size()
     bad = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
-    for (model, size), failed in bad.groupby(by, sort=False):
-        count = every[model, size]
-        share = f", {len(failed)} of {count} seeds" if len(failed) < count else ""
-        names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
+    names = [
+        f"{key[0]} at N_D = {key[1]} ({failed.status.iloc[0]}"
+        + (f", {len(failed)} of {every[key]} seeds)" if len(failed) < every[key] else ")")
+        for key, failed in bad.groupby(by, sort=False)
+    ]
     return f" Not plotted: {join_few_names(names, 6)}; reasons in the table of cells." if names else ""
 
 

@@ -82,7 +82,10 @@ def search_figure(content: ReportContent) -> PageFigure | None:
             ),
             Chip("median", "median", INK),
         ],
-        captions=[_correlation_words(frame, name) for name in names],
+        captions=[
+            f"rank correlation {fixed_text(value, 2)}" if math.isfinite(value) else "no rank correlation"
+            for value in (trial_rank_correlation(frame, name) for name in names)
+        ],
     )
 
 
@@ -125,8 +128,9 @@ def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Pan
     ink = {"color": INK, "width": 2.5}
     traces.insert(3, make_line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))
     ticks = {1: "1", 1.5: "1.5", 2: "2", 3: "3", HIGHEST_RATIO: f"≥{HIGHEST_RATIO:g}", DIVERGED_RATIO: "div."}
-    y = log_axis("error / best of cell [1]", tickvals=list(ticks), ticktext=list(ticks.values()))
-    return make_plot(traces, _axis_of_values(name, every), y | {"range": [-0.02, math.log10(DIVERGED_RATIO) + 0.04]})
+    span = [-0.02, math.log10(DIVERGED_RATIO) + 0.04]
+    up = log_axis("error / best of cell [1]", tickvals=list(ticks), ticktext=list(ticks.values()), range=span)
+    return make_plot(traces, _axis_of_values(name, every), up)
 
 
 def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
@@ -150,11 +154,6 @@ def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     room = 0.04 * (high - low)
     title = f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
     return axis(escape_name(title), range=[low - room, high + room], nticks=3)
-
-
-def _correlation_words(frame: pd.DataFrame, name: str) -> str:
-    correlation = trial_rank_correlation(frame, name)
-    return f"rank correlation {fixed_text(correlation, 2)}" if math.isfinite(correlation) else "no rank correlation"
 
 
 def _yes_or_no(values: pd.Series[float]) -> bool:
@@ -182,8 +181,7 @@ def search_table(content: ReportContent) -> PageTable:
     frame, names = content.trials, searched_names(content)
     states = pd.crosstab(frame.N_D, frame.state).reindex(columns=["stopped", "diverged"], fill_value=0)
     groups = frame.groupby("N_D", sort=True)
-    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), seconds=groups.seconds.sum())
-    shown = shown.assign(epochs=groups.epochs.sum()) if frame.epochs.any() else shown
+    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), epochs=groups.epochs.sum())
     columns = {
         "N_D [1]": "N_D",
         "cells [1]": "cells",
@@ -200,12 +198,12 @@ def search_table(content: ReportContent) -> PageTable:
         span = f"{scientific_text(frame[name].min(), 2)} to {scientific_text(frame[name].max(), 2)}{unit}"
         tried.append(f"{name.replace('_', ' ')} {'yes or no' if _yes_or_no(frame[name]) else span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
-    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: "
-    takeaway += (
-        f"{stopped} stopped early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
+    takeaway = (
+        f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: {stopped} stopped "
     )
+    takeaway += f"early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
     takeaway += f" Tried: {', '.join(tried)}." if tried else ""
-    shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
+    shown = shown.assign(seconds=groups.seconds.sum(), each=groups.seconds.sum() / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
 
 

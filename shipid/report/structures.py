@@ -48,7 +48,7 @@ class StructuresContent(PageContent):
     def answer(self) -> list[AnswerSentence]:
         """The structure chosen, and the sentences on it."""
         words = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in self.sentences]
-        return [AnswerSentence(text, "structures" if i == 0 else "") for i, text in enumerate(words)]
+        return [AnswerSentence(text, "" if i else "structures") for i, text in enumerate(words)]
 
 
 def structures_table(content: StructuresContent) -> PageTable:

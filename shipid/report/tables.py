@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,7 +98,7 @@ def digits_cell(value: float, digits: int = 4) -> TableCell:
     return TableCell(scientific_text(value, digits), float(value)) if math.isfinite(value) else TableCell("–", MISSING)
 
 
-def note_cells(notes: Sequence[str]) -> list[TableCell]:
+def note_cells(notes: Iterable[str]) -> list[TableCell]:
     """Make cells of notes on what is missing, empty for none."""
     return [word_cell(note, bad=bool(note)) for note in notes]
 
