@@ -128,7 +128,6 @@ def _sum_of_squares(solution: Solution) -> float:
 
 
 def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
-    """The log of a point (x, y) [m], moved to the origin."""
     rows = move_origin(dataset.frame, LeverArm(kind="lever_arm", reason="a trial", x=x, y=y)).rows
     return replace(dataset, frame=rows)
 

@@ -74,7 +74,6 @@ def collinear_sets(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, 
 
 
 def _shrink_set(gram: Array, members: list[int]) -> list[int]:
-    """Remove members one by one while the collinearity index stays above the limit; the members that are left."""
     while len(members) > 2:
         without = [[smaller for smaller in members if smaller != gone] for gone in members]
         gammas = [_collinearity_index(gram, smaller) for smaller in without]

@@ -111,7 +111,6 @@ def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float] = (), limits: L
 
 
 def _excitation_candidates(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
-    """A speed run and a multisine at one approach speed [m/s], with the largest amplitudes within the limits."""
     n_rpm, passing = shaft_speed(Controls(vessel), speed) / RPM, length / speed
     swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
     if swing <= 0:

@@ -156,7 +156,6 @@ def _is_sound(states: Array) -> bool:
 
 
 def _state_series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:
-    """Rows of run, piece, model, its instants and its states (N + 1, channels), one part after the other."""
     runs, pieces, models, segments, states = zip(*parts, strict=True)
     lengths = [len(segment.t) for segment in segments]
     heads = {"run": runs, "piece": pieces, "model": models}

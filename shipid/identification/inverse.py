@@ -248,7 +248,6 @@ def _long_stretches(
     runs: Sequence[str],
     environment: Mapping[str, Mapping[str, float]],
 ) -> list[_Stretch]:
-    """Unbroken stretches of the runs that are long enough for one test function."""
     missing = next((name for name in runs if name not in dataset.runs), None)
     if missing is not None:
         raise DataError(f"no run {missing!r}", path="runs")

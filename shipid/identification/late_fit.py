@@ -104,7 +104,6 @@ def _actuated_commands(solution: Solution, dataset: Dataset) -> list[str]:
 
 
 def _lateness_causes(late: bool, gear: Sequence[str]) -> str:
-    """What makes commands late in a log, or early, and the remedy."""
     if not late:
         lag = "an actuator of the vessel is too fast" if gear else "the vessel lacks an actuator"
         return f"{lag}, or the log has the motion late: compare with --nuisance latency"

@@ -372,7 +372,6 @@ def _in_log(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
 
 
 def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for each estimate that no ship has, whether the fit or the rest of the document shows it."""
     judgements = {path: implausibility(vessel, path, values) for path in values}
     judgements |= {
         path: f"{path}: {words}; hold it, or give it a prior"
@@ -388,7 +387,6 @@ def _unusual_numbers(vessel: Vessel) -> dict[str, str]:
 
 
 def _no_estimate_reason(solution: Solution) -> str:
-    """Why no factor has an estimate, and what would give one."""
     if not solution.dropped:
         return "every parameter is at a bound or fixed: free more parameters, or widen bounds"
     remedy = f"give a drop of less than {solution.settings.drop:g}, or runs that excite them more"
@@ -398,7 +396,6 @@ def _no_estimate_reason(solution: Solution) -> str:
 
 
 def _errors_by_group(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
-    """Errors by side, helm and speed of free runs as long as the predictions that were fitted."""
     series = simulate_free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
     return by_group(series, AFTER, vessel, dataset)
 
@@ -423,7 +420,6 @@ def _compare_outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequenc
 
 
 def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
-    """Warnings on measured outputs that are not fitted."""
     for row in outputs.to_dict("records"):
         if row["output"] not in settings.weights:
             name, width = row["output"], f"{ACCURATE * row['measured']:.2g}"
@@ -433,7 +429,6 @@ def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterat
 def _extrapolated_manoeuvres(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]
 ) -> tuple[str, ...]:
-    """Sentences on standard manoeuvres in which the identified vessel goes beyond the data."""
     data = data_reach(vessel, dataset, runs)
     return tuple(
         filter(None, (extrapolation_sentence(title, of_log(vessel, log), data) for title, log in logs.items()))
@@ -578,7 +573,6 @@ def residual_spacing(solution: Solution) -> float:
 
 
 def _longest_run(solution: Solution) -> float:
-    """Length of the longest run [s]."""
     each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
     return max(float(np.ptp(times)) for times in each)
 
@@ -683,7 +677,6 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
 
 
 def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[str]:
-    """Warnings for profiles that contain a better fit than the estimate."""
     warnings = []
     for curve in curves:
         estimate = solution.factors[solution.paths.index(curve.path)]

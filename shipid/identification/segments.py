@@ -109,7 +109,6 @@ def too_short(dataset: Dataset, runs: Sequence[str], step: float, horizon: float
 
 
 def _num_steps(t: Array, step: float) -> int:
-    """Whole steps [s] within an unbroken stretch of rows at t (N,) [s]."""
     return int((t[-1] - t[0] + clock_slack(t)) / step)
 
 

@@ -276,7 +276,6 @@ def measured_constants(asked: Sequence[str], settings: Identify) -> set[str]:
 
 
 def _without_dimensions(asked: Sequence[str], settings: Identify) -> list[str]:
-    """The paths without dimensions and constants; DocumentError where there are no others."""
     known = measured_constants(asked, settings)
     if known == set(asked):
         message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
@@ -310,7 +309,6 @@ def _accepts_value(vessel: Vessel, path: str, value: float) -> bool:
 
 
 def _factor_groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str, ...]]:
-    """Free paths in the order of the vessel, paths of `together` in one group."""
     of: dict[str, int] = {}
     for number, patterns in enumerate(settings.together):
         key = f"together.{number}"

@@ -178,7 +178,6 @@ def _fit_dropping_factors(
     start: Mapping[str, float] | Solution | None,
     progress: Progress | None,
 ) -> Solution:
-    """One fit, and those after each dropped factor."""
     begun = time.perf_counter()
     problem = build_problem(vessel, dataset, runs, settings)
     result, objective_start = _search_from_starts(problem, dataset, start, progress)
@@ -279,7 +278,6 @@ def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
 
 
 def _same_shapes(point: Point, other: Point) -> bool:
-    """Whether two points have arrays of equal shapes."""
     return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
@@ -326,7 +324,6 @@ def _build_solution(problem: Problem, result: Result, objective_start: float, se
 
 
 def _estimate_refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
-    """The reason why the vessel's checks refuse the estimated values; None if they accept them."""
     try:
         vessel.with_values(values)
     except DocumentError as error:
@@ -335,7 +332,6 @@ def _estimate_refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None
 
 
 def _search_sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
-    """The status of a search in one sentence, with a remedy."""
     if result.status == "ok":
         limited = [path for path, there in zip(problem.unknown.paths, at_bound, strict=True) if there]
         tail = f"; at a bound, so without an interval: {', '.join(limited)}" if limited else ""
@@ -369,7 +365,6 @@ def _weakest_factor(solution: Solution, threshold: float, targets: Array) -> int
 
 
 def _hold_factor(problem: Problem, number: int, target: float) -> Problem:
-    """The problem with factor `number` held at the value `target`."""
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
     return replace(problem, unknown=replace(problem.unknown, low=low, high=high))

@@ -69,8 +69,7 @@ class LinearFit:
 
     paths, factors : names and estimates (n,), factors on the base values. centre : (n,) of the base: 0 where that is 0.
     residuals : (m,) predicted less measured over the declared standard deviation; of each run in the order of time.
-    jacobian : (m, n) d residual / d factor, per-run nuisances projected out. clusters, signals : run and signal of
-    each.
+    jacobian : (m, n) d residual / d factor, per-run nuisances projected out. clusters, signals : of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
     at_bound : (n,) estimates at a bound. held : (n,) factors that were not free. Neither has an interval.
@@ -247,7 +246,6 @@ def _fallback_covariance(covariances: Mapping[Kind, Covariance]) -> Kind:
 
 
 def _statistics_without_factors(fit: LinearFit) -> Statistics:
-    """Statistics of a fit without a free factor: infinite errors, nothing identified."""
     n = len(fit.paths)
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
     covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free")
@@ -267,7 +265,6 @@ def _free_places(fit: LinearFit) -> Index:
 
 
 def _restrict_fit(fit: LinearFit, free: Index) -> LinearFit:
-    """The linearisation with only the columns `free`; all other factors are held."""
     widths = _interval_half_widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
     return LinearFit(
@@ -642,7 +639,6 @@ def block_clusters(fit: LinearFit, length: float) -> Index:
 
 
 def _by_data_alone(fit: LinearFit) -> LinearFit:
-    """The linearisation of the fit without priors, which is one step of Gauss-Newton away; every factor is free."""
     step = -invert_information(fit.jacobian.T @ fit.jacobian)[0] @ (fit.jacobian.T @ fit.residuals)
     left = fit.residuals + fit.jacobian @ step
     return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=None)
@@ -667,7 +663,6 @@ def _width_inflation(fit: LinearFit, free: Index) -> Array:
 def _factor_sentences(
     fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], sets: Sequence[Combination]
 ) -> tuple[str, ...]:
-    """One sentence for each factor: its interval, or the reason why it has none."""
     free, sentences = _free_places(fit), list[str]()
     shared = _width_inflation(fit, free)
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):

@@ -147,7 +147,6 @@ def exchange_structure(
 
 
 def _rudders_behind_propellers(vessel: Vessel) -> dict[str, Mapping[str, Any]]:
-    """Dotted path -> block of every rudder behind a propeller."""
     return {
         f"thruster.{name}": block
         for name, block in vessel.document.get("thruster", {}).items()

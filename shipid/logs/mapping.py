@@ -157,8 +157,7 @@ class TimeColumn(StrictPart):
 class Clock(TimeColumn):
     """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
 
-    step : [s] between rows of the dataset, by interpolation. every : [s] between rows of the log, whose time is
-    rounded.
+    step : [s] between rows of the dataset, by interpolation. every : [s] between rows of the log, rounded in its time.
     """
 
     max_gap: float | None = Field(default=None, gt=0)

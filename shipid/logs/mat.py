@@ -23,8 +23,7 @@ MOST_SIGNALS = 100  # columns of a matrix that has fewer rows: more are times
 def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
     """The vectors of a MATLAB file that are as long as the clock, else as the longest with enough, as a table.
 
-    `attrs["other"]` says of every other variable what it is, and how to make a vector of it; `attrs["notes"]` are
-    sentences.
+    `attrs["other"]` says of other variables what they are, and how to make a vector; `attrs["notes"]` are sentences.
     """
     from scipy.io import loadmat
 

@@ -143,7 +143,6 @@ def _damaged_workbook(error: Exception, file: Path) -> DataError:
 
 
 def _cell_text(cell: Any) -> str:
-    """A cell as text."""
     if isinstance(cell, bool):
         return str(cell).upper()
     if isinstance(cell, date) and cell.year <= FIRST_YEAR:  # a time of day after a midnight

@@ -289,7 +289,7 @@ def _takeaway_map(shown: CellMap) -> str:
 
 def cells_without_result(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
-    by, every = ["model", "N_D"], content.cells.groupby(["model", "N_D"]).size()
+    by, every = ["model", "N_D"], content.cells.groupby(["model", "N_D"]).size().to_dict()
     bad = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
     names = [
         f"{key[0]} at N_D = {key[1]} ({failed.status.iloc[0]}"

@@ -85,7 +85,6 @@ def _command_groups(wanted: Sequence[str], idle: set[str], vessel: Vessel) -> li
 def _group_columns(
     state: State, names: Sequence[str], drafted: Sequence[Suggestion], tunnel: bool, vessel: Vessel
 ) -> dict[str, Suggestion]:
-    """Columns for the commands of a group, of those that are left."""
     if not names:
         return {}
     places = {name: _side_or_place(name, vessel) for name in names}
@@ -145,7 +144,6 @@ def _match_in_order(state: State, names: Sequence[str], columns: Sequence[Sugges
 def _ask_about_commands(
     state: State, names: Sequence[str], columns: Sequence[Suggestion], why: str
 ) -> dict[str, Suggestion]:
-    """Commands with columns one by one, as a guess, and the question whether it is so."""
     pairs = {
         name: replace(one, confidence=min(one.confidence, GUESSED)) for name, one in zip(names, columns, strict=False)
     }
@@ -231,13 +229,11 @@ def _missing_command(state: State, name: str, idle: set[str], vessel: Vessel) ->
 
 
 def _rename_output(one: Suggestion, components: dict[str, str]) -> Suggestion:
-    """An output of a component that has another name in the vessel."""
     component, dot, signal = one.name.partition(".")
     return replace(one, name=f"{components[component]}.{signal}") if dot and component in components else one
 
 
 def _place_in_name(name: str) -> str:
-    """Side or end in the name of a command; empty where there is none."""
     component = name.partition(".")[0]
     place = next((one for one in PLACES if component.lower() in words_of_side(one)), None) or side_in_name(component)
     return place if place in PLACES else ""
@@ -254,7 +250,6 @@ def _side_or_place(name: str, vessel: Vessel) -> str:
 
 
 def _side_of_component(name: str, vessel: Vessel) -> str:
-    """Side on which the vessel has the component of a command; empty on the centre line."""
     y = _lateral_position(name, vessel)
     return "port" if y < 0 else "starboard" if y > 0 else ""
 

@@ -161,7 +161,6 @@ def _unit_change_rows(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp
 
 
 def _from_to(state: State, first: int, end: int) -> str:
-    """Words for the rows from `first` until before `end`."""
     if state.joined:
         return "in a part of the files"
     begins, ends = (clock_text(state, float(state.t[row])) for row in (first, min(end, len(state.t) - 1)))

@@ -207,7 +207,6 @@ def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | N
 
 
 def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
-    """The clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
     finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
     rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
     called = [name for name in columns if is_clock(name)]
@@ -363,7 +362,6 @@ def column_called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
 
 
 def _date_column(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
-    """The first column that holds a date in every row, without a time; one of numbers is called a clock."""
     for name in sorted(filter(None, map(str, table.columns)), key=lambda name: name in columns):
         if name in columns and not (is_clock(name) and len(np.unique(columns[name])) <= max(1, len(table) // ROWS)):
             continue
@@ -485,7 +483,6 @@ def _is_time_of_day(values: Array) -> bool:
 
 
 def _is_coarse(t: Array) -> bool:
-    """Whether the steps of a rising clock differ as if it were rounded: they take few values, a quantum apart."""
     steps = np.diff(t)
     usual = float(np.median(steps))
     spread = float(np.percentile(np.abs(steps - usual), 90))
@@ -535,7 +532,6 @@ def _roundest_number(value: float, slack: float) -> float:
 
 
 def _is_row_counter(values: Array) -> bool:
-    """Whether a column only counts rows."""
     return bool(np.all(np.diff(values) == 1.0) and values[0] in (0.0, 1.0))
 
 

@@ -161,7 +161,6 @@ def _ask_for_clock(state: State, name: str) -> None:
 
 
 def _report_run_parts(state: State, source: GuessFiles) -> None:
-    """Report how files of several runs are parted."""
     column, pause = source.parts.get("from"), source.parts.get("pause")
     said = [f"column {column!r} says them"] if column else []
     said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []

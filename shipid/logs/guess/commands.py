@@ -127,7 +127,6 @@ def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> boo
 
 
 def _ask_if_opposite(state: State) -> None:
-    """Ask where the angles of port and of starboard are seen to turn the ship to opposite sides."""
     angles = [one for one in state.suggestions if is_command(one.name) and one.source in state.turning]
     for port, starboard in product(angles, angles):
         sides = state.side_of(port.source), state.side_of(starboard.source)
@@ -285,7 +284,6 @@ def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
 
 
 def _runs_astern(state: State, name: str) -> bool:
-    """Whether a shaft speed is negative nearly always when the ship goes ahead: one that counts the other way."""
     if state.psi is None or state.position is None:
         return False
     middle = (state.chosen.first + state.chosen.last) // 2

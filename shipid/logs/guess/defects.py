@@ -119,7 +119,6 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
 
 
 def _piles_up(values: Array, limit: float) -> bool:
-    """Whether a signal (N,) stops at a limit: there are far more rows than near it, in several visits."""
     near = np.abs(values - limit)
     levels = np.unique(near)
     if limit == 0 or len(levels) < LEVELS:
@@ -194,7 +193,6 @@ def _same_as(state: State, heading: str) -> tuple[str, float] | None:
 
 
 def _value_step(values: Array) -> float:
-    """The least step between two values of a column."""
     steps = np.diff(np.unique(values))
     return float(steps.min()) if len(steps) else 0.0
 
@@ -347,7 +345,6 @@ def _steady_current(seen: Complex, ran: Complex) -> tuple[complex, float]:
 
 
 def _signal_delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | None:
-    """Delay of a signal (N,) behind the integral of its rate; None where none is sure."""
     holes = np.flatnonzero(np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))) + 1
     parts = [np.split(values, holes) for values in (state.t, np.asarray(seen, dtype=complex), integrated)]
     delay = measure_delay(zip(*parts, strict=True))
@@ -396,7 +393,6 @@ def clock_text(state: State, t: float) -> str:
 
 
 def _report_heading_offset(state: State) -> None:
-    """Report a heading offset: by all courses, beside a steady current, or by the straightest runs."""
     assert state.psi is not None
     angle, error, current = _off_on_all_courses(state)
     if error < CLEAR:
@@ -453,7 +449,6 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
 
 
 def _row_times(state: State, rows: NDArray[np.intp]) -> str:
-    """Where some rows are, in words: the first times, or how many in the files."""
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
     if state.joined:
         return f"in {count} of the files"

@@ -81,7 +81,6 @@ def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any],
 
 
 def _has_clock(lines: str) -> bool:
-    """Whether one of the first lines of a sheet has the name of a clock in a cell."""
     first = lines.split("\n", LOOKED_AT)[:LOOKED_AT]
     return any(
         is_clock(cell) for line in first for cell in split_cells(line, SEPARATOR) if cell and not _is_number(cell)
@@ -239,7 +238,6 @@ def _header_above(heads: list[list[str]]) -> list[str]:
 
 
 def _header_meaning(names: list[str]) -> float:
-    """How much the names of columns say: the sum of how well they fit a quantity, or a clock."""
     known = {name for name in names if name}
     return sum(
         1.0 if is_clock(name) else max([0.0, *(meaning_scores(name)[one] for one in meaning_scores(name) if one)])
@@ -248,12 +246,10 @@ def _header_meaning(names: list[str]) -> float:
 
 
 def _with_unit(name: str, unit: str) -> str:
-    """A name with its unit in brackets."""
     return f"{name} [{unit.strip('[]()')}]" if unit else name
 
 
 def _date_and_time(row: list[str]) -> int | None:
-    """The index of a cell that is a date before a time of day; None where there is none."""
     pairs = enumerate(itertools.pairwise(row))
     return next(
         (k for k, (one, other) in pairs if re.fullmatch(DAY_OF, one) and re.fullmatch(TIME_OF_DAY, other)), None
@@ -272,7 +268,6 @@ def _distinct_columns(names: list[str]) -> list[str]:
 
 
 def _is_units(row: list[str]) -> bool:
-    """Whether the cells of a line are units."""
     words = [cell.lower() for cell in row if cell]
     fitting = sum(bool(_UNIT.match(cell)) for cell in words)
     return len(words) >= 2 and fitting >= 0.7 * len(words)
@@ -314,7 +309,6 @@ def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | Non
 
 
 def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
-    """The share of cells that are numbers, with a unit or without, or positions; empty ones are not counted."""
     cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
     grouped = re.compile(grouped_number(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]

@@ -246,7 +246,6 @@ def _fitted_speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: 
 
 
 def _is_speed_unit(scale: float) -> bool:
-    """Whether a scale is nearly that of a unit of speed."""
     away = {unit: abs(scale / factor - 1) for unit, factor in UNITS["m/s"].items()}
     return any(distance < (OFF_UNIT if unit in PLAIN else OFF_RARE) for unit, distance in away.items())
 
@@ -263,7 +262,6 @@ def _clock_unit(state: State, ratio: float) -> str | None:
 def _report_factor(
     state: State, remains: bool, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...] = ("u", "v")
 ) -> None:
-    """Report a factor that remains after the unit: shown by the rounding of the values, or larger than its error."""
     pair = " and ".join(repr(source) for source in sources)
     begins = f"the track is {fit.scale:.4g} times the integral of {pair} in {unit}"
     if (other := _clock_unit(state, fit.scale)) is not None:
@@ -502,7 +500,6 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
 
 
 def _take_ais(state: State, change: Complex, name: str) -> None:
-    """Decode, in place, a rate of turn that is in numbers of AIS: so its integral is the heading, and not as it is."""
     coded = state.columns[name]
     if unit_in_name(name, "rad/s") is not None or np.abs(coded).max() > 128 or np.mean(coded % 1 == 0) < WHOLE:
         return

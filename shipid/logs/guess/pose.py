@@ -209,7 +209,6 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
 
 
 def _by_course(state: State, best: Pose) -> Pose:
-    """The hypothesis in the frame of a course over ground, which counts clockwise from north."""
     track = state.chosen.change(local_plane(state, best.north, best.east, on_globe=False))
     size = float(np.sum(np.abs(track)))
     middle = (state.chosen.first + state.chosen.last) // 2
@@ -236,7 +235,6 @@ def _by_course(state: State, best: Pose) -> Pose:
 
 
 def _by_velocities(state: State, best: Pose) -> Pose:
-    """The hypothesis in the frame of velocities named north and east, whose integral is the track."""
     pairs = [
         (north, east)
         for north in state.called("velocity_north")
@@ -305,8 +303,7 @@ def _best_pose(
 ) -> Pose | None:
     """The hypothesis of least cost among pairs of position and columns of heading, in degrees or radians.
 
-    A misfit counts against the spread of the heading. rated : what another column, integrated, leaves unexplained of
-    it.
+    A misfit counts against the spread of the heading. rated : what another column, integrated, leaves of it.
     """
     middle = (state.chosen.first + state.chosen.last) // 2
     thin = max(1, len(middle) // limit)
@@ -342,14 +339,12 @@ def _best_pose(
 
 
 def _is_in_deg(name: str, values: Array) -> bool:
-    """Whether a column of a compass takes all angles of a turn in degrees, and its name says no other unit."""
     low, high = float(values.min()), float(values.max())
     whole = (0.0 <= low < FIRST and LAST < high <= 360.0) or (-180.0 <= low < FIRST - 180 and LAST - 180 < high <= 180)
     return whole and _is_compass(name) and unit_in_name(name, "rad") is None
 
 
 def _search_pose(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:
-    """The best hypothesis among all columns, names apart; a heading is rather one whose rate is a column."""
     meanings = ("north", "east", "x", "y", "latitude", "longitude", "psi")
     free = [name for name in state.eligible(*meanings) if len(np.unique(state.columns[name][:2000])) > 10][:SEARCHED]
     rated = _columns_with_rate(state, free)
@@ -381,7 +376,6 @@ def _search_pose(state: State, pairs: list[tuple[str, str, bool, float]], headin
 
 
 def _may_be_globe(state: State, north: str, east: str) -> bool:
-    """Whether two columns without names may be latitude and longitude: small changes about a place on the Earth."""
     a, b = state.columns[north], state.columns[east]
     if (
         not _named_as_latitude(state, north, east)

@@ -88,11 +88,10 @@ ROWS_EACH, MOST_NUMBERS = 5, 20  # rows of each ship, on average, at least; ship
 class LogTable:
     """An unknown log as numbers: how it is written, its clock and all other columns, NaN where a value is missing.
 
-    form, clock : keys of [format] and [clock]. t : [s], rising. notes : sentences on columns left out. seams : places
-    where rows were not read, or runs begin. runs : column that says the run, and the number of runs, where the clock
-    begins
-    again with each. sides : letters that columns beside positions hold. words : columns of words, with their first.
-    other : columns that cannot be read, and why. doubts : questions on dates. in_parts : columns made of several.
+    form, clock : keys of [format] and [clock]. t : [s], rising. notes : sentences on columns left out.
+    seams : places where rows were not read, or runs begin. runs : column that says the run, and their number, where the
+    clock begins again with each. sides : letters that columns beside positions hold. words : columns of words, with
+    their first. other : columns that cannot be read, and why. doubts : questions on dates. in_parts : of several.
     """
 
     form: dict[str, Any]

@@ -25,8 +25,7 @@ class GuessFiles:
     """The files of a guess.
 
     path : the file, or the folder. pattern : key `runs` of [source]; None for a single file. files : run -> file.
-    skipped : files left out, with the reason. manoeuvres : run -> kind. parts : keys of [parts]; empty for one run a
-    file.
+    skipped : files left out, with the reason. manoeuvres : run -> kind. parts : keys of [parts]; else empty.
     held : runs that this gives. sniffed : all rows, as of one log.
     """
 
