@@ -19,14 +19,15 @@ import plotly.graph_objects as go
 
 from shipid.arguments import check_class, check_number
 from shipid.errors import ShipidError
-from shipid.report import bands, checks, errors_over, identification, logs, manoeuvre, paths, physics_and_data
-from shipid.report import factors as models
-from shipid.report import search as trials
-from shipid.report.checks import CheckContent
-from shipid.report.content import ReportContent
+from shipid.report import paths
+from shipid.report.checks import CHECK_PAGE, CheckContent
+from shipid.report.content import PageContent, ReportContent
 from shipid.report.figure import PageFigure, draw_alone, dress_panels
-from shipid.report.identification import IdentificationContent
-from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
+from shipid.report.manoeuvre import MANOEUVRE_PAGE, ManoeuvreContent
+from shipid.report.page import Section
+from shipid.report.physics_and_data import gain_lack, map_lack
+from shipid.report.sections import SECTIONS
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -37,6 +38,12 @@ if TYPE_CHECKING:
     Source = Results | ReportContent | pd.DataFrame
 
 Statistic = Literal["mean", "90th percentile", "root mean square"]
+PAGES: dict[type[PageContent], dict[str, Section]] = {
+    ReportContent: SECTIONS,
+    CheckContent: CHECK_PAGE,
+    IdentificationContent: IDENTIFICATION_PAGE,
+    ManoeuvreContent: MANOEUVRE_PAGE,
+}
 ABSENT_COLUMNS: dict[str, Any] = {"family": "given", "seed": 0, "status": "ok"} | dict.fromkeys(
     ("A", "A_90", "A_rms", "H_90", "rms"), np.nan
 )
@@ -69,7 +76,7 @@ __all__ = [
 def error_map(source: Source, *, dark: bool = False) -> go.Figure:
     """H over the accuracy A of the physics and the amount of data N_D; needs several N_D and two physics models."""
     content = content_of(source)
-    return _draw(physics_and_data.map_figure(content), dark=dark, lack=physics_and_data.map_lack(content))
+    return _draw("map", content, dark=dark, lack=map_lack(content))
 
 
 def gain(
@@ -81,19 +88,18 @@ def gain(
 ) -> go.Figure:
     """H over N_D, a line per model; from the physics alone (N_D = 0) where there is a single N_D."""
     content = content_of(source)
-    figure, lack = physics_and_data.gain_figure(content), physics_and_data.gain_lack(content)
-    return _draw(figure, [statistic, scale], dark=dark, lack=lack)
+    return _draw("gain", content, [statistic, scale], dark=dark, lack=gain_lack(content))
 
 
 def coverage(source: Source, N_D: int | None = None, *, dark: bool = False) -> go.Figure:
     """Share of whole test paths in their bands over the share promised, with intervals; `N_D` default: the most."""
-    return _draw(bands.coverage_figure(content_of(source)), [N_D], dark=dark)
+    return _draw("coverage", content_of(source), [N_D], dark=dark)
 
 
 def width_map(source: Source, *, dark: bool = False) -> go.Figure:
     """Mean radius of the bands over the accuracy A of the physics and the amount of data N_D."""
     content = content_of(source)
-    return _draw(bands.width_figure(content), dark=dark, lack=physics_and_data.map_lack(content))
+    return _draw("width-map", content, dark=dark, lack=map_lack(content))
 
 
 def error_over_horizon(
@@ -104,12 +110,12 @@ def error_over_horizon(
     dark: bool = False,
 ) -> go.Figure:
     """Error over the time ahead, of position [m] or course [deg]; `N_D` default: the most."""
-    return _draw(errors_over.horizon_figure(content_of(source)), [statistic, N_D], dark=dark)
+    return _draw("horizon", content_of(source), [statistic, N_D], dark=dark)
 
 
 def error_over_time(source: Source, run: str | None = None, *, dark: bool = False) -> go.Figure:
     """Position error at each instant of prediction of a test run, with its commands below; with the largest N_D."""
-    return _draw(errors_over.time_figure(content_of(source)), [run], dark=dark)
+    return _draw("over-time", content_of(source), [run], dark=dark)
 
 
 def prediction(
@@ -134,22 +140,22 @@ def prediction(
 
 def factors(source: Source, *, dark: bool = False) -> go.Figure:
     """Factors of the perturbed numbers of every model, as dots on a logarithmic axis."""
-    return _draw(models.factors_figure(content_of(source)), dark=dark)
+    return _draw("factors", content_of(source), dark=dark)
 
 
 def tracks(source: Source, *, dark: bool = False) -> go.Figure:
     """Map of the tracks of all runs, north up; runs of the test in another colour than all others."""
-    return _draw(logs.tracks_figure(content_of(source)), dark=dark)
+    return _draw("manoeuvres", content_of(source), dark=dark)
 
 
 def envelope(source: Source, *, dark: bool = False) -> go.Figure:
     """Least, mean and greatest value of every input, per set of runs."""
-    return _draw(logs.envelope_figure(content_of(source)), dark=dark)
+    return _draw("envelope", content_of(source), dark=dark)
 
 
 def search(source: Source, N_D: int | Literal["all"] | None = None, *, dark: bool = False) -> go.Figure:
     """Error of the trials of the search over each hyperparameter."""
-    return _draw(trials.search_figure(content_of(source)), [] if N_D is None else [N_D], dark=dark)
+    return _draw("search", content_of(source), [] if N_D is None else [N_D], dark=dark)
 
 
 def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool = False) -> go.Figure:
@@ -161,60 +167,63 @@ def motion(source: Dataset | CheckContent, run: str | None = None, *, dark: bool
         from shipid.data.contents import check_content
 
         content = check_content("log", source, check_dataset(source))
-    return _draw(checks.checked_motion(content.series), [run], dark=dark)
+    return _draw("motion-figure", content, [run], dark=dark)
 
 
 def estimates(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Estimates of an identification with 95 % intervals, as factors on the base values."""
-    return _draw(identification.estimates_figure(_identification(source)), dark=dark)
+    return _draw("estimates", _identification(source), dark=dark)
 
 
 def correlations(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Correlations of the estimates of an identification; needs two of them."""
-    return _draw(identification.correlations_figure(_identification(source)), dark=dark)
+    return _draw("correlations", _identification(source), dark=dark)
 
 
 def free_runs(
     source: Identification | IdentificationContent, run: str | None = None, *, dark: bool = False
 ) -> go.Figure:
     """Measured motion of a run (default: the first), and free runs of the vessel before and after identification."""
-    return _draw(identification.free_runs_figure(_identification(source)), [run], dark=dark)
+    return _draw("free-runs", _identification(source), [run], dark=dark)
 
 
 def residuals(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Autocorrelation of the residuals of an identification."""
-    return _draw(identification.residuals_figure(_identification(source)), dark=dark)
+    return _draw("residuals", _identification(source), dark=dark)
 
 
 def profiles(source: Identification | IdentificationContent, *, dark: bool = False) -> go.Figure:
     """Profile likelihoods of an identification, of the paths that were asked for."""
-    return _draw(identification.profiles_figure(_identification(source)), dark=dark)
+    return _draw("profiles", _identification(source), dark=dark)
 
 
 def track(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Track of a standard manoeuvre, north up, ship to scale."""
-    return _draw(manoeuvre.track_figure(_manoeuvre(source)), dark=dark)
+    return _draw("track", _manoeuvre(source), dark=dark)
 
 
 def histories(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Heading, helm, speeds and yaw rate of a standard manoeuvre over time."""
-    return _draw(manoeuvre.histories_figure(_manoeuvre(source)), dark=dark)
+    return _draw("histories", _manoeuvre(source), dark=dark)
 
 
 def spiral(source: MeasuredManoeuvre | ManoeuvreContent, *, dark: bool = False) -> go.Figure:
     """Steady yaw rate over helm angle, of a spiral."""
-    return _draw(manoeuvre.spiral_figure(_manoeuvre(source)), dark=dark)
+    return _draw("spiral", _manoeuvre(source), dark=dark)
 
 
 def _draw(
-    figure: PageFigure | None,
+    name: str,
+    content: PageContent,
     chosen: Sequence[object] = (),
     *,
     dark: bool,
     lack: str = "the results hold no rows for it",
 ) -> go.Figure:
-    """Draw a figure of a page; ShipidError where there is none, with what the source lacks for it."""
-    if figure is None:
+    """Draw a figure of a page by its id; ShipidError where there is none, with what the source lacks for it."""
+    section = next(one for one in PAGES[type(content)].values() if name in one.items)
+    figure = section.draw_item(name, content)
+    if not isinstance(figure, PageFigure):
         raise ShipidError(f"there is nothing to draw: {lack}", path="figures")
     return draw_alone(figure, chosen, dark=dark)
 

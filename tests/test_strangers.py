@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,7 +9,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.study.first_look import first_look
 from shipid.vessel.template import Particulars, first_guess
-from tests.benchmarks.strangers import Desk, Stopped, true_dataset
+from tests.benchmarks.strangers import true_dataset
 from tests.strangers import Stranger, stranger
 from tests.strangers_raw import RawStranger, raw_stranger
 
@@ -26,15 +24,6 @@ def ship() -> Stranger:
 @pytest.fixture(scope="module")
 def raw(tmp_path_factory: pytest.TempPathFactory) -> RawStranger:
     return raw_stranger(611, tmp_path_factory.mktemp("raw"), 3)
-
-
-def test_a_seed_makes_one_ship(ship: Stranger) -> None:
-    again = stranger(SEED, 4)
-    assert again.truth.digest == ship.truth.digest
-    assert again.dataset.digest == ship.dataset.digest
-    assert "V_c" not in ship.dataset.frame
-    assert "V_w" not in ship.dataset.frame
-    assert len(ship.dataset.runs) == 4
 
 
 @pytest.mark.slow
@@ -65,11 +54,3 @@ def test_orders_of_the_truth_are_found_for_an_import(raw: RawStranger, way: int)
     pd.testing.assert_frame_equal(found[commands], frame[commands])
     moved = ["north", "east", "psi", "v", "r"]
     np.testing.assert_allclose(found[moved], frame[moved], atol=1e-6 * float(np.abs(place).max()))
-
-
-def test_a_command_that_fails_stops_the_desk(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    with pytest.raises(Stopped, match=r"import: error: .*none\.toml"):
-        desk.type("import", "data", "import", "none.toml", "raw")
-    assert desk.commands == ["data import none.toml raw"]
-    assert desk.stage == ""

@@ -17,8 +17,7 @@ from shipid.errors import ResultError
 from shipid.files import write_table, write_text
 from shipid.metrics import summarise_errors
 from shipid.report import AnswerSentence, ReportContent, ReportFinding, write_report, write_summary
-from shipid.report.comparison import write_comparison
-from shipid.report.methods import MethodsContent, sentences_on_methods
+from shipid.report.methods import MethodsContent, sentences_on_methods, write_comparison
 from shipid.study import store
 from shipid.study.declared import NO_MODEL
 from shipid.study.lock import PAGES, sole_writer

@@ -37,7 +37,7 @@ def replay_command(
     from shipid.identification.late import late_commands
     from shipid.identification.outcome import pick_runs
     from shipid.identification.segments import too_short
-    from shipid.report.replay import REPLAYED, ReplayContent, write_replay
+    from shipid.report.motion import REPLAYED, ReplayContent, write_replay
 
     file = check_output(out or Path(f"{document_stem(vessel)}-replay.html"), endings=(".html",))
     if not step > 0:

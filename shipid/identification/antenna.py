@@ -51,7 +51,7 @@ class Antenna:
 def locate_antenna(solution: Solution, dataset: Dataset) -> Antenna | None:
     """The point that the log looks to be of; None where it is estimated already, or cannot be computed.
 
-    What one step of Gauss-Newton shows is fitted again with the log moved to the origin: arms are not linear.
+    A step of Gauss-Newton is fitted again with the log moved to the origin.
     """
     length = solution.vessel.length
     if length is None or "lever_arm" in solution.settings.widths:
@@ -73,10 +73,7 @@ def step_antenna(
 ) -> Antenna | None:
     """The point after one step of Gauss-Newton with the factors; None where predictions diverge, or rows are too few.
 
-    At a point (x, y) the ship goes u - y r along and v + x r across. The residuals of the log moved a little forward
-    and a little to starboard give the derivatives, and the statistics of a fit the interval.
-
-    at : [m] from where the log has been moved to the origin.
+    At (x, y) the ship goes u - y r along and v + x r across. at : [m] from where the log has been moved to the origin.
     """
     free = ~(solution.held | solution.at_bound)
     arms = ((ARM * length, 0.0), (0.0, ARM * length))
@@ -131,7 +128,6 @@ def _sum_of_squares(solution: Solution) -> float:
 
 
 def _to_origin(dataset: Dataset, x: float, y: float) -> Dataset:
-    """The log of a point (x, y) [m], moved to the origin."""
     rows = move_origin(dataset.frame, LeverArm(kind="lever_arm", reason="a trial", x=x, y=y)).rows
     return replace(dataset, frame=rows)
 

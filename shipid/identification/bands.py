@@ -1,12 +1,10 @@
 """Bands on standard manoeuvres of an identified vessel: what the uncertainty of its numbers leaves open.
 
-The covariance of the factors is split into its principal axes. The vessel performs each manoeuvre with its factors one
-standard deviation to either side along each axis. Half the difference of a measure is its linear part by that axis,
-the mean of both sides less the estimate its bend. A normal error has the variance of the linear part squared and twice
-the bend squared, and shifts the mean by the bend; the axes add up. A band reaches Student's quantile of so many
-standard deviations to both sides of the measure of the estimate, and further by the shift on its side.
-
-A band says what noise in the trials leaves open. It does not hold what the structure of the equations cannot follow.
+The vessel performs each manoeuvre one standard deviation to either side along each principal axis of the covariance.
+Half the difference of a measure is its linear part, the mean of both less the estimate its bend: the variance is the
+linear part squared plus twice the bend squared, the mean shifts by the bend; axes add up. A band reaches Student's
+quantile of standard deviations to both sides, and by the shift further. It does not hold what the equations cannot
+follow.
 """
 
 from __future__ import annotations
@@ -42,10 +40,7 @@ def check_level(level: float | None) -> None:
 def short_horizon(solution: Solution, judged: Statistics, spacing: float) -> str:
     """Sentence where the horizon is short against what the residuals remember; empty where it is not.
 
-    Free starts of short segments then take in a part of the process noise, and pull the factors by what no interval
-    shows: `docs/identification-coverage.md`.
-
-    spacing : time between residuals of one signal [s].
+    spacing : time between residuals of one signal [s]. See `docs/identification-coverage.md`.
     """
     horizon = solution.settings.horizon
     longest = max((one.memory * spacing for one in judged.whiteness.values() if not one.white), default=0.0)
@@ -80,15 +75,8 @@ def measure_bands(
 ) -> pd.DataFrame:
     """Band of every measure of some manoeuvres: `manoeuvre`, `measure`, `value`, `deviation`, `low`, `high`, `note`.
 
-    Parameters
-    ----------
-    vessel : the base, whose factors the solution holds.
-    measures : title of a manoeuvre, and what performs it: vessel -> measure -> value. ShipidError where it cannot.
-    level : share of such bands that hold the truth.
-
-    Raises
-    ------
-    DataError : the level is not between 0 and 1.
+    vessel : the base. measures : title of a manoeuvre, and what performs it: vessel -> measure -> value.
+    level : share of such bands that hold the truth; DataError where it is not between 0 and 1.
     """
     check_level(level)
     free = np.flatnonzero(~(solution.at_bound | solution.held))

@@ -1,12 +1,11 @@
 """Collinearity of sensitivities: which parameters the data distinguish, and which only in combination.
 
-Columns are scaled to unit length, so that nothing depends on units. The collinearity index of a set K is
+Columns are scaled to unit length. The collinearity index of a set K is
 
-    gamma_K = 1 / sqrt(smallest eigenvalue of S_K^T S_K)
+gamma_K = 1 / sqrt(smallest eigenvalue of S_K^T S_K)
 
-gamma above 10 to 15: the other parameters can compensate a change of one parameter to within 1 / gamma. It does not
-depend on the noise: collinear parameters may still be identified from enough good data. So it explains a wide interval
-and is no criterion by itself.
+gamma above 10 to 15: the others compensate a change of one parameter to within 1 / gamma. It does not depend on the
+noise, so it explains a wide interval and is no criterion by itself.
 
 Source: Brun, Reichert, Kuensch, Water Resources Research 37 (2001) 1015, eq. 10.
 """
@@ -32,9 +31,9 @@ UNSEEN = 1e-10  # of the largest eigenvalue, with columns of unit length: below 
 class Combination:
     """A set of parameters of which the data determine only a combination.
 
-    paths : dotted paths of the parameters. names : the shortest unambiguous names.
-    weights : relative change of each factor along the direction that leaves the residuals unchanged; the largest is 1.
-    gamma : collinearity index of the set; infinite for a parameter without any effect.
+    names : short ones. weights : relative change of each factor along the direction that leaves the residuals
+    unchanged;
+    the largest is 1. gamma : collinearity index; infinite for a parameter without any effect.
     """
 
     paths: tuple[str, ...]
@@ -56,9 +55,7 @@ class Combination:
 def collinear_sets(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, ...]:
     """Smallest sets with a collinearity index above `MOST_COLLINEAR`; worst first.
 
-    Backward elimination: parameters are removed one by one, each time the one whose removal leaves the most collinear
-    rest, until every further removal brings the index below that. What is left is one set. Its parameter with the
-    greatest weight is then excluded, and the search is repeated.
+    Backward elimination; the parameter of greatest weight of a set is then excluded, and the search is repeated.
     """
     lengths = np.sqrt((jacobian**2).sum(axis=0))
     silent = np.flatnonzero(lengths <= UNSEEN * lengths.max(initial=0.0)).tolist()
@@ -77,7 +74,6 @@ def collinear_sets(jacobian: Array, paths: Sequence[str]) -> tuple[Combination, 
 
 
 def _shrink_set(gram: Array, members: list[int]) -> list[int]:
-    """Remove members one by one while the collinearity index stays above the limit; the members that are left."""
     while len(members) > 2:
         without = [[smaller for smaller in members if smaller != gone] for gone in members]
         gammas = [_collinearity_index(gram, smaller) for smaller in without]

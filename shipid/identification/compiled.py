@@ -94,7 +94,7 @@ def pack_lanes(array: Array) -> Array:
 def run_compiled(layout: FitLayout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
     """Outputs (groups, lanes, N, .) of K predictions, by the compiled library.
 
-    x : (K, size) initial states with their sensitivities. fixed : (K, .) numbers that are constant along a prediction.
+    x : (K, size) initial states with their sensitivities. fixed : (K, .) constants of each prediction.
     known, seen : inputs and measured signals of each step, grouped by `pack_lanes`: (groups, N, ., lanes).
     """
     run, model = _compile_variation(layout), build_variation(layout)

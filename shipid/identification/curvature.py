@@ -1,14 +1,10 @@
 """Curvature of a fit: whether the linear 95 % interval of a factor holds, by one step of its profile on each side.
 
-The factor is moved to an end of its interval, the others with it along the linear regression on it, the column of the
-covariance. There the fit is linearised again: residuals e, Jacobian J_o of the other factors. The objective that is
-left when these are fitted anew by one step of Gauss-Newton, |e|^2 - |P e|^2 with P the projection on J_o, rises by
-h^2 / a where the problem is linear (h the half-width, a the variance of the factor for the declared deviations). Where
-it rises by q times that, the end of the interval is about 1 / sqrt(q) times as far from the estimate; rather more where
-q is below 1, for the profile goes on flattening.
-
-This costs one prediction of all runs for each end. The curvatures of Bates and Watts need second derivatives in all
-directions; what matters to an interval is the curvature along its own direction (Cook, Witmer), and a profile has it.
+The factor is moved to an end of its interval, the others with it along their regression on it. The fit is linearised
+there: residuals e, Jacobian J_o of the others. After a step of Gauss-Newton of these the objective |e|^2 - |P e|^2, P
+the projection on J_o, has risen by h^2 / a where the problem is linear (h the half-width, a the variance of the factor
+for the declared deviations). Where it rises by q times that, the end is about 1 / sqrt(q) times as far. This costs one
+prediction of all runs for each end.
 
 Sources: Bates, Watts, Journal of the Royal Statistical Society B 42 (1980) 1, and Nonlinear Regression Analysis (1988),
 ch. 6 (profile t); Cook, Witmer, The American Statistician 39 (1985) 119 (parameters one by one); Donaldson, Schnabel,
@@ -46,10 +42,10 @@ RANK = 1e-9  # relative, of a Jacobian
 
 
 def interval_end_ratios(judged: Statistics, at: Beside, profiled: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
-    """Factor -> how many times as far its lower and its upper end are from the estimate as those of its interval.
+    """Factor -> how many times as far its lower and upper end are from the estimate as those of its interval.
 
-    Of identified factors, except those whose interval is narrow and those `profiled`. At most `MOST`; 0 where a
-    prediction diverges at the end: a profile counts that as outside, too.
+    Of identified factors, but those with a narrow interval or `profiled`; at most `MOST`. 0 where a prediction
+    diverges.
     """
     fit, wide = judged.fit, _wide_factors(judged, profiled)
     if not wide:
@@ -108,7 +104,7 @@ def curvature_warning(
 ) -> str:
     """The sentence on intervals that are too short; none: empty.
 
-    profiled : factors that have a profile already. go_on : called before each prediction; what it raises ends the look.
+    profiled : factors that have a profile. go_on : called before each prediction; what it raises ends the look.
     """
     if not _wide_factors(judged, profiled):
         return ""

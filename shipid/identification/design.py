@@ -1,15 +1,12 @@
 """Experiment design: the manoeuvre with the greatest expected information gain (Bayesian D-optimality).
 
-Each candidate is simulated with the present parameters and cut into predictions of one horizon, as in the fit. All
-predictions are replayed with the recorded orders by one rollout with every perturbed parameter set. Central differences
-give the sensitivities J of the measured signals. The unknown initial state of every prediction is projected out.
-The candidate adds J^T J to the present information M. Its gain is
+Each candidate is simulated with the present parameters, cut into predictions of one horizon, and replayed with every
+perturbed parameter set: central differences give the sensitivities J of the measured signals, free initial states are
+projected out. Added to the present information M it gains
 
-    gain = 1/2 log2 det(M + J^T J) / det(M)     bits,
+gain = 1/2 log2 det(M + J^T J) / det(M)     bits.
 
-the expected information of a linear model with normal errors. The design is local: it holds near the present
-parameters and where the model is valid, so its gain is unreliable for motions unlike the fitted ones (astern, a stop).
-Ranking by bits per hour favours short runs, because the gain grows ever more slowly with the length of a run.
+The design is local: unreliable for motions unlike the fitted ones (astern, a stop). Bits per hour favour short runs.
 
 Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Verdinelli, Statistical Science 10 (1995)
 273; Goodwin, Payne, Dynamic System Identification (1977), ch. 6.
@@ -86,10 +83,7 @@ class InformedCandidate:
 
 
 def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tuple[float, Limits]:
-    """Median speed [m/s] of some runs, and as limits the greatest speed of the shafts that drive the ship ahead.
-
-    A tunnel thruster turns faster, and is none of these.
-    """
+    """Median speed [m/s] of some runs, and as limits the greatest speed of the shafts that drive the ship ahead."""
     rows = dataset.frame[dataset.frame["run"].isin(list(runs))]
     shafts = Controls(vessel).effects[0]
     limits = Limits(n_rpm=max(float(rows[name].abs().max()) for name in shafts) / RPM) if shafts else Limits()
@@ -97,10 +91,9 @@ def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tu
 
 
 def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float] = (), limits: Limits | None = None) -> list[Candidate]:
-    """Candidate manoeuvres at each approach speed [m/s] that respect the limits.
+    """Candidate manoeuvres at each approach speed [m/s] that respect the limits; default: Froude numbers 0.1 and 0.2.
 
-    At each speed: zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in which
-    only the shaft speed changes, in steps. Default speeds: Froude numbers 0.1 and 0.2.
+    Zigzags, turning circles, a pull-out, a stop, a multisine of helm and shaft, and a speed run in steps of the shaft.
     """
     length = vessel.length
     if length is None:
@@ -118,7 +111,6 @@ def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float] = (), limits: L
 
 
 def _excitation_candidates(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
-    """A speed run and a multisine at one approach speed [m/s], with the largest amplitudes within the limits."""
     n_rpm, passing = shaft_speed(Controls(vessel), speed) / RPM, length / speed
     swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
     if swing <= 0:
@@ -133,10 +125,7 @@ def _excitation_candidates(vessel: Vessel, speed: float, length: float, limits: 
 
 
 def within_limits(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
-    """Whether all orders of a manoeuvre are within the limits of helm and shaft.
-
-    The rate limits apply to excitations only: in other manoeuvres the actuator model limits the rates.
-    """
+    """Whether all orders of a manoeuvre are within the limits of helm and shaft; rates limit excitations only."""
     helm, shaft = manoeuvre.greatest_orders
     return shaft <= limits.n_rpm * (1 + 1e-9) and helm <= limits.angle_deg * (1 + 1e-9)
 
@@ -154,17 +143,12 @@ def information_of_candidates(
 ) -> list[InformedCandidate]:
     """Simulate candidates and compute the Fisher information of the factors that each adds.
 
-    Parameters
-    ----------
-    vessel : with the present parameters.
     groups : parameter paths that share each of the n factors. scale : their values at factor 1; default: the vessel's.
     weights : measured signal (u, v, r, psi, position) -> standard deviation [m/s, rad/s, rad, m].
     horizon : of a prediction [s], 0 for whole runs. interval : between measured rows [s].
-    step : of the integration (RK4) [s]; default: the interval over as much as makes it about 0.2 s by Froude's scale.
+    step : of the integration (RK4) [s]; default: a part of the interval of about 0.2 s by Froude's scale.
 
-    Raises
-    ------
-    ShipidError : a signal that is not known, no candidate, or a candidate that cannot be simulated.
+    Raises ShipidError for an unknown signal, no candidate, or one that cannot be simulated.
     """
     unknown = next((name for name in weights if name not in WEIGHTED), None)
     if unknown is not None:
@@ -278,7 +262,7 @@ def _finite_difference_sensitivities(
 ) -> tuple[Array, Array]:
     """Central differences of the signals over their standard deviations.
 
-    Returns the sensitivities to the factors (S, R * signals, n) and to the initial states (S, R * signals, q).
+    To the factors (S, R * signals, n) and to the initial states (S, R * signals, q).
     """
     names, base = list(vessel.parameters), np.array(list(vessel.parameters.values()))
     moves = np.zeros((len(groups), len(base)))
@@ -334,16 +318,10 @@ def _project_out_start(by_factor: Array, by_start: Array) -> Array:
 def rank_candidates(
     contributions: Sequence[InformedCandidate], paths: Sequence[str], present: Array | None = None
 ) -> pd.DataFrame:
-    """Candidates: `manoeuvre`, `hours`, `gain` [bits], `per_hour` [bits/h], `narrows`, `before`, `after`.
+    """Candidates by bits per hour: `manoeuvre`, `hours`, `gain` [bits], `per_hour`, `narrows`, `before`, `after`.
 
-    Those with the most bits per hour come first. `narrows` is the factor whose standard error falls by the largest
-    ratio, from `before` to `after`.
-
-    Parameters
-    ----------
-    paths : names of the n factors.
-    present : (n, n) information before the manoeuvre, to which a standard deviation of 1 of each factor is added;
-        default: that alone.
+    `narrows` is the factor whose standard error falls by the largest ratio, from `before` to `after`.
+    present : (n, n) information before, to which a standard deviation of 1 of each factor is added.
     """
     known = np.eye(len(paths)) / UNKNOWN**2 + (0.0 if present is None else present)
     before, rows = _standard_errors(known), []

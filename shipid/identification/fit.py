@@ -1,13 +1,11 @@
 """Nonlinear least squares for the factors, by SciPy's trust region (`least_squares`, trf).
 
 The unknowns of each run, xi (nuisances and initial states, with a prior of width 1), are eliminated at every
-evaluation: variable projection. For given factors, Gauss-Newton steps determine xi of each run, and the Jacobian is
-projected onto the complement of the derivatives to xi. So the trust region has only the n factors as variables:
+evaluation by Gauss-Newton steps, and the Jacobian is projected onto the complement of their derivatives:
 
-    minimise over f    sum over runs of min over xi of (|r(f, xi)|^2 + |xi|^2)    + |(f - centre) / prior|^2
+minimise over f    sum over runs of min over xi of (|r(f, xi)|^2 + |xi|^2)    + |(f - centre) / prior|^2
 
-Residuals and Jacobian of a run, however long, go to SciPy as the (n + 1) rows of their triangular factor, which have
-the same squares and the same gradient.
+Of each run SciPy gets the (n + 1) rows of the triangular factor, which have the same squares and gradient.
 
 Sources: Branch, Coleman, Li, SIAM Journal on Scientific Computing 21 (1999) 1 (the trust region with bounds); Golub,
 Pereyra, Inverse Problems 19 (2003) R1 (variable projection), with the Jacobian of Kaufman, BIT 15 (1975) 49.
@@ -95,16 +93,11 @@ def search_factors(
 ) -> Result:
     """Minimise the objective from given factors.
 
-    Parameters
-    ----------
     factors, point : initial factors (n,) and unknowns of the runs.
-    progress : called with the iteration number and the objective after each iteration; a true return value stops.
-    before : number of iterations of earlier searches. tolerance : relative change at which to end.
-    most : largest number of evaluations.
+    progress : called with iteration number and objective after each iteration; a true return value stops.
+    before : iterations of earlier searches. tolerance : relative change at which to end. most : evaluations.
 
-    Raises
-    ------
-    KeyboardInterrupt : Ctrl-C, after the current iteration. Errors raised by `progress` are passed on.
+    Raises KeyboardInterrupt for Ctrl-C, after the current iteration. Errors raised by `progress` are passed on.
     """
     free = problem.unknown.low < problem.unknown.high
     with hold_interrupts() as held, np.errstate(all="ignore"):
@@ -132,10 +125,9 @@ def search_factors(
 
 
 def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
-    """Unknowns of the runs in the deepest valley of several: each run may have one for each guess of its current.
+    """Unknowns of the runs in the deepest valley of several guesses of each run's current; None where these are none.
 
     Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.
-    None where currents are no unknowns.
     """
     if not NUISANCES["current"].keys() <= set(problem.names):
         return None
@@ -228,9 +220,8 @@ class _SearchState:
     def minimise(self, tolerance: float, most: int) -> str:
         """Run the trust region over the free factors; the status: `ok`, `not converged` or `stopped`.
 
-        Kinks of the equations (|v|, |r|) stop the short steps of a region that has become small, though a long
-        Gauss-Newton step along the valley still goes down. Where one does, the search goes on from there with a fresh
-        region and scale. Where none does, a step from the derivatives around the kink may.
+        Where kinks of the equations (|v|, |r|) have stopped the short steps of a region, and a long Gauss-Newton step
+        still goes down, the search goes on from there with a fresh region and scale.
         """
         if self.stops():
             return "stopped"
@@ -276,8 +267,7 @@ class _SearchState:
     def _across(self) -> bool:
         """Take steps where the best point is in a kink; True if they lower the objective by the share `FALL`.
 
-        In a kink the derivatives of one side promise a fall that the other side takes back. Each step is a
-        Gauss-Newton step for the residuals linearised at the best point and at `SAMPLES` points drawn around it.
+        Each is a Gauss-Newton step for the residuals linearised at the best point and at `SAMPLES` points around it.
         Source: Burke, Lewis, Overton, SIAM Journal on Optimization 15 (2005) 751 (gradient sampling).
         """
         draw, around, misses, first = np.random.default_rng(0), AROUND, 0, self.best.objective
@@ -372,8 +362,7 @@ def evaluate_factors(problem: Problem, factors: Array, point: Point) -> _Evaluat
 def local_linearisation(problem: Problem, factors: Array, point: Point) -> Callable[[Array], tuple[Array, Array]]:
     """Function of a change of the factors (n,) to residuals (m,) and Jacobian (m, n) there, priors included.
 
-    Their squares are the objective that one step of Gauss-Newton of the unknowns of the runs leaves, from where these
-    are to first order. One prediction each; where it diverges, they are not finite.
+    Unknowns of the runs go along to first order, and by one step of Gauss-Newton. Not finite where it diverges.
     """
     here = predict_residuals(problem, factors, point.nuisances, point.away)
 

@@ -65,8 +65,8 @@ def simulate_free_runs(
 ) -> FreeRuns:
     """Simulate vessels of one structure along recorded runs, in pieces of `length` [s]; 0: whole unbroken stretches.
 
-    The settings give step, method and overrides `runs.<run>.<path>`. Nuisances are at their fault-free values, as for
-    a new run. Raises DataError for a length shorter than two steps, and what `residuals.build` raises.
+    The settings give step, method and overrides; nuisances are at their fault-free values. Raises DataError for a
+    length shorter than two steps, and what `residuals.build` raises.
     """
     check_length(settings, length)
     spans = [float(rows["t"].iloc[-1] - rows["t"].iloc[0]) for _, rows in stretches_of_runs(dataset.select(runs))]
@@ -98,10 +98,7 @@ def simulate_free_runs(
 
 
 def _held_settings(vessel: Vessel, overrides: Mapping[str, object]) -> dict[str, object]:
-    """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides.
-
-    It is not 0, which would need a scale.
-    """
+    """Settings of a fit that is none: what is free plays no part in a free run, so one number that no run overrides."""
     numbers = (path for path, value in vessel.parameters.items() if value != 0)
     path = next(path for path in numbers if not any(key.endswith(f".{path}") for key in overrides))
     none: dict[str, object] = {"prior": {}, "bounds": {}, "scale": {}}
@@ -159,7 +156,6 @@ def _is_sound(states: Array) -> bool:
 
 
 def _state_series(parts: Sequence[tuple[str, int, str, ShootingSegment, Array]]) -> pd.DataFrame:
-    """Rows of run, piece, model, its instants and its states (N + 1, channels), one part after the other."""
     runs, pieces, models, segments, states = zip(*parts, strict=True)
     lengths = [len(segment.t) for segment in segments]
     heads = {"run": runs, "piece": pieces, "model": models}

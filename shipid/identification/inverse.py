@@ -1,14 +1,12 @@
 """Inverse dynamics: a first estimate without simulation, by least squares on the forces of the measured motion.
 
-The equations M nu_dot = F are multiplied by a test function phi(t) that moves along the run, and integrated by parts:
+M nu_dot = F is multiplied by a test function phi(t) that moves along the run, and integrated by parts:
 
-    0 = integral of (phi F + phi' M nu) dt
+0 = integral of (phi F + phi' M nu) dt
 
-This weak form needs no derivative of a measured signal. It is linear in the hydrodynamic derivatives and in the added
-mass, so a linear least-squares problem remains. Parameters that enter nonlinearly (a diameter, a drag coefficient under
-a root) are detected numerically; the equations are then linearised about the present values, and the fit is repeated.
-
-Measured velocities are regressors too, so noise biases this estimate (errors in variables): it is an initial value.
+No measured signal is differentiated, and the problem is linear in hydrodynamic derivatives and added mass. Parameters
+that enter nonlinearly are detected numerically, and the fit is repeated about the present values. Noise of the
+regressors biases it: an initial value.
 
 Source of the weak form: Messenger, Bortz, Journal of Computational Physics 443 (2021) 110525, whose bumps are used.
 """
@@ -74,16 +72,11 @@ def inverse_dynamics(
 ) -> Inverse:
     """Fit factors so that the forces explain the motion of the runs.
 
-    Parameters
-    ----------
     groups : parameters that share each of the n factors. scale : their values at factor 1; default: the vessel's.
-    prior : (n,) standard deviation of each factor about its base (1, or 0 where the base value is 0). It is limited to
-        1, so that a factor with little information stays near its base and the result can be simulated.
+    prior : (n,) standard deviation of each factor about its base (1, or 0 where that is 0), at most 1.
     environment : run -> channel -> constant value [SI] of channels that are not logged; default: 0.
 
-    Raises
-    ------
-    DataError : a run that does not exist, a command that is not logged, runs too short for one bump.
+    Raises DataError for an unknown run, a command that is not logged, runs too short for one bump.
     """
     base = vessel.parameters
     tied = [list(group) for group in groups]
@@ -107,9 +100,9 @@ def inverse_dynamics(
 def _solve_weighted(
     problem: _Problem, centre: Array, widths: Array, linear: bool
 ) -> tuple[Array, dict[str, float], bool]:
-    """Gauss-Newton iteration with step halving on weighted residuals and priors; weights from the residuals.
+    """Gauss-Newton with step halving on weighted residuals and priors: factors (n,), levels, whether it converged.
 
-    Returns factors (n,), levels, and whether it converged. Minimum-norm steps keep undetermined factors at their base.
+    Minimum-norm steps keep undetermined factors at their base.
     """
     factors, (residual, jacobian) = centre.copy(), problem.evaluate(centre)
     levels = problem.levels(residual)
@@ -255,7 +248,6 @@ def _long_stretches(
     runs: Sequence[str],
     environment: Mapping[str, Mapping[str, float]],
 ) -> list[_Stretch]:
-    """Unbroken stretches of the runs that are long enough for one test function."""
     missing = next((name for name in runs if name not in dataset.runs), None)
     if missing is not None:
         raise DataError(f"no run {missing!r}", path="runs")
@@ -318,9 +310,8 @@ def _weighted_stretch(
 def _test_functions(t: Array, window: float) -> tuple[Array, Array, Array]:
     """Quadrature weights (num_bumps, N) of the test functions at times t [s], each of integral 1.
 
-    Returns the weights of forces at the end and at the start of intervals, and of velocities. phi = c (1 - s^2)^p with
-    s from -1 to 1 over the window [s]; trapezoid rule. The weights of velocities (phi') are corrected so that constant
-    velocities, and velocities linear in time, give their exact accelerations.
+    Of forces at the end and at the start of intervals, and of velocities. phi = c (1 - s^2)^p, s from -1 to 1 over the
+    window [s]; trapezoid rule. Those of velocities are exact for velocities linear in time.
     """
     first = np.arange(t[0], t[-1] - window + 1e-9 * window, window / STRIDE)
     s = 2 * (t - first[:, None]) / window - 1

@@ -64,8 +64,7 @@ def interpolate_commands(
 ) -> dict[str, NDArray[np.float64]]:
     """Commands of one unbroken stretch at instants [s] (any shape), where they change between the rows.
 
-    An order to an actuator changes in the middle between the row that has it and the row before. A command without an
-    actuator is a measured angle or speed, or acts at once: it goes on evenly from row to row.
+    An order to an actuator changes midway between two rows; a command without one goes on evenly.
     """
     t, model = np.asarray(rows["t"]), vessel_dynamics(vessel)
     nearest = np.searchsorted((t[1:] + t[:-1]) / 2, instants, side="right")
@@ -80,8 +79,7 @@ def held_over_steps(
 ) -> dict[str, NDArray[np.float64]]:
     """Commands of one unbroken stretch in steps from instants (N,) [s], where they hold from row to row.
 
-    A row may lie within a step. An order to an actuator then counts from the beginning of the step that is nearest, any
-    other command with its mean over the step: else it would come late by up to a step.
+    Within a step an order to an actuator counts from the nearest begin of a step, any other command with its mean.
     """
     model, edges = vessel_dynamics(vessel), np.append(instants, instants[-1] + step)
     nearest, mean = sample_columns(rows, instants + step / 2), mean_commands(rows, edges)

@@ -42,11 +42,7 @@ class Lateness:
 
 
 def command_lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
-    """The effect of commands half a row earlier; None where it cannot be computed.
-
-    An order that is given between two rows is first seen in the later one. Its mean delay is half a row. The residuals
-    with all commands one row earlier show what that does, and whether they become smaller.
-    """
+    """The effect of commands half a row earlier, by the residuals with all one row earlier; None where it cannot be."""
     settings = solution.settings
     between = row_interval(dataset, solution.runs)
     if settings.step > COARSE * between:
@@ -69,10 +65,7 @@ def command_lateness(solution: Solution, dataset: Dataset) -> Lateness | None:
 
 
 def late_fit(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
-    """A sentence where commands at another time move an estimate out of its interval and fit better; else none.
-
-    Commands that are held come half a row late. What is more than that, or less than none, has another cause.
-    """
+    """A sentence where commands at another time move an estimate out of its interval and fit better; else none."""
     late = command_lateness(solution, dataset)
     if late is None:
         return ""
@@ -111,7 +104,6 @@ def _actuated_commands(solution: Solution, dataset: Dataset) -> list[str]:
 
 
 def _lateness_causes(late: bool, gear: Sequence[str]) -> str:
-    """What makes commands late in a log, or early, and the remedy."""
     if not late:
         lag = "an actuator of the vessel is too fast" if gear else "the vessel lacks an actuator"
         return f"{lag}, or the log has the motion late: compare with --nuisance latency"

@@ -84,17 +84,16 @@ class SettingsFile(BaseModel):
 class Identification:
     """Result of an identification with its statistics and its validation.
 
-    vessel : the base vessel. runs, held_out : runs of the fit, and of the test. digest : of the dataset.
+    vessel : the base vessel. digest : of the dataset. ahead : length of a free run [s], 0 for whole runs.
     estimates : `path`, `name` (short), `with` (tied paths), `unit`, `base`, `value`, `error`, `low`, `high` [unit],
-        `factor`, `factor_error`, `factor_low`, `factor_high` [1], `identified`, `reason`.
-    ahead : length of a free run [s], 0 for whole runs. free : set (`fit`, `test`) -> free runs `before` and `after`.
+    `factor`, `factor_error`, `factor_low`, `factor_high` [1], `identified`, `reason`.
+    free : set (`fit`, `test`) -> free runs `before` and `after`.
     manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`; with a band also `low` and `high`.
     colours : autocorrelation of the residuals: `signal`, `lag` [s], `correlation`.
-    groups : errors by side, helm and speed over one horizon, by `shipid.identification.sides.by_group`, on runs held
-        out, else on fitted ones. beyond : sentences on standard manoeuvres that go farther than the fitted runs.
-    outputs : measured outputs of components that the vessel predicts, on fitted runs: `output`, `unit`, root mean
-        square `measured`, and of the difference `before` and `after`; empty without any.
-    programme : manoeuvres to run next, ranked by `shipid.identification.design.rank_candidates`; None: not requested.
+    groups : errors of `shipid.identification.sides.by_group` on runs held out, else on fitted ones. beyond : sentences
+    on standard manoeuvres that go farther than the fitted runs.
+    outputs : of components: `output`, `unit`, root mean square `measured`, and of the difference `before` and `after`.
+    programme : manoeuvres to run next, of `shipid.identification.design.rank_candidates`; None: not requested.
     """
 
     vessel: Vessel
@@ -136,8 +135,7 @@ class Identification:
     def patch(self, file: Path) -> str:
         """The patch as TOML, to be written to `file`: `load_vessel` on it rebuilds the identified vessel exactly.
 
-        Numbers that were changed after the base was read, by `Vessel.with_values`, are in the patch, too. Raises
-        ShipidError where more than numbers were changed: no patch holds that.
+        Raises ShipidError where more than numbers of the vessel were changed after it was read.
         """
         vessel, solution = self.vessel, self.solution
         bundled = documents.bundled_documents("models").get(vessel.key)
@@ -198,9 +196,9 @@ def read_settings(file: Path | None = None, changes: Mapping[str, Any] | None = 
 def pick_runs(
     dataset: Dataset, runs: Sequence[str] = (), held_out: Sequence[str] = ()
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the runs to fit (default: all) and of the runs held out, which are never fitted.
+    """Names of the runs to fit (default: all) and of those held out: names or patterns in which `*` is any characters.
 
-    runs, held_out : names or patterns in which `*` matches any characters. Raises DataError for an unknown run.
+    Raises DataError for an unknown run.
     """
 
     def chosen(patterns: Sequence[str] | str, option: str) -> list[str]:
@@ -224,7 +222,7 @@ def without_shared(
 ) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
     """The dataset whose runs to fit see no moment of the runs held out, the runs that are left, and warnings.
 
-    On a shared clock runs may overlap. Raises DataError where no run is left.
+    Raises DataError where no run is left.
     """
     apart = without_shared_moments(dataset, held_out)
     before, after = (one.frame["run"].value_counts() for one in (dataset, apart))
@@ -261,18 +259,13 @@ def run_identification(
 ) -> Identification:
     """Identify a vessel from recorded runs, and validate it by free runs, also of the runs held out.
 
-    Parameters
-    ----------
-    runs, held_out : names or patterns, as `pick_runs` takes them.
-    ahead : length of the free runs [s], 0 for whole runs.
-    profiles : factors whose profile likelihood is computed. programme : whether to rank manoeuvres to run next.
+    runs, held_out : as `pick_runs` takes them. ahead : length of the free runs [s], 0 for whole runs.
+    profiles : factors whose profile is computed. programme : whether to rank manoeuvres to run next.
     band : level of the bands on the measures of standard manoeuvres, such as 0.9; None: none.
     progress : called with the iteration number and the objective; a true return value stops.
 
-    Raises
-    ------
-    DocumentError, DataError : vessel, dataset, settings and runs do not fit together.
-    ShipidError : the fit did not converge; the message says why.
+    Raises DocumentError or DataError where vessel, dataset, settings and runs do not fit together, ShipidError where
+    the fit did not converge.
     """
     check_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
@@ -357,10 +350,7 @@ def run_identification(
 
 
 def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
-    """Digest of the document in the vessel's file, and the numbers that were changed since it was read.
-
-    A vessel whose file cannot be read any more is as it was.
-    """
+    """Digest of the document in the vessel's file, and the numbers that were changed since it was read."""
     try:
         read = load_vessel(vessel.file)
     except ShipidError:
@@ -382,7 +372,6 @@ def _in_log(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
 
 
 def _implausible_estimates(vessel: Vessel, identified: Vessel, values: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for each estimate that no ship has, whether the fit or the rest of the document shows it."""
     judgements = {path: implausibility(vessel, path, values) for path in values}
     judgements |= {
         path: f"{path}: {words}; hold it, or give it a prior"
@@ -398,7 +387,6 @@ def _unusual_numbers(vessel: Vessel) -> dict[str, str]:
 
 
 def _no_estimate_reason(solution: Solution) -> str:
-    """Why no factor has an estimate, and what would give one."""
     if not solution.dropped:
         return "every parameter is at a bound or fixed: free more parameters, or widen bounds"
     remedy = f"give a drop of less than {solution.settings.drop:g}, or runs that excite them more"
@@ -408,7 +396,6 @@ def _no_estimate_reason(solution: Solution) -> str:
 
 
 def _errors_by_group(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
-    """Errors by side, helm and speed of free runs as long as the predictions that were fitted."""
     series = simulate_free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
     return by_group(series, AFTER, vessel, dataset)
 
@@ -433,7 +420,6 @@ def _compare_outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequenc
 
 
 def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterator[str]:
-    """Warnings on measured outputs that are not fitted."""
     for row in outputs.to_dict("records"):
         if row["output"] not in settings.weights:
             name, width = row["output"], f"{ACCURATE * row['measured']:.2g}"
@@ -443,7 +429,6 @@ def _unused_output_warnings(outputs: pd.DataFrame, settings: Identify) -> Iterat
 def _extrapolated_manoeuvres(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], logs: Mapping[str, pd.DataFrame]
 ) -> tuple[str, ...]:
-    """Sentences on standard manoeuvres in which the identified vessel goes beyond the data."""
     data = data_reach(vessel, dataset, runs)
     return tuple(
         filter(None, (extrapolation_sentence(title, of_log(vessel, log), data) for title, log in logs.items()))
@@ -470,10 +455,7 @@ def check_identification(
     ahead: float = 0.0,
     profiles: Sequence[str] = (),
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the runs to fit and those held out, as `pick_runs` does, when all arguments of `run_identification` fit.
-
-    Raises what `run_identification` would raise before it simulates.
-    """
+    """The runs to fit and those held out, when all arguments of `run_identification` fit; raises as it does."""
     fitted, tested = pick_runs(dataset, runs, held_out)
     check_length(settings, ahead)
     resolve_overrides(settings, (*fitted, *tested), vessel, vessel_dynamics(vessel).environment, known=dataset.runs)
@@ -521,8 +503,6 @@ def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> p
 
 def _compare_manoeuvres(pair: Mapping[str, Vessel], logs: dict[str, pd.DataFrame] | None = None) -> pd.DataFrame:
     """Manoeuvre measures of both vessels; where a vessel cannot perform one: NaN, and the reason in `note`.
-
-    A manoeuvre that neither performs is one row without a measure.
 
     logs : takes the log of the last vessel in each manoeuvre, by title.
     """
@@ -593,7 +573,6 @@ def residual_spacing(solution: Solution) -> float:
 
 
 def _longest_run(solution: Solution) -> float:
-    """Length of the longest run [s]."""
     each = [solution.times[solution.clusters == run] for run in np.unique(solution.clusters)]
     return max(float(np.ptp(times)) for times in each)
 
@@ -613,10 +592,7 @@ def _whiteness_table(solution: Solution) -> pd.DataFrame:
 def _next_manoeuvres(
     vessel: Vessel, dataset: Dataset, runs: Sequence[str], solution: Solution, judged: Statistics
 ) -> tuple[pd.DataFrame | None, str]:
-    """Ranked manoeuvres at the median speed of the fitted runs and at half of it, within the recorded shaft speeds.
-
-    Also a sentence on those that the identified vessel cannot perform; without any other there is no table.
-    """
+    """Ranked manoeuvres at the median speed of the fitted runs and at half, and a sentence on those that cannot be."""
     speed, limits = design.recorded_limits(vessel, dataset, runs)
     unknown, settings = free_factors(solution.vessel, solution.settings), solution.settings
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
@@ -701,7 +677,6 @@ def _not_varied(dataset: Dataset, runs: Sequence[str], paths: Sequence[str]) -> 
 
 
 def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[str]:
-    """Warnings for profiles that contain a better fit than the estimate."""
     warnings = []
     for curve in curves:
         estimate = solution.factors[solution.paths.index(curve.path)]

@@ -1,7 +1,7 @@
-"""What numbers a ship can have: physical ranges by kind of number, in terms that a naval architect knows.
+"""What numbers a ship can have: physical ranges by kind of number, wider than those of the ships in the sources.
 
 Sources: added mass and radii of gyration, Clarke et al. (1983), Brix (1993); propulsion factors, Carlton (2018);
-rudder factors, Yasukawa and Yoshimura (2015), Quadvlieg (2013). Ranges are those of the ships in them, made wider.
+rudder factors, Yasukawa and Yoshimura (2015), Quadvlieg (2013).
 """
 
 from __future__ import annotations
@@ -91,10 +91,7 @@ def _coefficient_kind(path: str) -> Kind | None:
 
 
 def plausible_factors(vessel: Vessel, path: str) -> tuple[float, float]:
-    """Least and greatest factor on a number with which it stays in the range that ships have, the base included.
-
-    The other numbers are those of the vessel. Infinite where no range is known.
-    """
+    """Least and greatest factor on a number with which it stays in the range of ships; infinite where none is known."""
     kind = _coefficient_kind(path)
     base, numbers = vessel.parameters[path], vessel.parameters
     if kind is None or base == 0:
@@ -125,9 +122,7 @@ def _factor_at_limit(ratio: Callable[[float], float | None], end: float, rising:
 def implausible_paths(vessel: Vessel, values: Mapping[str, float]) -> set[str]:
     """Paths among `values` with which the number is outside the range that ships have.
 
-    Parameters
-    ----------
-    values : dotted path -> value of all numbers that were changed; the others are the vessel's.
+    values : dotted path -> value of all numbers that were changed.
     """
     numbers = {**vessel.parameters, **values}
     judged = {path: _coefficient_ratio(vessel, path, numbers) for path in values}
@@ -144,9 +139,7 @@ def _coefficient_ratio(vessel: Vessel, path: str, numbers: Mapping[str, float]) 
 def implausibility(vessel: Vessel, path: str, values: Mapping[str, float]) -> str:
     """Why a number cannot be that of a ship, or that it is at an end of the range; empty where it may.
 
-    Parameters
-    ----------
-    values : dotted path -> value of all numbers that were changed; the others are the vessel's.
+    values : dotted path -> value of all numbers that were changed.
     """
     numbers = {**vessel.parameters, **values}
     seen = _coefficient_ratio(vessel, path, numbers)

@@ -1,13 +1,9 @@
 """Profile likelihood: how much worse the best fit becomes when one factor is held away from its estimate.
 
-For a factor f the profile is (C(f) - C_min) / s^2, with C(f) the least objective (the sum of squares of the whitened
-residuals, priors included) over all other factors, and s^2 the variance of the residuals over the declared one.
-The 95 % interval holds all f whose profile is at most t^2, t the quantile of Student's distribution. Where the problem
-is linear it is the interval of the standard error; where it is not, it need be neither symmetric nor finite: a side on
-which the profile stays below t^2 is open, and the factor is not identified on that side.
-
-Coloured residuals count more than they are worth: s^2 is then the ratio of the robust to the plain variance of that
-factor (`variance_ratio`), the vertical correction of Chandler and Bate.
+For a factor f it is (C(f) - C_min) / s^2, C(f) the least objective over all other factors, priors included, and s^2 the
+variance of the residuals over the declared one. The 95 % interval holds all f with at most t^2, t the quantile of
+Student's distribution; a side on which the profile stays below is open, the factor not identified there. Of coloured
+residuals s^2 is the ratio of the robust to the plain variance of that factor (`variance_ratio`; Chandler and Bate).
 
 Sources: Raue et al., Bioinformatics 25 (2009) 1923; Bates, Watts, Nonlinear Regression Analysis (1988), ch. 6;
 Chandler, Bate, Biometrika 94 (2007) 167.
@@ -101,16 +97,11 @@ def profile_factor(
     bounds: tuple[float, float] = (-np.inf, np.inf),
     unit: str = "its base value",
 ) -> Profile:
-    """Compute the profile of one factor, from the estimate to both sides, until it leaves the 95 % interval.
+    """The profile of one factor, from the estimate to both sides, until it leaves the 95 % interval.
 
-    Parameters
-    ----------
-    path : name of the factor.
-    factors, index, objective : the estimate (n,), index of the factor, and the objective at the estimate.
-    refit : function that fits the other factors with this one held, see `Refit`.
-    half_width : half-width of the linear 95 % interval, for the first step. freedom : degrees of freedom of t.
-    ratio : s^2, variance of the residuals over the declared one, or `variance_ratio`.
-    bounds : lower and upper bound of the factor. unit : what the factor is relative to, in words.
+    path : name of the factor. factors, index, objective : the estimate (n,), place of the factor, objective there.
+    refit : fits the other factors with this one held. half_width : of the linear 95 % interval. freedom : of t.
+    ratio : s^2. bounds : of the factor. unit : what the factor is relative to, in words.
     """
     curve = _Curve(path, refit, ratio, {float(factors[index]): (objective, np.asarray(factors, dtype=float))})
     limit = float(stdtrit(freedom, 0.5 + LEVEL / 2) ** 2)
@@ -138,7 +129,7 @@ def profile_factor(
 def _profile_crossing(curve: _Curve, estimate: float, side: int, step: float, limit: float, farthest: float) -> float:
     """Value of the factor where the profile crosses the limit on one side (-1 or 1); infinite if it stays below.
 
-    Growing steps bracket the crossing, then regula falsi on sqrt(profile), which is nearly linear in the factor.
+    Growing steps bracket it, then regula falsi on sqrt(profile), nearly linear in the factor.
     """
     inside, outside, value = estimate, None, estimate
     for _ in range(MOST_REFITS):

@@ -1,8 +1,4 @@
-"""Weighted residuals of many predictions, and their exact derivatives to the unknowns.
-
-Each prediction begins at a measured state of the log, or at an estimated state near it. All predictions run in one
-call of the engine.
-"""
+"""Weighted residuals of many predictions, and their exact derivatives to the unknowns, in one call of the engine."""
 
 from __future__ import annotations
 
@@ -51,10 +47,10 @@ MOST_LATE = 4.0  # prior widths that a latency may reach
 class Problem:
     """All data of one fit with R runs, P parameters, nq nuisances and ny signals.
 
-    segments : predictions, ordered by run. unknown : the factors to estimate.
-    names, centres, widths : scalars of the per-run nuisances, their fault-free values (nq,) and prior widths (nq,).
-    start_width : prior width of the initial states in standard deviations of the signals; None: they are not free.
-    base : (R, P) parameters of each run with the overrides for that run. deviations : (ny,) of the signals.
+    segments : by run. unknown : the factors to estimate. names, centres, widths : nuisances of a run, their fault-free
+    values (nq,) and prior widths (nq,). start_width : of the initial states in standard deviations of the signals;
+    None:
+    they are not free. base : (R, P) parameters with the overrides of each run. deviations : (ny,) of the signals.
     """
 
     vessel: Vessel
@@ -347,9 +343,8 @@ class ResidualPrediction:
         With A the derivatives to the nuisances xi ~ N(0, 1), e = (I + A A^T)^(-1/2) (r - A xi). At the optimum of xi
         its sum of squares is that of r and xi, and its Jacobian gives the Fisher information of the factors.
 
-        With the Huber loss a residual counts as psi = r up to the threshold and no more beyond it, and d psi / d r is 1
-        or 0, on average the share p of its signal that is within. So r is psi / sqrt(p) here, and the derivatives are
-        times sqrt(p): squares, scores and information are then those of Huber's covariance,
+        With the Huber loss r is psi / sqrt(p) here, psi = r up to the threshold and constant beyond it, p the share of
+        the signal that is within, and derivatives are times sqrt(p): then information is that of Huber's covariance,
         (J^T J)^-1 E[psi^2] / p^2 (Huber, Robust Statistics (1981), sec. 7.6).
 
         threshold : of the Huber loss, in standard deviations. shares : signal -> p; default: `within`.
@@ -408,11 +403,8 @@ def predict_residuals(
 ) -> ResidualPrediction:
     """Run all predictions of a fit.
 
-    Parameters
-    ----------
     factors : (n,). nuisances : (R, nq) in prior widths.
-    away : (S, nn) initial states minus those of the log, in prior widths of `initial_state`; default: 0. It is ignored
-        if initial states are not free.
+    away : (S, nn) initial states minus those of the log, in prior widths of `initial_state`; default: 0.
     """
     whole = problem.whole
     q = problem.centres + problem.widths * nuisances

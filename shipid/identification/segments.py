@@ -58,19 +58,14 @@ def cut_segments(
 ) -> list[ShootingSegment]:
     """Cut runs into consecutive segments of `horizon` [s]; 0: one segment for each unbroken stretch.
 
-    Each begins at a row of the log: the last one that the segment before it holds. A shorter segment at the end of a
-    stretch is kept if it has at least half a horizon.
+    Each begins at the last row that the segment before it holds; one at the end has at least half a horizon.
 
-    Parameters
-    ----------
     step : of the integrator [s]. lags : number of earlier command values to keep.
     parameters_of_run : run -> path -> value, overrides that the actuator simulation of that run uses.
     commands : `held` from each row to the next, or changing `between` rows.
 
-    Raises
-    ------
-    DataError : an unknown run, a command that was not recorded, a run without a long enough stretch or whose rows are
-        further apart than the horizon, or a step too long for orders that change between rows.
+    Raises DataError for an unknown run, a command that was not recorded, a run without a long enough stretch or with
+    rows further apart than the horizon, or a step too long for orders that change between rows.
     """
     unknown = next((run for run in runs if run not in dataset.runs), None)
     if unknown is not None:
@@ -114,7 +109,6 @@ def too_short(dataset: Dataset, runs: Sequence[str], step: float, horizon: float
 
 
 def _num_steps(t: Array, step: float) -> int:
-    """Whole steps [s] within an unbroken stretch of rows at t (N,) [s]."""
     return int((t[-1] - t[0] + clock_slack(t)) / step)
 
 

@@ -1,9 +1,8 @@
 """Variational equations: the ship's motion and its forward sensitivities to the unknowns, in one integration.
 
-The state z is integrated together with its sensitivities S = dz/d[node, factors, nuisances],
-S' = (df/dz) S + df/d[...], by one integrator, so that S is the exact derivative of the discrete motion. The node is
-the initial state of a prediction. Numbers are inputs, so each structure is built once. States that do not influence a
-fitted signal (for example the position) are left out.
+S = dz/d[node, factors, nuisances] of the state z goes along by S' = (df/dz) S + df/d[...]: the exact derivative of the
+discrete motion. The node is the initial state of a prediction. Numbers are inputs; states that do not influence a
+fitted signal are left out.
 """
 
 from __future__ import annotations
@@ -355,7 +354,7 @@ def prediction_scan(layout: FitLayout, num_steps: int) -> ca.Function:
 def run_machine(layout: FitLayout, x: Array, fixed: Array, known: Array, seen: Array) -> Array:
     """Outputs (1, K, N, .) of K predictions of N steps, by CasADi's virtual machine.
 
-    x : (K, size) initial states with their sensitivities. fixed : (K, .) numbers that are constant along a prediction.
+    x : (K, size) initial states with their sensitivities. fixed : (K, .) constants of each prediction.
     known, seen : (K, N, .) inputs, and measured signals with their weights.
     """
     count, num_steps = known.shape[:2]

@@ -57,9 +57,8 @@ class Identify(CheckedModel, BaseModel):
     """The `[identify]` table. The unknowns are factors on the base values of the vessel's parameters (dotted paths).
 
     weights : standard deviations of the signals [m/s, rad/s, rad, m], and of measured outputs by the names of their
-    columns (`propeller.thrust` [N]), which may be nested tables. Units of the nuisance widths: standard deviations
-    of the weights (initial_state), m/s (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency),
-    1 (thrust_scale).
+    columns (`propeller.thrust` [N]). Widths of nuisances: standard deviations of the weights (initial_state), m/s
+    (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency), 1 (thrust_scale).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -277,7 +276,6 @@ def measured_constants(asked: Sequence[str], settings: Identify) -> set[str]:
 
 
 def _without_dimensions(asked: Sequence[str], settings: Identify) -> list[str]:
-    """The paths without dimensions and constants; DocumentError where there are no others."""
     known = measured_constants(asked, settings)
     if known == set(asked):
         message = f"selects dimensions and constants only: to fit them all the same, write {', '.join(sorted(known))}"
@@ -311,7 +309,6 @@ def _accepts_value(vessel: Vessel, path: str, value: float) -> bool:
 
 
 def _factor_groups(settings: Identify, free: list[str], chosen: Any) -> list[tuple[str, ...]]:
-    """Free paths in the order of the vessel, paths of `together` in one group."""
     of: dict[str, int] = {}
     for number, patterns in enumerate(settings.together):
         key = f"together.{number}"
@@ -330,10 +327,7 @@ def _factor_groups(settings: Identify, free: list[str], chosen: Any) -> list[tup
 
 
 def without_zeros(group: Sequence[str], settings: Identify, base: Mapping[str, float]) -> tuple[str, ...]:
-    """A group without the numbers that are 0 and that patterns alone tie to others: times a factor they stay 0.
-
-    Those that the settings name in full stay, and are refused where others are not 0.
-    """
+    """A group without the numbers that are 0 and that patterns alone tie to others: times a factor they stay 0."""
     named = {*settings.scale, *settings.parameters, *(path for patterns in settings.together for path in patterns)}
     kept = tuple(path for path in group if base[path] != 0 or path in named)
     return kept if any(base[path] != 0 for path in kept) else tuple(group)
@@ -350,8 +344,7 @@ def resolve_overrides(
 ) -> dict[str, dict[str, float]]:
     """Run -> {path or `environment.<channel>`: value} of the settings' `runs`; DocumentError for an unknown name.
 
-    channels : environment channels of the vessel. known : all runs of the data; overrides for runs outside the fit are
-    valid and left out.
+    channels : of the vessel. known : all runs of the data; overrides for runs outside the fit are left out.
     """
     result: dict[str, dict[str, float]] = {run: {} for run in (*runs, *known)}
     valid = [*vessel.parameters, *(f"{ENVIRONMENT}.{name}" for name in channels)]

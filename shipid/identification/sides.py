@@ -1,9 +1,8 @@
 """Errors by side, rudder level and speed: where a model is wrong, which no total says.
 
-Free runs of one horizon are compared with the log, row by row. A row belongs to the side to which the ship turns, to a
-level of its rudder or azimuth angle, and to a third of the speeds. The error of the turning is the predicted yaw rate
-less the measured one, over the measured one, each summed over the rows of the group: of a half cycle of a zigzag, the
-error of its change of heading.
+Free runs of one horizon are compared with the log by rows: the side to which the ship turns, a level of its rudder or
+azimuth angle, a third of the speeds. The error of the turning is the sum of predicted less measured yaw rate over that
+of the measured one.
 """
 
 from __future__ import annotations
@@ -37,11 +36,9 @@ def by_group(series: pd.DataFrame, model: str, vessel: Vessel, dataset: Dataset)
     """Errors of free runs at rows: `group`, `side` (`starboard`, `port`, none), `rows`, RMS `u`, `v`, `r`, `turning`.
 
     u, v [m/s], r, its standard error r_error [rad/s]. turning, error : relative error of the change of heading [1], its
-    standard error. pieces : free runs with rows of the group, of which both are.
+    standard error. pieces : free runs with rows of the group.
 
-    Parameters
-    ----------
-    series : `FreeRuns.series`. model : the model among its models. dataset : of the runs, for the commands.
+    series : `FreeRuns.series`. model : one of its models. dataset : of the runs, for the commands.
     """
     log, mine = (series[series["model"] == name].reset_index(drop=True) for name in (MEASURED, model))
     helm = _mean_helm(vessel, dataset, log)
@@ -134,7 +131,7 @@ def _side_groups(
 def uneven_side_warnings(groups: pd.DataFrame) -> tuple[str, ...]:
     """Sentences on groups whose one side is more than twice as wrong as the other, in its turning or its yaw rate.
 
-    Each is shown by a t test over the pieces; the level is divided by the number of tests (Bonferroni).
+    By a t test over the pieces, at a level divided by the number of tests (Bonferroni).
     """
     sentences = []
     rows = [row for row in groups.to_dict("records") if row["side"]]
@@ -189,7 +186,7 @@ def side_table_rows(groups: pd.DataFrame) -> list[list[str]]:
 
 
 def _turning_error_text(turning: float, error: float) -> str:
-    """Return the error of the turning [%] with its standard error, where more than one piece shows it."""
+    """The error of the turning [%] with its standard error, where more than one piece shows it."""
     share = "" if np.isnan(turning) else f"{100 * turning:+.1f}"
     return f"{share} +-{100 * error:.1f}" if share and np.isfinite(error) else share
 

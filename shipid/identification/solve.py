@@ -34,26 +34,21 @@ ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "
 class Solution:
     """Result of a fit: estimates, residuals, Jacobian, and the status of the solver.
 
-    Parameters
-    ----------
     paths, factors : name and estimate (n,) of each factor; the name of a tied group is its first path.
     values : path -> value [SI] of every parameter that a factor acts on, tied ones included.
     nuisances : run -> name -> estimate [SI] of the unknowns of that run.
     residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
-        time. Their sum of squares is the objective without the priors of the factors, those of the nuisances included.
-        With huber they are those of `Prediction.marginal`, and their squares sum to something else.
+    time. With huber those of `Prediction.marginal`.
     jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
     prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) their means.
     clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
     spent : (m,) share of each residual that the nuisances have taken.
     objective_start, objective : sum of squares at the start, from the measured states, and at the end.
-    status : `ok`, `refused` (converged to values that the vessel's checks refuse), `not converged`, `diverged` or
-        `stopped`. sentence : the status with its reason and a remedy.
-    at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free: dropped, or given
-        bounds that are equal. dropped : paths of the former.
+    status : `ok`, `refused` (values that the vessel's checks refuse), `not converged`, `diverged` or `stopped`.
+    sentence : the status with its reason and a remedy. warnings : what the fit cannot see, one sentence each.
+    at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free. dropped : their paths.
     effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
     within : signal -> share of its residuals up to the threshold of huber; 1 with the squared loss.
-    warnings : what the fit cannot see, one sentence each: a step that is longer than the interval of the log.
     """
 
     vessel: Vessel
@@ -101,19 +96,14 @@ def identify(
 ) -> Solution:
     """Estimate the factors that minimise the weighted prediction errors of the runs.
 
-    With `discount`, the fit is repeated with the deviations of the signals times their level and the square root of the
-    correlation time of their residuals, in samples: so many correlated residuals then weigh, against priors and one
-    another, as the independent ones that they are worth. The settings of the solution have these deviations.
+    With `discount` the fit is repeated with the deviations of the signals times their level and the square root of the
+    correlation time of their residuals, in samples; the settings of the solution have these.
 
-    Parameters
-    ----------
-    runs : names of the runs to fit, or the name of one. settings : unknowns, weights, horizon and solver.
+    runs : names, or one. settings : unknowns, weights, horizon and solver.
     start : path -> initial factor, or an earlier solution; default: the setting `start`.
     progress : called with the iteration number and the objective after each iteration; a true return value stops.
 
-    Raises
-    ------
-    DocumentError, DataError : the settings, the vessel and the data do not fit together.
+    Raises DocumentError or DataError where the settings, the vessel and the data do not fit together.
     """
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     check_class("settings", settings, Identify, "such as Identify(parameters=[...])", DocumentError)
@@ -141,8 +131,7 @@ def identify(
 def by_log(solution: Solution, dataset: Dataset, other: Dataset) -> Array | None:
     """Change (m,) of the residuals from the log of a fit to another one, as a column of the Jacobian.
 
-    None where a prediction diverges, or the other log has other rows. With the Huber loss every change counts alike:
-    one that only residuals within the threshold make looks as if the fit became better.
+    None where a prediction diverges, or the other log has other rows.
     """
     point = solution.point
     here, there = (
@@ -189,7 +178,6 @@ def _fit_dropping_factors(
     start: Mapping[str, float] | Solution | None,
     progress: Progress | None,
 ) -> Solution:
-    """One fit, and those after each dropped factor."""
     begun = time.perf_counter()
     problem = build_problem(vessel, dataset, runs, settings)
     result, objective_start = _search_from_starts(problem, dataset, start, progress)
@@ -215,8 +203,7 @@ def _search_from_starts(
 ) -> tuple[Result, float]:
     """Result of the first search that converges (else of the best), and the objective at the initial factors.
 
-    A search that converges to an objective above that at the initial factors is followed by one from these. Inverse
-    dynamics are passed over where the runs are too short for them.
+    One that converges above that objective is followed by one from these factors.
     """
     factors, point = _initial_unknowns(problem, start)
     objective_start = evaluate_factors(problem, factors, point).objective
@@ -291,7 +278,6 @@ def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
 
 
 def _same_shapes(point: Point, other: Point) -> bool:
-    """Whether two points have arrays of equal shapes."""
     return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
@@ -338,7 +324,6 @@ def _build_solution(problem: Problem, result: Result, objective_start: float, se
 
 
 def _estimate_refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None:
-    """The reason why the vessel's checks refuse the estimated values; None if they accept them."""
     try:
         vessel.with_values(values)
     except DocumentError as error:
@@ -347,7 +332,6 @@ def _estimate_refusal(vessel: Vessel, values: Mapping[str, float]) -> str | None
 
 
 def _search_sentence(problem: Problem, result: Result, at_bound: NDArray[np.bool_]) -> str:
-    """The status of a search in one sentence, with a remedy."""
     if result.status == "ok":
         limited = [path for path, there in zip(problem.unknown.paths, at_bound, strict=True) if there]
         tail = f"; at a bound, so without an interval: {', '.join(limited)}" if limited else ""
@@ -381,7 +365,6 @@ def _weakest_factor(solution: Solution, threshold: float, targets: Array) -> int
 
 
 def _hold_factor(problem: Problem, number: int, target: float) -> Problem:
-    """The problem with factor `number` held at the value `target`."""
     low, high = problem.unknown.low.copy(), problem.unknown.high.copy()
     low[number] = high[number] = target
     return replace(problem, unknown=replace(problem.unknown, low=low, high=high))

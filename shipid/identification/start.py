@@ -1,9 +1,4 @@
-"""Initial factors of a fit: by continuation in the horizon, and by inverse dynamics.
-
-A long prediction from poor factors diverges, and its objective has many minima. A prediction of two steps is nearly
-linear in the factors. So the fit is solved for short horizons first, each from the factors of the one before:
-continuation. Initial factors need not be exact: part of the data and a loose tolerance are enough.
-"""
+"""Initial factors of a fit: by inverse dynamics, and by continuation from short horizons, which are nearly linear."""
 
 from __future__ import annotations
 
@@ -32,9 +27,7 @@ def grow_horizon(
 ) -> tuple[Array, int, bool]:
     """Initial factors by fits over growing horizons, each shorter than the horizon of the fit.
 
-    Returns
-    -------
-    Factors (n,), number of iterations including those `before`, and whether `progress` asked to stop.
+    Returns factors (n,), number of iterations including those `before`, and whether `progress` asked to stop.
     """
     longest = max(segment.num_steps for segment in problem.segments) * problem.settings.step
     iterations = before

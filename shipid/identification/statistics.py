@@ -1,25 +1,20 @@
 """Uncertainty of the estimates: covariances, confidence intervals, and identifiability.
 
 A weighted least-squares fit with residuals e (m,) and sensitivities J (m, n) has A = J^T J + Lambda, Lambda the
-precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B, of what they assume:
+precision of the priors, and cov = A^-1 (B + Lambda) A^-1. Three forms of B:
 
-    fisher    B = sum over signals of s^2 J_s^T R_s J_s    s^2 is the level of each signal as the residuals show it, not
-              as declared; R_s, the correlation in time of a first-order process, is 1 where residuals are white. To be
-              trusted there. A run that is too short for `block_clusters` has this form, whatever its residuals are.
-    sandwich  B = sum over clusters of (J_g^T A_g e_g)(...)^T     anything within a cluster, independent clusters.
-              A cluster is a run: process noise, model error and colour within it are allowed. A_g = (I - H_gg)^(-1)
-              gives the estimates without that run (CR3, the jackknife): a run that decides much draws the estimates to
-              itself, so its residuals show less than its errors. One number scales B so that it is right in the median
-              direction where errors are independent; t has Satterthwaite's degrees of freedom (of CR2). In a direction
-              that one run alone decides it has no residuals: there errors count as in the others on average. To be
-              trusted from 4 degrees of freedom on (Tipton), in the median of the factors that data rather than priors
-              decide.
-    blocks    the sandwich form with clusters that are stretches of a run, each much longer than the correlation time
-              of the residuals. For few runs; it does not account for a current or a bias that lasts a whole run.
+fisher    B = sum over signals of s^2 J_s^T R_s J_s    s^2 is the level of each signal as the residuals show it; R_s,
+          the correlation in time of a first-order process, is 1 where residuals are white: trusted there.
+sandwich  B = sum over clusters of (J_g^T A_g e_g)(...)^T     clusters are runs, independent of each other.
+          A_g = (I - H_gg)^(-1) gives the estimates without that run (CR3, the jackknife). One number scales B so that
+          it is right in the median direction where errors are independent; t has Satterthwaite's degrees of freedom
+          (of CR2). In a direction that one run alone decides errors count as in the others on average. Trusted from
+          4 degrees of freedom on (Tipton), in the median of the factors that data rather than priors decide.
+blocks    the sandwich with clusters that are stretches of a run, longer than the correlation time of the residuals.
+          It does not account for a current or a bias that lasts a whole run.
 
-No form accounts for a bias of the estimates. Where every prediction has a free initial state, coloured residuals bias
-the factors (incidental parameters: Neyman, Scott, Econometrica 16 (1948) 1), the more the shorter the horizon is
-against the correlation time of the residuals: compare with a fit over a longer horizon.
+No form accounts for a bias. With free initial states coloured residuals bias the factors (Neyman, Scott, Econometrica
+16 (1948) 1), the more the shorter the horizon is against their correlation time.
 
 Sources: Liang, Zeger, Biometrika 73 (1986) 13; Bell, McCaffrey, Survey Methodology 28 (2002) 169 (CR3, Satterthwaite);
 MacKinnon, Nielsen, Webb, Journal of Applied Econometrics 38 (2023) 671 (the jackknife where clusters differ);
@@ -72,17 +67,13 @@ KEPT = 1e-4  # of I - H: directions that a cluster alone decides have no residua
 class LinearFit:
     """Linearisation of a fit at its estimate, as plain arrays; m residuals, n parameters.
 
-    Parameters
-    ----------
-    paths, factors : names and estimates (n,), factors on the base values (dimensionless).
+    paths, factors : names and estimates (n,), factors on the base values. centre : (n,) of the base: 0 where that is 0.
     residuals : (m,) predicted less measured over the declared standard deviation; of each run in the order of time.
-    jacobian : (m, n) d residual / d factor, per-run nuisances projected out.
-    clusters, signals : run number and signal of each residual.
+    jacobian : (m, n) d residual / d factor, per-run nuisances projected out. clusters, signals : of each residual.
     prior_widths : (n,) standard deviation of each factor's prior; infinite without one.
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
     at_bound : (n,) estimates at a bound. held : (n,) factors that were not free. Neither has an interval.
-    dropped : paths of the held factors that the drop test has removed. runs : name of each run number, or empty.
-    centre : (n,) factor of the base vessel: 0 where its number is 0, and factors are on the setting `scale`.
+    dropped : paths of held factors that the drop test removed. runs : name of each run number, or empty.
     """
 
     paths: tuple[str, ...]
@@ -169,10 +160,9 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Uncertainty of the n factors.
+    """Uncertainty of the n factors; infinite for factors that the data do not determine.
 
-    chosen : the form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 %
-    intervals. All are infinite for factors that the data do not determine.
+    chosen : form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 % intervals.
     alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST`.
     sentences : the result in words, one for each factor. correlations : (n, n). free : paths of the factors that are
     neither held nor at a bound. combinations : sets of these that the data do not distinguish.
@@ -201,12 +191,10 @@ class Statistics:
 
 
 def fit_statistics(fit: LinearFit) -> Statistics:
-    """Compute covariances, 95 % intervals and identifiability of a fit.
+    """Covariances, 95 % intervals and identifiability of a fit, linear at the estimate.
 
-    A factor is identified if its 95 % interval from the data alone, without its prior, is within +-`WIDEST` base
-    values. Collinearity explains a wider interval; it is not a criterion, because collinear factors may still be
-    identified. All results are linear at the estimate. For a wide interval, the profile likelihood
-    (`shipid.identification.profile`) shows whether the interval is finite.
+    A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values; collinearity
+    explains a wider one. The profile likelihood (`shipid.identification.profile`) shows whether that is finite.
     """
     free = _free_places(fit)
     if not len(free):
@@ -258,7 +246,6 @@ def _fallback_covariance(covariances: Mapping[Kind, Covariance]) -> Kind:
 
 
 def _statistics_without_factors(fit: LinearFit) -> Statistics:
-    """Statistics of a fit without a free factor: infinite errors, nothing identified."""
     n = len(fit.paths)
     none, wide, fixed = np.zeros(0), np.full(n, np.inf), np.zeros(n, dtype=bool)
     covariance = Covariance("fisher", np.zeros((0, 0)), none, False, "no factor is free")
@@ -278,7 +265,6 @@ def _free_places(fit: LinearFit) -> Index:
 
 
 def _restrict_fit(fit: LinearFit, free: Index) -> LinearFit:
-    """The linearisation with only the columns `free`; all other factors are held."""
     widths = _interval_half_widths(fit)[free]
     paths = tuple(fit.paths[j] for j in free)
     return LinearFit(
@@ -341,9 +327,9 @@ def residual_whiteness(fit: LinearFit, basis: _Basis | None = None) -> dict[str,
 def _correlation_of_runs(runs: Sequence[Array], drift: _Drift) -> tuple[float, float]:
     """Probability that residuals are white, and their integrated correlation time (samples).
 
-    The probability is the smaller one of two tests, times two: Ljung-Box, the statistics of independent runs added, and
-    that of `drift`. The time is 1 + 2 sum rho_k over the pooled correlations up to the first pair that is no longer
-    positive (Geyer, Statistical Science 7 (1992) 473); where the drift alone shows, at least its ratio.
+    Twice the smaller one of Ljung-Box, the statistics of runs added, and `drift`. The time is 1 + 2 sum rho_k over the
+    pooled correlations up to the first pair that is no longer positive (Geyer, Statistical Science 7 (1992) 473); where
+    the drift alone shows, at least its ratio.
     """
     statistic, freedom = 0.0, 0
     for run in runs:
@@ -367,10 +353,8 @@ def _correlation_of_runs(runs: Sequence[Array], drift: _Drift) -> tuple[float, f
 class _Drift:
     """Means over quarters of runs of one signal, z = Q e, whose covariance under white errors is C = Q (I - H) Q^T.
 
-    H = J A^-1 J^T: the factors have taken in a part of what is slow. Nuisances xi ~ N(0, 1) leave marginal residuals
-    white and do not count. z^T z has the mean tr C and the variance 2 tr C^2; it is judged as chi squared, with
-    Satterthwaite's degrees of freedom. A drift that adds x to the variance of the means of errors adds x tr C^2; of a
-    part that nuisances take in, less.
+    H = J A^-1 J^T. z^T z has the mean tr C and the variance 2 tr C^2; it is judged as chi squared, with Satterthwaite's
+    degrees of freedom. A drift that adds x to the variance of the means of errors adds x tr C^2.
 
     total : z^T z over the variance of the residuals. expected, squares : tr C and tr C^2, 0 where no run has quarters.
     """
@@ -526,8 +510,7 @@ def declared_error(fit: LinearFit, path: str) -> float:
 def against_priors(fit: LinearFit) -> dict[str, tuple[float, float, float]]:
     """Factors whose prior the data contradict: path -> width of the prior, and factor with half-width of data alone.
 
-    The fit without priors is one step of Gauss-Newton away. There a factor is farther from the centre of its prior than
-    `CONTRARY` standard deviations of prior and data together.
+    By one step of Gauss-Newton without priors: `CONTRARY` standard deviations of prior and data from the centre.
     """
     inner = _restrict_fit(fit, _free_places(fit))
     centre = np.ones(len(fit.paths)) if fit.centre is None else fit.centre
@@ -557,7 +540,7 @@ def factors_of_single_runs(fit: LinearFit) -> dict[str, str]:
 def open_to_drift(judged: Statistics) -> dict[str, float]:
     """Factors whose interval a slow drift may mislead that the residuals do not show: path -> errors over stated ones.
 
-    The drift is the one that half of such fits overlook (`Whiteness.hidden`). For a fit with errors of the Fisher form.
+    It is the drift that half of such fits overlook (`Whiteness.hidden`).
     """
     inner = _restrict_fit(judged.fit, _free_places(judged.fit))
     effect, labels = inner.jacobian @ _Basis.of(inner).inverse, np.array(inner.signals)
@@ -614,9 +597,8 @@ def _matrix_root(matrix: Array) -> Array:
 def _jackknife_scale(parts: Sequence[_Part], scores: Array) -> tuple[float, Array]:
     """What to multiply scores (clusters, n) by, and the covariance (n, n) along directions that one cluster decides.
 
-    The sum of the squared scores of independent errors is compared with their variance in each principal direction. The
-    scale makes both agree in the median. No score shows the errors along a direction that one cluster alone decides:
-    they count as many times more than independent ones as the scores of all others do.
+    The scale makes squared scores of independent errors and their variance agree in the median of principal directions.
+    Along directions that one cluster alone decides errors count as many times more as the scores of all others do.
     """
     of_scores = sum((axes.T * (values * grown)) @ axes for values, grown, axes in parts)
     of_errors = sum((axes.T * values**2) @ axes for values, _, axes in parts)
@@ -631,10 +613,7 @@ def _jackknife_scale(parts: Sequence[_Part], scores: Array) -> tuple[float, Arra
 
 
 def _freedom_of_scores(parts: Sequence[_Part], weights: Array) -> float:
-    """(tr B)^2 / tr(B^2) of a sum of squared scores along weights (n,), as a form B in independent errors.
-
-    The scores are those without bias (CR2), A_g = (I - H_gg)^(-1/2): CR3 would count twice that runs are unequal.
-    """
+    """(tr B)^2 / tr(B^2) of a sum of squared scores along weights (n,), of CR2: A_g = (I - H_gg)^(-1/2)."""
     of_cluster = [(np.sqrt(values * grown) * (axes @ weights), values, axes) for values, grown, axes in parts]
     diagonal = np.array([one @ one for one, _, _ in of_cluster])
     if diagonal.sum() <= KEPT * float(weights @ weights):
@@ -660,18 +639,13 @@ def block_clusters(fit: LinearFit, length: float) -> Index:
 
 
 def _by_data_alone(fit: LinearFit) -> LinearFit:
-    """The linearisation of the fit without priors, which is one step of Gauss-Newton away; every factor is free."""
     step = -invert_information(fit.jacobian.T @ fit.jacobian)[0] @ (fit.jacobian.T @ fit.residuals)
     left = fit.residuals + fit.jacobian @ step
     return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=None)
 
 
 def _half_widths_without_priors(fit: LinearFit, half: Array) -> Array:
-    """Half-widths (n,) without priors; half : (n,) those with them. Every factor of the fit is free.
-
-    The form of covariance is that of the fit without priors: where these decide, all forms agree with them, and none
-    shows what correlated residuals would do to the data alone.
-    """
+    """Half-widths (n,) without priors, by the form of that fit; half : (n,) those with them. Every factor is free."""
     if not np.isfinite(_interval_half_widths(fit)).any():
         return half
     seen = fit_statistics(_by_data_alone(fit))
@@ -689,7 +663,6 @@ def _width_inflation(fit: LinearFit, free: Index) -> Array:
 def _factor_sentences(
     fit: LinearFit, half: Array, alone: Array, identifiable: NDArray[np.bool_], sets: Sequence[Combination]
 ) -> tuple[str, ...]:
-    """One sentence for each factor: its interval, or the reason why it has none."""
     free, sentences = _free_places(fit), list[str]()
     shared = _width_inflation(fit, free)
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):

@@ -28,7 +28,7 @@ class Stream:
     """Currents of the runs, one for each, that fit best beside the factors, linearised.
 
     currents : (R, 2) [m/s] north and east. explained : share of the squares of the residuals that they take away, of
-        those that a steady error of u and of v of all runs leaves: that is a wrong vessel, or a sensor.
+    those that a steady error of u and of v of all runs leaves.
     """
 
     currents: Array

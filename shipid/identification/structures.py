@@ -1,8 +1,8 @@
 """Structures of hull forces, and how the hull of a vessel is exchanged for another one.
 
-A structure names the coefficients of a hull. Its starting values follow from the hull of the vessel: both give the same
-forces, as nearly as a linear least-squares fit over the states of the data and beyond them can make it. The prior of a
-coefficient has two parts: a share of its value, and a share of the hull's force, so that a small value is free to grow.
+A structure names the coefficients of a hull. Starting values give the forces of the present hull by linear least
+squares over the states of the data and beyond them. The prior of a coefficient is a share of its value and a share of
+the hull's force.
 
 Sources: MMG, Yasukawa and Yoshimura (2015); Abkowitz (1964); second-order modulus, Norrbin (1970), Fedyaevsky and
 Sobolev (1964).
@@ -124,16 +124,11 @@ def exchange_structure(
 ) -> HullExchange:
     """Exchange the hull of a vessel for that of a structure, with starting values that make the same forces.
 
-    Parameters
-    ----------
-    name : of `STRUCTURES`, or `present`: vessel and settings as they are.
-    dataset, runs : whose states the forces are compared over.
+    name : of `STRUCTURES`, or `present`. dataset, runs : whose states the forces are compared over.
     settings : numbers that are no coefficients of the hull stay free or fixed as they say, with their priors.
 
-    Raises
-    ------
-    ShipidError : an unknown structure. DocumentError : a vessel without the sizes that the structure needs.
-    DataError : a run or a command that the data do not have.
+    Raises ShipidError for an unknown structure, DocumentError for a vessel without the sizes that it needs, DataError
+    for a run or a command that the data do not have.
     """
     check_structures([name])
     if name == PRESENT:
@@ -152,7 +147,6 @@ def exchange_structure(
 
 
 def _rudders_behind_propellers(vessel: Vessel) -> dict[str, Mapping[str, Any]]:
-    """Dotted path -> block of every rudder behind a propeller."""
     return {
         f"thruster.{name}": block
         for name, block in vessel.document.get("thruster", {}).items()

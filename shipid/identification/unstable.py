@@ -1,7 +1,6 @@
 """Ships that do not keep their course by themselves: how fast a small yaw grows, and what it does to long predictions.
 
-In a prediction over a whole run a random force early in the run then grows, and a run that comes near to turning the
-other way decides most of the estimates: `docs/identification-coverage.md`.
+See `docs/identification-coverage.md`.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ _NORTH = re.compile(r"(?:°|deg)? ?(t|m|true|mag)")
 
 
 def split_amounts(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]]:
-    """Return the numbers (N,) of texts such as 12.3 kn, as text, and their units; each other text with no unit."""
+    """The numbers (N,) of texts such as 12.3 kn, as text, and their units; each other text with no unit."""
     found = texts.str.extract(rf"^(?:{_AMOUNT.pattern})$")
     units = found[1].map(lambda unit: _as_written(unit) if isinstance(unit, str) else "").astype(object)
     return found[0].where(units.ne(""), texts), units
@@ -55,7 +55,7 @@ def split_amounts(texts: pd.Series[Any]) -> tuple[pd.Series[Any], pd.Series[Any]
 
 @cache
 def _as_written(text: str) -> str:
-    """Return a unit as a name would have it in brackets; empty where it is none."""
+    """A unit as a name would have it in brackets; empty where it is none."""
     north = north_reference(text)
     if north == "T" or (north and len(text) > 1):  # m alone is metres
         return f"deg {north}"
@@ -66,7 +66,7 @@ def _as_written(text: str) -> str:
 
 @cache
 def without_prefix(text: str) -> tuple[str, float]:
-    """Return a unit without its prefix, and what that multiplies it by: mrad is rad and 0.001; 1 where it has none."""
+    """A unit without its prefix, and what that multiplies it by: mrad is rad and 0.001; 1 where it has none."""
     found = _PREFIX.fullmatch(text.strip().lower())
     if found and not is_known(found[0]) and any(re.fullmatch(UNIT_WORDS[unit], found[2]) for unit in PREFIXED):
         return found[2], _PREFIXES[found[1]]

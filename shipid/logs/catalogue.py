@@ -14,19 +14,14 @@ FOLDER_VARIABLE = "SHIPID_DATA"
 
 
 def bundled_mappings() -> list[str]:
-    """Return the names of the bundled mappings; `fetch_log` takes each of them."""
+    """The names of the bundled mappings; `fetch_log` takes each of them."""
     return list(document.bundled_documents("studies/mappings"))
 
 
 def fetch_log(name: str) -> Path:
-    """Return the file of the log that a mapping describes; its checksum is verified.
+    """The file of the log of a mapping, its checksum verified: in SHIPID_DATA if that is set, else downloaded once.
 
-    If the environment variable SHIPID_DATA is set, the log must be in that folder and nothing is downloaded. If it is
-    not set, the log is downloaded once from the mapping's url into the cache folder of the user.
-
-    Raises
-    ------
-    DataError : if the log is not there, cannot be downloaded, or is another file than the mapping was written for.
+    Raises DataError if it is not there, cannot be downloaded, or is another file.
     """
     mapping = read_mapping(name)
     source = mapping.source

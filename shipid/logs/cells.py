@@ -90,7 +90,7 @@ def row_in_words(log: pd.DataFrame, place: int) -> str:
 
 
 def log_column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Series[Any]:
-    """Return a column (N,) of a log by its name; raises DataError at `path` where it is missing, or there twice."""
+    """A column (N,) of a log by its name; raises DataError at `path` where it is missing, or there twice."""
     names = [str(name) for name in log.columns]
     if names.count(source) > 1:
         raise DataError(f"column {source!r} appears twice in the log: rename one of them", file=file, path=path)
@@ -106,10 +106,9 @@ def log_column(log: pd.DataFrame, source: str, file: Path, path: str) -> pd.Seri
 def parse_numbers(
     log: pd.DataFrame, source: str, form: Format, file: Path, path: str, sides: str = "", units: tuple[str, ...] = ()
 ) -> NDArray[np.float64]:
-    """Turn a column into numbers, NaN where it is missing; text that is no number raises with its row.
+    """Turn a column into numbers, NaN where missing; text that is no number raises with its row.
 
-    With the letters of its `sides` it is an angle in degrees, which may be written as 59°26'12.3"N, or P12.5. A number
-    may have one of its `units` behind it, and no other one; nor true north in some rows and magnetic north in others.
+    sides : letters of an angle in degrees, such as 59°26'12.3"N. units : of which one may stand behind every number.
     """
     column = log_column(log, source, file, path)
     if pd.api.types.is_numeric_dtype(column.dtype):
@@ -176,7 +175,7 @@ def parse_numbers(
 
 
 def _row_of_thousands_mark(text: pd.Series[Any]) -> int | None:
-    """Return the first row whose point may mark thousands, 1.250 for 1250; None where a point of a column may not."""
+    """The first row whose point may mark thousands, 1.250 for 1250; None where a point of a column may not."""
     pointed = text.str.contains(".", regex=False)
     groups = text.str.fullmatch(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?")
     return int(np.argmax(pointed)) if pointed.any() and groups[pointed].all() else None

@@ -24,10 +24,7 @@ MANY, FAR_MORE = 10_000_000, 100  # instants, and those for each row: beyond bot
 def common_instants(
     channels: dict[str, Channel], held: set[str], t: NDArray[np.float64], step: float | None, file: Path
 ) -> NDArray[np.float64]:
-    """Return the instants [s] that every channel covers: `step` [s] apart, or the instants of the log.
-
-    Those in `held` hold their last value to the last row, whether it has a value or not.
-    """
+    """The instants [s] that every channel covers: `step` [s] apart, or the instants of the log."""
     spans = {name: times[np.isfinite(values)] for name, (times, values) in channels.items()}
     empty = [name for name, times in spans.items() if not len(times)]
     if empty:
@@ -53,10 +50,9 @@ def common_instants(
 def instants_at_step(
     first: float, last: float, step: float, times: list[NDArray[np.float64]], file: Path, path: str
 ) -> NDArray[np.float64]:
-    """Return the instants [s] that are `step` [s] apart from first to last; none where it is before first.
+    """The instants `step` [s] apart from first to last; none where it is before first.
 
-    times : of the samples (N,) [s] of every channel. Raises DataError for far more instants than these: one wrong date
-    puts years between two rows.
+    times : of the samples (N,) [s] of every channel. Raises DataError for far more instants than these: a wrong date.
     """
     count = max(0, int(np.floor((last - first) / step)) + 1)
     if count > MANY and count > FAR_MORE * len(samples := np.unique(np.concatenate(times))):
@@ -72,7 +68,7 @@ def instants_at_step(
 
 
 def interpolation_rule(name: str, column: Column) -> str:
-    """Return the rule of interpolation: as declared, else `previous` for orders, `angle` where it wraps, `linear`."""
+    """The rule of interpolation: as declared, else `previous` for orders, `angle` where it wraps, `linear`."""
     usual = "short way" if name == "longitude" else "linear"
     return column.interpolation or ("previous" if is_command(name) else "angle" if column.wrap else usual)
 

@@ -63,10 +63,7 @@ SAMPLES = 60  # texts by which the way of writing is looked for
 
 
 def other_zone(head: str, clock: str, first: str) -> str:
-    """Say that a first time without a zone is read as UTC, where the head of a log, or its clock's name, says another.
-
-    Empty where they say none, and for a time of day alone.
-    """
+    """Say that a first time without a zone is read as UTC, where the head of a log, or its clock's name, has one."""
     said = _SAID_OF_CLOCK.search(clock) or _SAID.search(f"{head}\n{clock}")
     if said is None or re.search(f"{ZONE}|{UTC_BEHIND}|^{TIME_OF_DAY}$", first):
         return ""
@@ -74,11 +71,10 @@ def other_zone(head: str, clock: str, first: str) -> str:
 
 
 def parse_dates(dates: pd.Series[Any]) -> Array:
-    """Return dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
+    """Dates as seconds since 1970 (UTC where no zone is given), times of day as seconds since midnight.
 
-    Read are ISO 8601, dates and durations of pandas, durations as text, and `DAYS` with `HOURS`; of those that every
-    row can be, that with which the log is shorter, else day/month. A time of day goes on after midnight. NaN where
-    there is none, and where a date has no zone while others have one.
+    Read are ISO 8601, dates and durations of pandas, and `DAYS` with `HOURS`: of those that every row can be, that with
+    which the log is shorter, else day/month. NaN where there is none, or no zone while others have one.
     """
     if isinstance(dates.dtype, pd.CategoricalDtype):
         dates = dates.astype(object)
@@ -188,10 +184,7 @@ def format_span(first: float, last: float) -> str:
 
 
 def join_date_and_time(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Series[Any]:
-    """Return dates and times of day, of two columns (N,), as one column of text for `parse_dates`.
-
-    Both may be in one number, as 20240514 or 140524 and 80000.5; or in days of Excel and their fractions.
-    """
+    """Dates and times of day of two columns (N,) as text for `parse_dates`; both may be numbers, or days of Excel."""
     days, hours = _as_texts(dates), _as_texts(times).str.replace(",", ".")
     if days.str.fullmatch(DAY_OF_EXCEL).all() and hours.str.fullmatch(FRACTION).all():
         micros = (1e6 * DAY * (days.astype("Float64") - EXCEL + hours.astype("Float64"))).round()
@@ -203,7 +196,7 @@ def join_date_and_time(dates: pd.Series[Any], times: pd.Series[Any]) -> pd.Serie
 
 
 def days_with_marks(dates: pd.Series[Any]) -> pd.Series[Any]:
-    """Return dates (N,) as text, those in one number with marks: 2024-05-14, 14/05/2024, and 14/05/24 or 24/05/14."""
+    """Dates (N,) as text, those in one number with marks: 2024-05-14, 14/05/2024, and 14/05/24 or 24/05/14."""
     texts = _as_texts(dates).str.replace(r"^(\d{5}|\d{7})$", r"0\1", regex=True)
     texts = texts.str.replace(r"^((?:19|20)\d\d)(0[1-9]|1[0-2])(\d\d)$", r"\1-\2-\3", regex=True)
     return texts.str.replace(r"^(\d\d)(\d\d)((?:19|20)\d\d|\d\d)$", r"\1/\2/\3", regex=True)
@@ -217,12 +210,7 @@ def _as_texts(cells: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def date_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Return year, month and day, or year and day of the year (N,), as text; None where the log has neither.
-
-    The text is for `join_date_and_time`.
-
-    Years of two digits are of 1969 to 2068, as everywhere in Python.
-    """
+    """Year, month and day, or year and day of the year (N,), as text; None where the log has neither."""
     year, last = parts[0], 31 if len(parts) == 3 else 366
     year = np.where((year >= 0) & (year < 100), year + np.where(year < 69, 2000, 1900), year)
     limits = [(1900, 9999), *([(1, 12)] if len(parts) == 3 else []), (1, last)]
@@ -235,7 +223,7 @@ def date_texts(parts: list[Array]) -> pd.Series[Any]:
 
 
 def time_texts(parts: list[Array]) -> pd.Series[Any]:
-    """Return hour, minute and, if there is a third, second (N,), as text for `parse_dates`; None without an hour."""
+    """Hour, minute and, if there is a third, second (N,), as text for `parse_dates`; None without an hour."""
     hour, minute, *rest = parts
     second = rest[0] if rest else np.zeros(len(hour))
     known = _all_whole([hour, minute, np.floor(second)], [(0, 23), (0, 59), (0, 60)])
@@ -274,19 +262,13 @@ def _since_midnight(times: pd.Series[Any]) -> Array:
 
 
 def over_midnights(since: Array) -> Array:
-    """Times of day (N,) [s] as seconds since the first midnight: after one that goes back, the next day has begun.
-
-    Where it goes back by an hour it is not the next day: see `hour_twice`.
-    """
+    """Times of day (N,) [s] as seconds since the first midnight: after one that goes back, the next day has begun."""
     steps = np.diff(since, prepend=since[:1])
     return np.asarray(since + DAY * np.cumsum((steps < -NEXT_DAY) & ~_hour_back(steps)), dtype=np.float64)
 
 
 def hour_twice(t: Array) -> tuple[int, str] | None:
-    """Row (from 0) of a log at t (N,) [s] that begins an hour anew, and what to do; None if no row does.
-
-    So local time does at the end of daylight saving. A pause of up to ten minutes may lie between the rows.
-    """
+    """Row (from 0) of a log at t (N,) [s] that begins an hour anew, and what to do; None if no row does."""
     steps = np.diff(t)
     row = int(np.argmax(steps < 0)) + 1 if np.any(steps < 0) else 0
     if row == 0 or not _hour_back(steps[row - 1]):

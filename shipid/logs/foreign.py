@@ -117,7 +117,7 @@ FOREIGN = (
 
 
 def foreign_format(head: bytes) -> Foreign | None:
-    """Return what kind of file begins with these bytes, where it is one that no reader reads; else None."""
+    """What kind of file begins with these bytes, where it is one that no reader reads; else None."""
     start = head[:ENOUGH].removeprefix(b"\xef\xbb\xbf")
     if is_workbook(start):
         return None

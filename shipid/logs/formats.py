@@ -31,7 +31,7 @@ class TableFormat(Format):
     ragged: Literal["refuse", "drop"] = "refuse"  # lines with more or fewer cells than the header, or its names again
 
     def text(self) -> TextFormat:
-        """Return how the lines of the table are read."""
+        """How the lines of the table are read."""
         return TextFormat(separator=SEPARATOR, **{name: getattr(self, name) for name in TableFormat.model_fields})
 
     @field_validator("thousands")
@@ -50,7 +50,7 @@ class TextFormat(TableFormat):
     comment: str | None = Field(default=None, min_length=1, max_length=1)
 
     def text(self) -> TextFormat:
-        """Return this format."""
+        """The format."""
         return self
 
     @field_validator("separator")

@@ -45,10 +45,9 @@ def unwrap_angles(rows: pd.DataFrame, mapping: Mapping, file: Path) -> pd.DataFr
 
 
 def check_wraps(t: Array, values: Array, name: str, column: Column, max_gap: float, file: Path) -> None:
-    """Raise DataError where an angle jumps by a whole turn, for the mean of 359 and 1 deg is 180, or cannot wrap.
+    """Raise DataError where an angle jumps by a whole turn from row to row, or over a gap of at most `max_gap` [s].
 
-    It does so from row to row, or over a gap of at most `max_gap` [s], which will be interpolated. An order is not
-    interpolated, but a gear that follows it would go the whole turn back.
+    The mean of 359 and 1 deg is 180.
     """
     row = signal_row(name)
     ordered = row is not None and row.angle and is_command(name)
@@ -107,9 +106,9 @@ def unwrap_in_place(values: NDArray[np.float64]) -> None:
 def project_positions(
     rows: pd.DataFrame, mapping: Mapping, file: Path
 ) -> tuple[pd.DataFrame, Records, tuple[float, float]]:
-    """North and east [m] in the plane that touches the ellipsoid (WGS 84) at the origin, instead of positions on it.
+    """North and east [m] in the plane that touches WGS 84 at the origin; directions count from its north.
 
-    What counts from true north is turned to the north of the plane. Also the record of that, and the origin [deg].
+    Also the record of that, and the origin [deg].
     """
     from pymap3d import geodetic2ned
 
@@ -151,10 +150,9 @@ def meridian_convergence(latitude: ArrayLike, longitude: ArrayLike, latitude_0: 
 def rotate_to_plane(
     rows: pd.DataFrame, turn: NDArray[np.float64], columns: dict[str, Column]
 ) -> tuple[pd.DataFrame, Records]:
-    """Turn psi, course, true wind and earth-fixed velocities of rows (N,) by the angles `turn` (N,) [rad].
+    """Turn psi, course, true wind and earth-fixed velocities of rows (N,) by `turn` (N,) [rad]; also a record of that.
 
-    Also the record of that. Where no angle is above `PARALLEL`, nothing is turned. A position that is missing or jumps
-    has the angle of those about it.
+    Where no angle is above `PARALLEL`, nothing is turned.
     """
     t, known = rows["t"].to_numpy(), np.isfinite(turn)
     turn[known] = np.unwrap(turn[known])

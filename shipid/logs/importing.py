@@ -101,16 +101,9 @@ def import_log(
     the other repairs in the order of the mapping, estimation of u, v, r, apparent to true wind, runs, resampling.
     `metadata["repairs"]` counts every repair, `flags` marks its rows.
 
-    Parameters
-    ----------
-    mapping : what the columns are, from `read_mapping`.
-    file : the log; with `source.runs`, the folder of its files.
-    without : kinds of repair to leave out.
+    file : the log; with `source.runs`, the folder of its files. without : kinds of repair to leave out.
     progress : called with the share of a large log that has been read, 0 to 1.
-
-    Raises
-    ------
-    DataError : with the log, the row or the key of the mapping, and what would be right.
+    Raises DataError with the log, the row or the key of the mapping, and what would be right.
     """
     check_class("mapping", mapping, Mapping, "as of `read_mapping`", DataError)
     source, off = as_path("file", file, DataError), tuple(without)
@@ -164,7 +157,7 @@ def import_log(
 
 
 def run_files(source: LogSource, log: Path) -> dict[str, Path]:
-    """Return run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
+    """Run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         if log.is_dir():
             fault = 'cannot be read: a folder, and the mapping reads one file; for a file a run write runs = "*.csv"'
@@ -184,7 +177,7 @@ def run_files(source: LogSource, log: Path) -> dict[str, Path]:
 
 
 def run_name(file: Path, folder: Path, pattern: str) -> str:
-    """Return the name of the run in a file: the text that a single star matches, else its path without ending."""
+    """The name of the run in a file: the text that a single star matches, else its path without ending."""
     if pattern.count("*") == 1 and "/" not in pattern:
         before, _, after = pattern.partition("*")
         return file.name.removeprefix(before).removesuffix(after)
@@ -192,7 +185,7 @@ def run_name(file: Path, folder: Path, pattern: str) -> str:
 
 
 def log_digest(mapping: Mapping, log: Path) -> str:
-    """Return the SHA-256 of the log in hex; for several files, the SHA-256 of their SHA-256s joined."""
+    """The SHA-256 of the log in hex; for several files, the SHA-256 of their SHA-256s joined."""
     files = [*run_files(mapping.source, log).values(), *(log.parent / entry.path for entry in mapping.file.values())]
     digests = [file_digest(file) for file in files]
     several = mapping.source.runs is not None or mapping.file
@@ -200,7 +193,7 @@ def log_digest(mapping: Mapping, log: Path) -> str:
 
 
 def file_digest(file: Path) -> str:
-    """Return the SHA-256 of a file in hex; raises DataError if it cannot be read."""
+    """The SHA-256 of a file in hex; raises DataError if it cannot be read."""
     require_file(file)
     try:
         with file.open("rb") as stream:
@@ -268,10 +261,7 @@ def _comes_first(repair: Repair, fixed: bool, read: set[str]) -> bool:
 
 
 def _check_breaks(mapping: Mapping, t: Array, off: tuple[str, ...], file: Path) -> None:
-    """Raise DataError for an interval of a break that no time t (N,) [s] of a log reaches: its clock is another one.
-
-    Where each run has a separate clock, or part, the interval may be of another run.
-    """
+    """Raise DataError for an interval of a break that no time t (N,) [s] of a log reaches: its clock is another one."""
     alone = mapping.source.runs is None and mapping.parts is None and BREAK not in off
     for index, repair in enumerate(mapping.repair if alone else ()):
         for start, end in repair.intervals if isinstance(repair, Break) and repair.enabled else ():
@@ -330,7 +320,7 @@ def _import_table(mapping: Mapping, file: Path, log: pd.DataFrame, off: tuple[st
 
 
 def _add_records(parts: list[Records]) -> Records:
-    """Return the records of all files; counts of one kind and column are added up."""
+    """The records of all files; counts of one kind and column are added up."""
     if len(parts) == 1:
         return parts[0]
     total: dict[tuple[str, str, int], dict[str, Any]] = {}
@@ -411,10 +401,7 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
 
 
 def _run_begins(log: pd.DataFrame, t: NDArray[np.float64], parts: RunParts, file: Path) -> Begins:
-    """Return where runs begin in the rows of a log at t (N,) [s]: after a pause, or where the column changes.
-
-    Runs are named after the value of the column, else after their number.
-    """
+    """Where runs begin in the rows of a log at t (N,) [s]: after a pause, or where the column changes."""
     new = np.append(True, np.diff(t) > (np.inf if parts.pause is None else parts.pause))
     if parts.source is None:
         return [(float(t[row]), str(number)) for number, row in enumerate(np.flatnonzero(new), 1)]

@@ -28,7 +28,7 @@ from shipid.logs.repairs import Records
 
 
 def read_clock(log: pd.DataFrame, clock: Clock | FileClock, form: Format, file: Path, path: str) -> NDArray[np.float64]:
-    """Return the time of every row [s]; raises DataError where it is missing or does not rise."""
+    """The time of every row [s]; raises DataError where it is missing or does not rise."""
     t = read_time_column(log, clock, form, file, path)
     twice = hour_twice(t) if np.isfinite(t).all() and (is_dated(clock.unit) or clock.unit == "hhmmss") else None
     if twice is not None:
@@ -122,10 +122,9 @@ def rows_repeated(table: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def even_instants(t: NDArray[np.float64], every: float, log: pd.DataFrame, file: Path) -> NDArray[np.float64]:
-    """Return instants `every` [s] apart in place of a rounded column of time t (N,) [s] of a log.
+    """Instants `every` [s] apart in place of a rounded column of time t (N,) [s]; lost rows leave out steps.
 
-    The rows run on from the first. Where the column pauses, or where rows were lost, whole steps are left out. Raises
-    DataError where the column leaves the instants by more than it is rounded.
+    Raises DataError where the column leaves the instants by more than it is rounded.
     """
     even, _ = even_clock(t, every)
     rounding = clock_rounding(t)
@@ -139,7 +138,7 @@ def even_instants(t: NDArray[np.float64], every: float, log: pd.DataFrame, file:
 
 
 def even_clock(t: NDArray[np.float64], every: float) -> tuple[NDArray[np.float64], int]:
-    """Return instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
+    """Instants `every` [s] apart that follow a rounded column of time, and the number of pauses in it."""
     rounding = clock_rounding(t)
     pauses = np.flatnonzero(np.diff(t) > 2.0 * rounding[1:] + 3.0 * every) + 1
     even = np.empty(len(t))
@@ -177,10 +176,7 @@ def _with_losses(t: NDArray[np.float64], every: float, rounding: NDArray[np.floa
 
 
 def clock_rounding(t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far a rounded column of time may be from the truth in each row [s]: its step to the next other value.
-
-    Of numbers written with a few digits the step grows with the number; the largest so far is taken.
-    """
+    """How far a rounded time may be from the truth in each row [s]: its largest step to the next other value so far."""
     values = np.unique(t)
     if len(values) < 3:
         return np.full(len(t), np.inf)

@@ -21,19 +21,13 @@ PAUSE = 3600.0  # s put between recordings whose clocks overlap but count from n
 
 
 def join_datasets(datasets: Mapping[Path, Dataset]) -> tuple[Dataset, list[str]]:
-    """Return one dataset with all runs, and notes on what was changed.
+    """One dataset with all runs, and notes on what was changed.
 
-    Positions have the origin of the first dataset, and directions the north of its plane. Columns that not all have are
-    left out; commands must be the same. Names of runs that clash get the name of their file before them.
+    Positions have the origin of the first dataset. Columns that not all have are left out. Names of runs that clash get
+    the name of their file before them.
 
-    Parameters
-    ----------
-    datasets : file -> dataset, two or more; the names in messages and in the metadata are those of the files.
-
-    Raises
-    ------
-    DataError : the commands or the vessels differ, a run is in two datasets, positions have no common origin, or clocks
-        cannot be one.
+    datasets : file -> dataset, two or more.
+    Raises DataError where commands or vessels differ, a run is in two datasets, or origins or clocks cannot be one.
     """
     if len(datasets) < 2:
         raise DataError(f"{len(datasets)} dataset: joining needs two or more")

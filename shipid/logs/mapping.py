@@ -117,17 +117,15 @@ Four = Annotated[tuple[str, ...], Field(min_length=4, max_length=4)]
 
 
 def source_columns(source: Named | Four) -> tuple[str, ...]:
-    """Return the names of the columns of the log that say a value."""
+    """The names of the columns of the log that say a value."""
     return (source,) if isinstance(source, str) else tuple(source)
 
 
 class LogSource(StrictPart):
     """Where the log is published, and the exact bytes that the mapping was written for.
 
-    With `runs`, a pattern such as `Z_*.dat` or `**/*.csv`, the log is a folder. Every file of that name is one run with
-    a separate clock. Its name is the text that the star matches; with more stars or with sub-folders it is the
-    path without its ending. `skip` are files, by their path in the folder, that are left out. `manoeuvres` says what
-    runs are.
+    runs : a pattern such as `Z_*.dat` or `**/*.csv`: the log is a folder, every file one run with a separate clock,
+    named by the text that the star matches, or by its path. skip : files that are left out. manoeuvres : what runs are.
     """
 
     file: str | None = None  # relative to the data folder
@@ -143,8 +141,7 @@ class LogSource(StrictPart):
 class TimeColumn(StrictPart):
     """The column of time of a file, or two or three of hour, minute and second; beside times of day the date.
 
-    `date` is a column of dates, or two or three of year, month and day, or of year and day of the year. The unit is
-    "date" then, and where the time is in parts.
+    date : a column, or two or three of year, month and day, or of year and day of the year.
     """
 
     source: Named = Field(alias="from")
@@ -160,8 +157,7 @@ class TimeColumn(StrictPart):
 class Clock(TimeColumn):
     """The column of time; gaps up to `max_gap` [s] are interpolated, longer ones break the run.
 
-    With `step` [s] the rows of the dataset are that far apart, and every column is interpolated at their instants. With
-    `every` [s] the rows of the log are that far apart, and its column of time is only their rounded time.
+    step : [s] between rows of the dataset, by interpolation. every : [s] between rows of the log, rounded in its time.
     """
 
     max_gap: float | None = Field(default=None, gt=0)
@@ -192,9 +188,8 @@ class PlaneOrigin(StrictPart):
 class Column(StrictPart):
     """One column of the dataset: value = sign * factor * (source column) + offset, in `unit`, then turned as declared.
 
-    The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds; that of a heading
-    the four of a quaternion. Its samples are of `latency` [s] before their time stamp; `interpolation` is the rule
-    between samples.
+    The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds; of a heading the
+    four of a quaternion. `latency` [s]: how late samples are stamped; `interpolation`: the rule between samples.
     """
 
     source: Named | Four = Field(alias="from")
@@ -212,11 +207,7 @@ class Column(StrictPart):
 
 
 class VelocityEstimate(StrictPart):
-    """How u, v, r that the log lacks are estimated: standard deviations of what is logged, and how fast they change.
-
-    `position` [m], `heading_deg`, `velocity` [m/s] and `rate_deg` [deg/s] are errors of one sample; `acceleration`
-    [m/s^2] and `angular_acceleration_deg` [deg/s^2] are what u, v and r change by in one second.
-    """
+    """How u, v, r that the log lacks are estimated: standard deviations of one sample, and of the change in 1 s."""
 
     position: float = Field(gt=0)
     heading_deg: float = Field(gt=0)
@@ -320,7 +311,7 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
 
 
 def to_si(unit: str, name: str) -> float:
-    """Return the factor from a unit of the log to the SI unit of a column."""
+    """The factor from a unit of the log to the SI unit of a column."""
     return UNITS[str(INPUTS.get(name) or unit_of_column(name))][unit]
 
 
@@ -336,7 +327,7 @@ def clock_seconds(values: NDArray[np.float64], unit: str) -> NDArray[np.float64]
 
 
 def since_midnight(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return numbers (N,) such as 123005.5, half past twelve, as seconds since the first midnight; NaN for no time."""
+    """Numbers (N,) such as 123005.5, half past twelve, as seconds since the first midnight; NaN for no time."""
     hour, minute, second = values // 10_000, values // 100 % 100, values % 100
     since = 3600.0 * hour + 60.0 * minute + second
     since[~((values >= 0) & (hour < 24) & (minute < 60) & (second < 61))] = np.nan  # 60: a leap second
@@ -362,10 +353,7 @@ def rate_of_ais(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def degrees_in_parts(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Degrees, minutes and, if there are three, seconds (N,) in degrees; NaN where there are 60 of them or more.
-
-    The sign of one is that of all: -33 deg 18 min, and -0 deg 18 min.
-    """
+    """Degrees, minutes and, if there are three, seconds (N,) in degrees; NaN where there are 60 of them or more."""
     degrees = np.abs(parts[0])
     for part, share in zip(parts[1:], (60.0, 3600.0), strict=False):
         degrees = degrees + np.where(np.abs(part) < 60.0, np.abs(part), np.nan) / share
@@ -390,9 +378,8 @@ def quaternion_size(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
 def degrees_in_text(texts: pd.Series[Any], sides: str) -> NDArray[np.float64]:
     """Texts (N,) such as 59°26'12.3"N, N59 26.205 or 5926.205N in degrees; NaN for a text that says no angle.
 
-    `sides` are the letters of this angle, "NS" or "EW", that of positive numbers first: a text with both a latitude and
-    a longitude says the one that they name. All texts have a letter or none has. Where one has four digits before the
-    point or more, all that are one number are degrees and minutes in one, with six or more also seconds.
+    sides : letters of this angle, "NS" or "EW", the positive one first; all texts have one or none has. Four digits
+    before the point are degrees and minutes, six also seconds.
     """
     upper = texts.astype(str).str.strip().str.upper().str.replace(_COMMA, ".", regex=True)
     found = upper.str.extract(rf"^(?:{_ANGLE.pattern})$")
@@ -439,10 +426,7 @@ def side_letters(name: str) -> str:
 
 
 def degrees_to_sides(texts: pd.Series[Any]) -> NDArray[np.float64]:
-    """Texts (N,) such as P12.5, 7.0 S or STBD 20 in degrees, those to starboard positive; NaN for any other text.
-
-    Only 0 may stand without a side, and a number with one has no sign.
-    """
+    """Texts (N,) such as P12.5, 7.0 S or STBD 20 in degrees, those to starboard positive; NaN for any other text."""
     upper = texts.astype(str).str.strip().str.upper().str.replace(",", ".", regex=False)
     before, other, number, behind, another = (
         upper.str.extract(rf"^(?:{_SIDED.pattern})$")[place].fillna("") for place in range(5)

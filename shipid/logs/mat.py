@@ -21,11 +21,9 @@ MOST_SIGNALS = 100  # columns of a matrix that has fewer rows: more are times
 
 
 def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
-    """Return the vectors of a MATLAB file that are as long as the clock, as a table.
+    """The vectors of a MATLAB file that are as long as the clock, else as the longest with enough, as a table.
 
-    Without a clock of that name they are as long as the longest of which there are enough for a log. `attrs["other"]`
-    says of every other variable what it is, and how to make a vector of it; `attrs["notes"]` are sentences on those
-    that MATLAB must save otherwise, and on vectors of another length.
+    `attrs["other"]` says of other variables what they are, and how to make a vector; `attrs["notes"]` are sentences.
     """
     from scipy.io import loadmat
 
@@ -103,10 +101,7 @@ def _open_structs(variables: dict[str, Any], prefix: str = "") -> Iterable[tuple
 
 
 def _no_vectors(variables: dict[str, Any]) -> Iterable[tuple[str, str, str]]:
-    """Dotted name of every variable that is no vector of numbers, what it is, and how MATLAB makes a vector of it.
-
-    The last is empty where nothing has to be saved anew.
-    """
+    """Dotted name of every variable that is no vector of numbers, what it is, and how MATLAB makes a vector of it."""
     for name, value in _open_structs(variables):
         last = name.rpartition(".")[2]
         cells = list(value.flat) if isinstance(value, np.ndarray) and value.dtype == object else value

@@ -37,16 +37,9 @@ class MeasuredDataset:
 def measure_dataset(dataset: Dataset, kind: str | None = None, length: float | None = None) -> MeasuredDataset:
     """Measure every run; a run with breaks is measured in its unbroken pieces, named `run/1`, `run/2`, ...
 
-    Instants are those of the log; where its clock has dates, they count from the begin of the piece.
-
-    Parameters
-    ----------
     kind : of all runs, a key of `standard_manoeuvres()`; default: what is recognised.
-    length : of the ship between perpendiculars [m]; without it nothing is judged by ship lengths.
-
-    Raises
-    ------
-    DataError : an unknown kind, a length that is not positive.
+    length : between perpendiculars [m]; without it nothing is judged by ship lengths.
+    Raises DataError for an unknown kind, or a length that is not positive.
     """
     trials = standard_manoeuvres()
     if kind is not None and kind not in trials:

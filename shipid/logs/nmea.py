@@ -38,10 +38,10 @@ _BEGIN = re.compile(r"[$!]([A-Z][A-Z0-9]{3,7}),")
 
 
 def read_nmea(file: Path, form: NmeaFormat, _: str, progress: Callable[[float], None] | None = None) -> pd.DataFrame:
-    """Return sentences as rows: `time` [s] and columns of their values, NaN where a sentence has no value.
+    """Sentences as rows: `time` [s] and columns of their values, NaN where a sentence has no value.
 
-    Of talkers that say a column side by side, the one who says it most often has it. The others have columns with their
-    letters, such as `heading_GP`. `attrs["unreadable"]` counts the lines that are no sentence or fail their checksum.
+    The talker who says a column most often has it; others have columns with their letters, such as `heading_GP`.
+    `attrs["unreadable"]` counts lines that are no sentence or fail their checksum.
     progress : called with the share of a long log that has been read, 0 to 1.
     """
     refuse_foreign(file)
@@ -106,7 +106,7 @@ class _Heard:
             talkers.append(sentence.talker)
 
     def table(self) -> pd.DataFrame:
-        """Return the rows: what is said at one time is in one, of a column what is said first."""
+        """The rows: what is said at one time is in one, of a column what is said first."""
         times = np.array(self.stamps) if self.stamped else self.clock.times()
         known = np.isfinite(times)
         new = known & (times != np.append(np.nan, times[:-1]))
@@ -163,10 +163,7 @@ def _by_talker(name: str, t: Array, talkers: NDArray[np.str_]) -> Iterator[tuple
 
 
 def _from_main_talker(t: Array, main: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether what was said at t (N,) [s, also of the day] is of a main talker, or said while that is silent.
-
-    A receiver may change its letters with the satellites in sight, as from GP to GN. Two receivers speak side by side.
-    """
+    """Whether what was said at t (N,) [s, also of the day] is of a main talker, or said while that is silent."""
     places = np.flatnonzero(main)
     steps = _time_gap(t[places][1:], t[places][:-1])
     usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
@@ -180,16 +177,15 @@ def _from_main_talker(t: Array, main: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _time_gap(after: Array, before: Array) -> Array:
-    """Return how far times (N,) [s] are apart, over midnight, too."""
+    """How far times (N,) [s] are apart, over midnight, too."""
     return np.asarray(np.abs((after - before + HALF_DAY) % DAY - HALF_DAY))
 
 
 class _Clock:
     """Times of fixes: seconds since 1970, by the dates of RMC and ZDA, or since the midnight before the first fix.
 
-    Beside the positions of a receiver, those of a second one and ZDA say no other time. A fix without a date is of the
-    day of that one before or behind it whose time of day is nearer. Without any date a time of day that goes back by
-    twelve hours is of the next day. `rolled` counts the dates of a receiver whose week number rolled over.
+    Without any date a time of day that goes back by twelve hours is of the next day. `rolled` counts the dates of a
+    receiver whose week number rolled over.
     """
 
     def __init__(self) -> None:
@@ -206,7 +202,7 @@ class _Clock:
         self.talkers.append(talker if position else "")
 
     def times(self) -> Array:
-        """Return the times (N,) [s] of the fixes; one that says no time has that of the fix before, or NaN."""
+        """The times (N,) [s] of the fixes; one that says no time has that of the fix before, or NaN."""
         self._count_weeks_on()
         since = np.array(self.seconds)
         main = Counter(filter(None, self.talkers)).most_common(1)
@@ -252,8 +248,7 @@ class _Clock:
 def _sentence_time(text: str) -> float:
     """Time before a sentence: a number, a date as seconds since 1970, or the time of an NMEA 4.10 TAG block.
 
-    Dates are year-month-day, also in one number with the time of day, or day.month.year with dots. ValueError where it
-    is none, or a date that may be two days.
+    ValueError where it is none, or a date that may be two days.
     """
     words = text.strip().rstrip(",;")
     if words.startswith("\\"):

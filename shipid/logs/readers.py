@@ -1,7 +1,6 @@
 """Readers: a log as a table of columns named as in the log, from text, a sheet, Parquet, MATLAB or NMEA 0183.
 
-A reader is a row of `READERS`: the options of its format, a function that reads, and one that recognises a file. Values
-are returned as written, as text or numbers; the mapping gives units and meaning.
+A reader is a row of `READERS`. Values are as written; the mapping gives units and meaning.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ Progress = Callable[[float], None]
 
 
 def require_file(file: Path) -> int:
-    """Return the size of a file in bytes; raises DataError where it is no file: absent, a folder, a device, a pipe."""
+    """The size of a file in bytes; raises DataError where it is no file: absent, a folder, a device, a pipe."""
     try:
         state = file.stat()
         if stat.S_ISDIR(state.st_mode):
@@ -54,15 +53,9 @@ def read_log_table(
 
     `attrs["other"]` says of each column that cannot be read what it is, and the remedy.
 
-    Parameters
-    ----------
-    clock : name of the column of time. columns : names of the others that are needed; a large text is read for them
-        alone, as numbers where they are.
+    clock : name of the column of time. columns : names of the others that are needed.
     progress : called with the share of a large log that has been read, 0 to 1.
-
-    Raises
-    ------
-    DataError : with the log, the key of the format or the row, and what would be right.
+    Raises DataError with the log, the key of the format or the row, and what would be right.
     """
     size = require_file(file)
     if size == 0:
@@ -143,10 +136,9 @@ def check_line_width(head: bytes, separator: str, file: Path) -> None:
 
 
 def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.DataFrame:
-    """Read text as a table of text; `file` is the log that errors name.
+    """Read text as a table of text; `file` is the log that errors name. Lines without any value are left out.
 
-    Lines without any value are left out. A line with more or fewer cells than the header is an error, or left out and
-    counted in `attrs["ragged"]` (their line numbers) if `form.ragged` says so.
+    A line of another length than the header is an error, or counted in `attrs["ragged"]` if `form.ragged` says so.
     """
     try:
         try:
@@ -197,7 +189,7 @@ def _read_cells(source: Path | io.StringIO, form: TextFormat, width: int) -> pd.
 
 
 def _row_width(source: Path | io.StringIO, form: TextFormat, file: Path) -> int:
-    """Return the largest number of cells in the first rows."""
+    """The largest number of cells in the first rows."""
     if isinstance(source, Path):
         with source.open("rb") as stream:
             source = io.StringIO(stream.read(LONGEST_LINE // 8).decode(form.encoding, "replace"))
@@ -214,7 +206,7 @@ def _no_rows_error(form: TextFormat, file: Path) -> DataError:
 
 
 def _name_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[list[str], pd.DataFrame]:
-    """Return a name for every column, empty where the header has none, and the rows below the header."""
+    """A name for every column, empty where the header has none, and the rows below the header."""
     filled = [bool(table[name].fillna("").str.strip().ne("").any()) for name in table]
     width = max((index + 1 for index, one in enumerate(filled) if one), default=1)
     if form.names is not None:
@@ -231,10 +223,7 @@ def _name_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[li
 def _without_headers(
     table: pd.DataFrame, names: list[str], source: Path | io.StringIO, form: TextFormat, file: Path
 ) -> tuple[pd.DataFrame, list[int]]:
-    """Return the rows that do not repeat the header, and the line numbers of the others; refuse them if so declared.
-
-    Files that were put one behind the other have such lines.
-    """
+    """The rows that do not repeat the header, and the line numbers of the others; refuse them if so declared."""
     named = [index for index, name in enumerate(names) if name]
     again = np.zeros(len(table), dtype=bool)
     if form.header and form.names is None and named:
@@ -254,7 +243,7 @@ def _without_headers(
 def _without_ragged(
     table: pd.DataFrame, names: list[str], source: Path | io.StringIO, form: TextFormat, file: Path
 ) -> tuple[pd.DataFrame, list[int]]:
-    """Return the rows with one cell for every name, and the line numbers of the others; refuse them if so declared."""
+    """The rows with one cell for every name, and the line numbers of the others; refuse them if so declared."""
     named = [index for index, name in enumerate(names) if name]
     beyond = [index for index in range(len(names)) if index > (named[-1] if named else 0)]
     wrong = np.zeros(len(table), dtype=bool)
@@ -286,16 +275,13 @@ def _without_ragged(
 def _short_rows(
     source: Path | io.StringIO, form: TextFormat, asked: set[int], width: int, file: Path
 ) -> dict[int, int]:
-    """Return place -> count of cells of the rows asked for that have fewer than `width` cells.
-
-    Places are those among `_numbered_rows`. To pandas, a cell that is not there is an empty one.
-    """
+    """Place among `_numbered_rows` -> count of cells of the rows that have fewer than `width` cells."""
     rows = enumerate(_numbered_rows(source, form, file) if asked else ())
     return {place: len(row) for place, (_, row) in rows if place in asked and len(row) < width}
 
 
 def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextFormat, file: Path) -> list[int]:
-    """Return the numbers in the log, from 1, of the first lines of rows at these places among `_numbered_rows`."""
+    """The numbers in the log, from 1, of the first lines of rows at these places among `_numbered_rows`."""
     asked = set(places)
     return [
         number
@@ -305,10 +291,7 @@ def _line_numbers(places: Iterable[int], source: Path | io.StringIO, form: TextF
 
 
 def _numbered_rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield number, from 1, of the first line and cells of what pandas takes for rows: neither skipped nor a comment.
-
-    Quotes count only where a cell begins with one; lines may end between them. Raises DataError where they never close.
-    """
+    """Yield number, from 1, and cells of what pandas takes for rows. DataError where quotes never close."""
     blanks = form.separator == "whitespace"
     if isinstance(source, Path):
         text: io.TextIOBase = source.open(encoding=form.encoding, errors="replace", newline="")
@@ -336,11 +319,7 @@ def _numbered_rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> 
 def _large_text(
     file: Path, form: TextFormat, wanted: set[str], progress: Progress | None, size: int
 ) -> pd.DataFrame | None:
-    """Read only the wanted columns of a text log, block by block, as numbers; None where that cannot be done.
-
-    What cannot be read so (blanks as separator, comments, text among the numbers, ragged lines) is left to the slow and
-    thorough way, which names the place.
-    """
+    """Read only the wanted columns of a text log, block by block, as numbers; None where that cannot be done."""
     if form.separator == "whitespace" or form.comment is not None or form.ragged == "drop":
         return None
     with file.open("rb") as stream:

@@ -1,7 +1,6 @@
-"""Repairs of a recorded log: each one declared with a reason, counted, flagged row by row, and possible to switch off.
+"""Repairs of a recorded log: each declared with a reason, counted, flagged row by row, and possible to switch off.
 
-A repair is a document (its parameters) and a function (its formula): `(rows, repair) -> Outcome`. Rows are the
-whole log in SI units, with columns `t` and `flags`.
+A repair is a document and a function `(rows, repair) -> Outcome` of the whole log in SI units, with `t` and `flags`.
 """
 
 from __future__ import annotations
@@ -91,8 +90,7 @@ class LeverArm(Repair):
 class Latency(Repair):
     """An earth-fixed signal comes `seconds` [s] late: what was logged at t was true at t - seconds.
 
-    `signal`: `position`, `velocity` (over ground, however it was logged), `heading` or `yaw rate`. `turn`: whether u
-    and v turn with a heading; by default where the log has them earth-fixed, or as speed and course.
+    signal : `position`, `velocity` (over ground), `heading` or `yaw rate`. turn : whether u and v turn with a heading.
     """
 
     signal: Literal["position", "velocity", "heading", "yaw rate"]
@@ -117,7 +115,7 @@ class Outcome:
 
 
 def interpolate_missing(t: NDArray[np.float64], values: NDArray[np.float64], missing: Mask) -> NDArray[np.float64]:
-    """Return values (N,) with the `missing` ones interpolated linearly in time from the finite others."""
+    """Values (N,) with the `missing` ones interpolated linearly in time from the finite others."""
     known = ~missing & np.isfinite(values)
     filled = np.where(missing, np.nan, values)
     if known.any():
@@ -148,10 +146,7 @@ def _stretch_number(rows: pd.DataFrame) -> NDArray[np.int64]:
 
 
 def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
-    """Drop both neighbours of every step |d psi| > threshold, unwrap the rest, interpolate the dropped.
-
-    Both neighbours are dropped, because nothing shows which of the two samples is false.
-    """
+    """Drop both neighbours of every step |d psi| > threshold, unwrap the rest, interpolate the dropped."""
     touched, count = np.zeros(len(rows), dtype=bool), 0
     healed: dict[str, NDArray[np.float64]] = {}
     for name in repair.columns:
@@ -169,10 +164,8 @@ def heal_wrap(rows: pd.DataFrame, repair: WrapInterpolation) -> Outcome:
 def remove_spikes(rows: pd.DataFrame, repair: Despike) -> Outcome:
     """Replace x where |x - median(x over the window)| > threshold by interpolation of the rest of its stretch.
 
-    Windows are whole and do not reach over a break: the median of half a window is biased for a moving ship. In the
-    half window at each end of a stretch a line through the whole window there takes its place, where it fits the rest;
-    the first or last rows of a stretch are put on it.
-    Missing values in them are interpolated for the median. Raises DataError for a window of a single row.
+    Windows are whole and do not reach over a break; at the ends of a stretch a line through the whole window takes the
+    place of the median, where it fits. Raises DataError for a window of a single row.
     """
     t, touched, count = rows["t"].to_numpy(), np.zeros(len(rows), dtype=bool), 0
     step = float(np.median(np.diff(t)))

@@ -33,9 +33,6 @@ class Leg:
 def find_manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
     """Manoeuvres of every run in the order of time, with names that are unique; a draft for a person to correct.
 
-    Parameters
-    ----------
-    dataset : whole recordings; one run a manoeuvre gives that manoeuvre.
     unit : of the log's clock [s], in which starts and ends are given.
     """
     cuts = []
@@ -51,7 +48,7 @@ def find_manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
 
 
 def run_kind(rows: pd.DataFrame) -> str:
-    """Return the kind of manoeuvre that takes most of a run."""
+    """The kind of manoeuvre that takes most of a run."""
     t = rows["t"].to_numpy()
     spans: dict[str, float] = {}
     for kind, (first, last) in _of_stretch(rows):
@@ -97,7 +94,7 @@ def _steering_angle(rows: pd.DataFrame) -> Array:
 
 
 def _helm_legs(helm: Array, t: Array) -> list[Leg]:
-    """Return the stretches with the helm on one side; stretches of less than a few seconds join the one before."""
+    """The stretches with the helm on one side; stretches of less than a few seconds join the one before."""
     side = np.where(np.abs(helm) >= HELM, np.sign(helm), 0.0).astype(int)
     short = min(SHORT, (t[-1] - t[0]) / 50)
     legs: list[Leg] = []
@@ -112,7 +109,7 @@ def _helm_legs(helm: Array, t: Array) -> list[Leg]:
 
 
 def _zigzag_length(legs: list[Leg], psi: Array, t: Array) -> int:
-    """Return how many legs from here on are one zigzag, helm from side to side, only briefly amidships; 0 if none."""
+    """How many legs from here on are one zigzag, helm from side to side, only briefly amidships; 0 if none."""
     sides: list[Leg] = []
     size = 0
     for index, leg in enumerate(legs):
@@ -129,7 +126,7 @@ def _zigzag_length(legs: list[Leg], psi: Array, t: Array) -> int:
 
 
 def _between_manoeuvres(rows: pd.DataFrame, first: int, last: int) -> Iterator[tuple[str, tuple[int, int]]]:
-    """Return the part between manoeuvres: a speed run if the shaft changes speed, else a transit; nothing if short."""
+    """The part between manoeuvres: a speed run if the shaft changes speed, else a transit; nothing if short."""
     t = rows["t"].to_numpy()
     if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):
         return

@@ -20,22 +20,19 @@ Said = Iterator[tuple[str, str | float]]
 
 @dataclass(frozen=True)
 class NmeaSentence:
-    """A sentence: the letters of its talker, its kind, such as RMC, and the fields behind them.
-
-    Of a proprietary one, such as `$PASHR`, the talker is empty.
-    """
+    """A sentence: the letters of its talker, its kind, such as RMC, and the fields behind them."""
 
     talker: str
     kind: str
     fields: Fields
 
     def values(self) -> dict[str, float]:
-        """Return column -> value, none of a sentence that calls itself invalid; ValueError where one is no number."""
+        """Column -> value, none of a sentence that calls itself invalid; ValueError where one is no number."""
         said = SENTENCES[self.kind](self.fields) if self.kind in SENTENCES else ()
         return {name: float(value) for name, value in said if value != ""}
 
     def time(self) -> float | None:
-        """Return the time of day [s] of a fix; None of any other sentence, ValueError where it is no time."""
+        """The time of day [s] of a fix; None of any other sentence, ValueError where it is no time."""
         text = self.fields[TIMES[self.kind]] if self.kind in TIMES else ""
         if not text:
             return None
@@ -45,7 +42,7 @@ class NmeaSentence:
         return 3600.0 * hour + 60.0 * minute + second
 
     def day(self) -> int | None:
-        """Return the number of the day that a valid RMC or ZDA says, None of any other sentence."""
+        """The number of the day that a valid RMC or ZDA says, None of any other sentence."""
         if self.kind == "RMC" and self.fields[1] != "V":
             return _day_number(self.fields[8])
         if self.kind == "ZDA":
@@ -55,10 +52,7 @@ class NmeaSentence:
 
 
 def parse_sentence(text: str, checked: bool) -> NmeaSentence | None:
-    """Return the sentence in a text that begins behind its `$`; None where it is none or its checksum fails.
-
-    checked : whether one without a checksum is none.
-    """
+    """The sentence in a text that begins behind its `$`; None where it is none, or `checked` and its checksum fails."""
     match = _SENTENCE.fullmatch(text)
     if match is None:
         return None

@@ -57,11 +57,9 @@ def check_width(cells: int, file: Path) -> None:
 
 
 def sheets_with_values(file: Path) -> list[str]:
-    """Return the names of the sheets of a workbook that have values, the one with most cells first; hidden ones last.
+    """The names of the sheets of a workbook that have values, the one with most cells first; hidden ones last.
 
-    Raises
-    ------
-    DataError : no sheet has any, not a workbook or a damaged one, or python-calamine is not installed.
+    Raises DataError where none has any, the file is damaged, or python-calamine is not installed.
     """
     book = _open_workbook(file)
     cells = {name: sheet.height * sheet.width for name in book.sheet_names for sheet in [_open_sheet(book, name, file)]}
@@ -73,14 +71,9 @@ def sheets_with_values(file: Path) -> list[str]:
 
 
 def sheet_text(file: Path, name: str) -> str:
-    """Return a sheet as lines of cells with a tab between them; line k is row k.
+    """A sheet as lines of cells with a tab between them; line k is row k. Empty columns on the left are left out.
 
-    Columns without a value on the left are left out. Numbers have all digits. Dates are written as in ISO 8601,
-    durations in seconds; a cell of several lines is one line. A formula without a stored value is written as it is.
-
-    Raises
-    ------
-    DataError : no sheet has this name; else as of `sheets_with_values`.
+    Dates are as in ISO 8601, durations in seconds. Raises DataError where no sheet has this name.
     """
     book = _open_workbook(file)
     if name not in book.sheet_names:
@@ -150,7 +143,6 @@ def _damaged_workbook(error: Exception, file: Path) -> DataError:
 
 
 def _cell_text(cell: Any) -> str:
-    """Return a cell as text."""
     if isinstance(cell, bool):
         return str(cell).upper()
     if isinstance(cell, date) and cell.year <= FIRST_YEAR:  # a time of day after a midnight

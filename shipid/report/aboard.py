@@ -24,36 +24,31 @@ from shipid.report.figure import (
     make_plot,
     names_in,
 )
-from shipid.report.page import write_page
-from shipid.report.section import Section
-from shipid.report.selection import spread_items
+from shipid.report.page import Section, write_page
+from shipid.report.selection import FEW_RUNS, spread_items
 from shipid.report.wording import metres_text
 
 LOGGED_TRACK, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
 LOOKS = {
-    LOGGED_TRACK: {"color": INK, "dash": "solid", "width": 1.6},
-    PATH: {"color": category_colour(0), "dash": "solid", "width": 2.4},
-    PHYSICS: {"color": category_colour(1), "dash": "dash", "width": 1.4},
-    BAND: {"color": category_colour(0), "dash": "dot", "width": 1.2},
+    LOGGED_TRACK: {"color": INK, "dash": "solid"},
+    PATH: {"color": category_colour(0), "dash": "solid"},
+    PHYSICS: {"color": category_colour(1), "dash": "dash"},
+    BAND: {"color": category_colour(0), "dash": "dot"},
 }
 HALF_AXES = {"band along": ("band_along", "dash"), "band across": ("band_across", "dot")}
 """Half axes of the band in the figure over time: name -> column, dash."""
 FIRST_KINDS = ("predictions", "alarm", "band")  # kinds of lines that the page begins with
-MOST_RUNS, MOMENTS = 24, 6  # runs to choose from; instants of a run whose paths are drawn
+MOMENTS = 6  # instants of a run whose paths are drawn
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AboardContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : in words, and the predictor.
-    lines : the lines of the summary, in the order of the terminal.
+    lines : the summary, in the order of the terminal. track : run, t [s], north, east [m], as measured.
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
-        [m] and band_course [rad, clockwise from north].
-    track : run, t [s], north, east [m], as measured.
+    [m] and band_course [rad, clockwise from north].
     """
 
     lines: Sequence[SummaryLine]
@@ -78,7 +73,7 @@ def _control_of_runs(content: AboardContent) -> Control:
     """Runs to choose from, if there are many some at even distances; first the one with the largest error."""
     every = names_in(content.instants)
     worst = str(content.instants["run"].iloc[int(content.instants["error"].fillna(-1.0).argmax())])
-    shown = {*spread_items(every, MOST_RUNS), worst}
+    shown = {*spread_items(every, FEW_RUNS), worst}
     runs = [run for run in every if run in shown]
     return Control("Run", runs, runs.index(worst))
 
@@ -117,9 +112,8 @@ def _draw_moments(content: AboardContent, run: str, drawn: Sequence[str]) -> Pan
     times = points["t"].unique()
     for t in times[even_places(len(times), MOMENTS)]:
         mine = points[points["t"] == t]
-        few = mine.iloc[np.unique(np.linspace(len(mine) // 4, len(mine) - 1, 3).round().astype(int))]
         places = {PATH: (mine["east"], mine["north"]), PHYSICS: (mine["physics_east"], mine["physics_north"])}
-        places |= {BAND: band_outline(few)} if BAND in drawn else {}
+        places |= {BAND: band_outline(mine.iloc[even_places(len(mine), 4)[1:]])} if BAND in drawn else {}
         traces += [make_line(name, x, y, [name], line=LOOKS[name]) for name, (x, y) in places.items() if name in drawn]
     return make_chart(traces, "east [m]", "north [m]")
 
@@ -127,8 +121,8 @@ def _draw_moments(content: AboardContent, run: str, drawn: Sequence[str]) -> Pan
 def along_run_figure(content: AboardContent) -> PageFigure:
     """Error at the end of each path, size of the band there, and the alarm, over the time of a run."""
     error, runs, banded = content.instants["error"], _control_of_runs(content), "band_along" in content.points
-    takeaway = f"Over all runs, the median error at the end of a path is {metres_text(error.median())}"
-    takeaway += f"; the largest, {metres_text(float(error.max()))}, is in {runs.options[runs.start]}."
+    takeaway = f"Over all runs, the median error at the end of a path is {metres_text(error.median())}; the largest, "
+    takeaway += f"{metres_text(float(error.max()))}, is in {runs.options[runs.start]}."
     colour = category_colour(0)
     return PageFigure(
         id="along",
@@ -155,9 +149,7 @@ def _draw_along(content: AboardContent, run: str) -> Panel:
     traces = [make_line("error", t, mine["error"], [PATH], line={"color": category_colour(0), "width": 2})]
     last = points.groupby("t", sort=False).last()
     for name, (column, dash) in HALF_AXES.items() if "band_along" in last else ():
-        traces.append(
-            make_line(name, t, last[column], [name], line={"color": category_colour(0), "dash": dash, "width": 1.4})
-        )
+        traces.append(make_line(name, t, last[column], [name], line={"color": category_colour(0), "dash": dash}))
     raised = t[mine["outside"].astype(bool)]
     marker = {"color": INK, "size": 8, "symbol": "triangle-up"}
     traces.append(make_line(ALARM, raised, np.zeros(len(raised)), [ALARM], mode="markers", marker=marker))
@@ -167,11 +159,6 @@ def _draw_along(content: AboardContent, run: str) -> Panel:
 
 
 ABOARD_PAGE = {
-    "aboard": Section(
-        "As if at sea",
-        lambda content: (paths_figure(content), along_run_figure(content)),
-        needs=("instants",),
-        anchors=("seen", "along"),
-    ),
+    "aboard": Section("As if at sea", {"seen": (paths_figure, "instants"), "along": (along_run_figure, "instants")})
 }
 write_aboard = partial(write_page, "aboard", ABOARD_PAGE)

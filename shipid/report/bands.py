@@ -22,20 +22,20 @@ from shipid.report.figure import (
     make_line,
     make_plot,
 )
+from shipid.report.page import Section
 from shipid.report.physics_and_data import HEIGHT, draw_map, ends_of_map, map_of_cells
-from shipid.report.section import Section
 from shipid.report.selection import close_styles, close_up_models, figure_sizes, model_chips
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells
+from shipid.report.tables import PageTable, TableCell, frame_table, with_cells
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.units import level_text, percent_text, plural_word
 
 BAND_COLUMNS = {
-    "model": TableColumn("model"),
-    "N_D [1]": TableColumn("N_D", 0),
-    "promised": TableColumn("promised", numeric=True),
-    "held [95 %]": TableColumn("held", numeric=True),
-    "mean radius [m]": TableColumn("width", "length"),
-    "radius at the end [m]": TableColumn("end", "length"),
+    "model": "model",
+    "N_D [1]": "N_D",
+    "promised": "promised",
+    "held [95 %]": "held",
+    "mean radius [m]": "width",
+    "radius at the end [m]": "end",
 }
 
 
@@ -47,7 +47,7 @@ def _level_of_sentences(frame: pd.DataFrame) -> float:
 def coverage_figure(content: ReportContent) -> PageFigure | None:
     """Nominal against measured coverage, with intervals; None where no model of a close-up has a band."""
     frame = content.frame("coverage")
-    names = [name for name in close_up_models(content) if len(frame) and name in set(frame.model)]
+    names = [name for name in close_up_models(content) if name in set(frame.model)]
     if not names:
         return None
     counts, banded = figure_sizes(frame.N_D), frame.model.nunique()
@@ -117,7 +117,7 @@ def width_figure(content: ReportContent) -> PageFigure | None:
     cells, frame = content.cells, content.frame("coverage")
     if "width" not in cells:
         return None
-    if cells.width.notna().sum() < 2 and len(frame):  # too few runs for the level of the study: the highest there is
+    if cells.width.notna().sum() < 2:  # too few runs for the level of the study: the highest there is
         top = frame[frame.level.eq(_level_of_sentences(frame))][["model", "N_D", "width"]]
         cells = cells.drop(columns="width").merge(top, how="left", on=["model", "N_D"])
     cells = cells[cells.width.notna()]
@@ -129,12 +129,11 @@ def width_figure(content: ReportContent) -> PageFigure | None:
         for row in rows_as_tuples(shown.cells)
     ]
     shown = shown._replace(cells=shown.cells.assign(words=words))
-    low, high = ends_of_map(shown.cells)
     hatched = " Hatched: not narrower than the band of no physics at the same N_D." if shown.cells.worse.any() else ""
     return PageFigure(
         id="width-map",
         title="Better physics, narrower promise",
-        takeaway=f"The mean radius of the band goes from {low} to {high}.",
+        takeaway=f"The mean radius of the band goes from {ends_of_map(shown.cells)}.",
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "
         f"left out.{hatched}",
@@ -148,11 +147,9 @@ def width_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def coverage_table(content: ReportContent) -> PageTable | None:
+def coverage_table(content: ReportContent) -> PageTable:
     """Coverage and width by model, N_D and level."""
     frame, refused = content.frame("coverage"), content.frame("no_band")
-    if frame.empty:
-        return None
     reasons = [
         f"{join_few_names([f'{row.model} at N_D = {row.N_D}' for row in rows_as_tuples(part)])}: {reason}"
         for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
@@ -175,11 +172,9 @@ def _coverage_cells(frame: pd.DataFrame) -> pd.DataFrame:
 
 HOW_FAR_OFF = Section(
     "How far off it may be",
-    draw=lambda content: (
-        coverage_figure(content),
-        coverage_table(content),
-        width_figure(content),
-    ),
-    needs=("coverage",),
-    anchors=("coverage", "coverage-table", "width-map"),
+    {
+        "coverage": (coverage_figure, "coverage"),
+        "coverage-table": (coverage_table, "coverage"),
+        "width-map": (width_figure, "coverage"),
+    },
 )

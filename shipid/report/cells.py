@@ -6,27 +6,27 @@ import pandas as pd
 
 from shipid.report.content import ReportContent
 from shipid.report.factors import with_failures
-from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableColumn, frame_table
+from shipid.report.page import Section
+from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import counted_text, duration_text
 
 CELLS = {
-    "model": TableColumn("model"),
-    "A [m]": TableColumn("A", "length"),
-    "N_D [1]": TableColumn("N_D", 0),
-    "data [min]": TableColumn("minutes", 1),
-    "seed": TableColumn("seed", 0),
-    "H [m]": TableColumn("H", "length"),
-    "H_90 [m]": TableColumn("H_90", "length"),
-    "rms [m]": TableColumn("rms", "length"),
-    "in band [1]": TableColumn("coverage", 2),
-    "radius of band [m]": TableColumn("width", "length"),
-    "status": TableColumn("status"),
-    "time [s]": TableColumn("seconds", 0),
-    "trials [1]": TableColumn("trials", 0),
-    "stopped [1]": TableColumn("stopped", 0),
-    "diverged [1]": TableColumn("diverged", 0),
-    "chosen": TableColumn("hyperparameters"),
+    "model": "model",
+    "A [m]": "A",
+    "N_D [1]": "N_D",
+    "data [min]": "minutes",
+    "seed": "seed",
+    "H [m]": "H",
+    "H_90 [m]": "H_90",
+    "rms [m]": "rms",
+    "in band [1]": "coverage",
+    "radius of band [m]": "width",
+    "status": "status",
+    "time [s]": "seconds",
+    "trials [1]": "trials",
+    "stopped [1]": "stopped",
+    "diverged [1]": "diverged",
+    "chosen": "hyperparameters",
 }
 
 
@@ -44,4 +44,4 @@ def cells_table(content: ReportContent) -> PageTable:
     return frame_table("cells", "Every cell", takeaway, with_failures(frame), CELLS)
 
 
-THE_CELLS = Section("The cells", draw=lambda content: (cells_table(content),), needs=("cells",), anchors=("cells",))
+THE_CELLS = Section("The cells", {"cells": (cells_table, "cells")})

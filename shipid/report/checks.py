@@ -23,18 +23,17 @@ from shipid.report.figure import (
     names_in,
 )
 from shipid.report.motion import DEGREES
-from shipid.report.page import write_page
-from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, join_few_names, scientific_text, set_sentence, short_text
+from shipid.report.page import Section, write_page
+from shipid.report.tables import PageTable, TableCell, digits_cell, frame_table, with_cells, word_cell
+from shipid.report.wording import counted_text, join_few_names, metres_text, scientific_text, set_sentence
 
 CHECK_COLUMNS = {
-    "run": TableColumn("run"),
-    "check": TableColumn("check"),
-    "result": TableColumn("ok"),
-    "value": TableColumn("value", numeric=True),
-    "limit": TableColumn("limit", numeric=True),
-    "what it says": TableColumn("sentence"),
+    "run": "run",
+    "check": "check",
+    "result": "ok",
+    "value": "value",
+    "limit": "limit",
+    "what it says": "sentence",
 }
 SIGNALS_OF_CHECKS = {
     "rate [deg/s]": {"psi_rate": "rate of the heading", "r": "yaw rate r"},
@@ -48,13 +47,8 @@ SIGNALS_OF_CHECKS = {
 class CheckContent(PageContent):
     """Everything the page of a checked log shows.
 
-    Parameters
-    ----------
-    name : short name of the log.
-    checks : check, run, value, unit, limit, ok, sentence.
-    series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s].
-    tracks : run, set, north, east [m].
-    repairs : kind, column, count, note; may be empty.
+    checks : check, run, value, unit, limit, ok, sentence. tracks : run, set, north, east [m].
+    series : run, t [s], r and psi_rate [rad/s], drift [m], u, v [m/s]. repairs : kind, column, count, note.
     """
 
     checks: pd.DataFrame
@@ -77,34 +71,28 @@ class CheckContent(PageContent):
 
 
 def checks_table(content: CheckContent) -> PageTable:
-    """Return the table of all checks, failed ones first; what these say is shown whole."""
+    """The table of all checks, failed ones first; what these say is shown whole."""
     frame = content.checks.assign(ok=content.checks["ok"].astype(bool)).sort_values("ok", kind="stable")
-    rows = [
-        {
-            "ok": word_cell("passed" if row.ok else "failed", bad=not row.ok),
-            "value": TableCell(
-                scientific_text(row.value, 3) + (f" {row.unit}" if row.unit != "1" else ""), float(row.value)
-            ),
-            "limit": TableCell(scientific_text(row.limit, 3), float(row.limit)),
-            "sentence": word_cell(set_sentence(row.sentence), bad=not row.ok),
-        }
-        for row in rows_as_tuples(frame)
-    ]
-    cells = {name: [row[name] for row in rows] for name in ("ok", "value", "limit", "sentence")}
+    units = frame["unit"].mask(frame["unit"].eq("1"), "")
+    values = zip(frame["value"], units, strict=True)
+    cells = {
+        "ok": [word_cell("passed" if ok else "failed", bad=not ok) for ok in frame["ok"]],
+        "value": [TableCell(f"{scientific_text(one, 3)} {unit}".rstrip(), float(one)) for one, unit in values],
+        "limit": [digits_cell(limit, 3) for limit in frame["limit"]],
+        "sentence": [word_cell(set_sentence(row.sentence), bad=not row.ok) for row in rows_as_tuples(frame)],
+    }
     return frame_table("all-checks", "Every check", "", with_cells(frame, **cells), CHECK_COLUMNS)
 
 
-def checked_motion(series: pd.DataFrame) -> PageFigure | None:
+def checked_motion(content: CheckContent) -> PageFigure:
     """Rate of the heading and yaw rate, drift of the position, and velocities, over time, one run at a time."""
-    runs = names_in(series)
-    if not runs:
-        return None
+    series, runs = content.series, names_in(content.series)
     worst = series.groupby("run")["drift"].max()
     names = [name for columns in SIGNALS_OF_CHECKS.values() for name in columns.items()]
     return PageFigure(
         id="motion-figure",
         title="Heading, yaw rate, position and velocity",
-        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {short_text(worst.max())} m.",
+        takeaway=f"Positions leave integrated velocities most in {worst.idxmax()}: {metres_text(worst.max())}.",
         how="Rate of the heading by central differences; distance between the position and integrated u, v, psi, which "
         "start together every 30 s.",
         alternative="Lines over time; the table below has the results of the checks.",
@@ -138,14 +126,10 @@ def _draw_checked(rows: pd.DataFrame) -> list[Panel]:
 
 
 CHECK_PAGE = {
-    "motion": Section(
-        "What the checks compare", lambda content: (checked_motion(content.series),), ("series",), ("motion-figure",)
-    ),
-    "checks": Section("The checks", lambda content: (checks_table(content),), ("checks",), ("all-checks",)),
+    "motion": Section("What the checks compare", {"motion-figure": (checked_motion, "series")}),
+    "checks": Section("The checks", {"all-checks": (checks_table, "checks")}),
     "data": Section(
-        "The data",
-        lambda content: (logs.tracks_figure(content), logs.repairs_table(content)),
-        anchors=("manoeuvres", "repairs"),
+        "The data", {"manoeuvres": (logs.tracks_figure, "tracks"), "repairs": (logs.repairs_table, "repairs")}
     ),
 }
 write_checks = partial(write_page, "data check", CHECK_PAGE)

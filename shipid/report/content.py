@@ -30,10 +30,9 @@ def model_text(model: str) -> str:
 
 @dataclass(frozen=True)
 class SummaryLine:
-    """A line of the summary of a log played as if at sea: what it is about, and its text.
+    """A line of the summary of a log played as if at sea.
 
-    kind : `predictions`, `alarm` and `band` are how it went, `limit` is what limits that; a `detail` belongs to a line
-        above it or to the terminal, and the page draws it.
+    kind : `predictions`, `alarm` and `band` are how it went, `limit` is what limits that; the page draws a `detail`.
     """
 
     kind: Literal["predictions", "alarm", "band", "limit", "detail"]
@@ -42,13 +41,9 @@ class SummaryLine:
 
 @dataclass(frozen=True)
 class AnswerSentence:
-    """One sentence of the answer and the figure or table that carries it.
+    """One sentence of the answer as plain text, and the id of the figure or table that carries it; empty for no link.
 
-    Parameters
-    ----------
-    text : plain text.
-    figure : id of a figure or table that a section of the page declares among its `anchors`, or "findings" or
-        "provenance"; empty for no link. Drawing the page raises ValueError for any other.
+    Drawing the page raises ValueError for an id that no section declares, other than "findings" and "provenance".
     """
 
     text: str
@@ -69,15 +64,11 @@ class ReportFinding:
 class WindowSnapshot:
     """One window of a test run with its predictions, in the frame (11) frozen at the instant of prediction.
 
-    Parameters
-    ----------
-    run, t : test run and instant of prediction [s].
-    outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
-    psi_end : true heading at the end of the horizon, relative to the heading at its start [rad].
-    truth : (T + 1, 2) true x, y from the instant of prediction on [m].
-    paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; physics has N_D = 0.
+    run, t : test run and instant of prediction [s]. outline : (k, 2) of the ship, x ahead, y to starboard [m].
+    psi_end : true heading at the end of the horizon, relative to that at its start [rad].
+    truth : (T + 1, 2) true x, y [m]. paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; N_D = 0 of physics.
     wind : speed [m/s] and direction it blows towards [rad], clockwise from ahead; None where not measured.
-    bands : (model, source, N_D) -> (n, 2) closed outline of the band around that path [m]; only where there is one.
+    bands : (model, source, N_D) -> (n, 2) closed outline of the band around that path [m].
     """
 
     run: str
@@ -94,13 +85,8 @@ class WindowSnapshot:
 class PageContent:
     """What a page shows besides its sections; every page adds frames and `answer`, the sentences below the title.
 
-    Parameters
-    ----------
-    title, name : in words, and the short name beside the kicker.
-    provenance : label -> value.
-    command : what reproduces the page; empty for none.
-    study_document : document as text; empty for none.
-    findings : claims with verdicts; empty for none.
+    title, name : in words, and the short name beside the kicker. provenance : label -> value.
+    command : what reproduces the page. study_document : as text. findings : claims with verdicts. Empty for none.
     """
 
     title: str
@@ -125,34 +111,24 @@ def empty_frame(*columns: str) -> Callable[[], pd.DataFrame]:
 class ReportContent(PageContent):
     """Everything one report shows; a frame without rows leaves its figure out.
 
-    `source` is "physics", "cooperative" or "naive". Rows of physics and naive do not depend on the number
-    of manoeuvres and have N_D = 0; the model without physics is the one of family "none", its source "cooperative". It
-    is called `no physics`, whatever the frames call it.
+    `source` is "physics", "cooperative" or "naive". Rows of physics and naive have N_D = 0; the model without physics
+    is the one of family "none", its source "cooperative". It is called `no physics`, whatever the frames call it.
 
-    Parameters
-    ----------
-    answer : a few sentences, in order.
-    cells : one row per cell: model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres
-        A, A_90, H, H_90, rms; then member, runs, minutes, seconds, hyperparameters (text). Failed cells have NaN.
+    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres A, A_90, H, H_90, rms
+    (NaN where failed); then member, runs, minutes, seconds, hyperparameters (text).
     naive : mean, p90, rms [m] of constant u, v, r.
     models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean
-        absolute error of the physics along x and y of the frame (11).
-    factors : one row per perturbed number of a model: model, path, group ("hull", "inertia", ...), factor [1]; a term
-        that was removed has factor 0.
-    trials : one row per trial of the search: cell, model, N_D, seed, number, state ("complete", "diverged",
-        "stopped"), value [m^2] (NaN where diverged), epochs (0 in closed form), seconds, chosen (its network is in the
-        compensator), and one float column per searched hyperparameter; yes or no is 1 or 0.
-    horizon : model, N_D, seed, source, ahead [s], mean, p90 [m]; where known along, across [m], the mean absolute
-        error along x and y of the frame (11).
+    absolute error of the physics along x and y of the frame (11).
+    factors : of perturbed numbers: model, path, group ("hull", ...), factor [1]; 0 where a term was removed.
+    trials : cell, model, N_D, seed, number, state ("complete", "diverged", "stopped"), value [m^2] (NaN where
+    diverged), epochs, seconds, chosen (its network is in the compensator), and a float column per searched
+    hyperparameter.
+    horizon : model, N_D, seed, source, ahead [s], mean, p90 [m]; where known along, across [m].
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
     commands : run, t [s], one column per command in the units used on board, in brackets: "port shaft [rpm]".
-    snapshots : windows of the test runs.
-    tracks : run, set ("train", "validation", "test", ...), north, east [m].
-    envelope : set, quantity, unit, min, mean, max; the set "published" holds the numbers of the paper.
-    repairs : kind, column, count, note.
-    best : the physics model that validation prefers at the largest amount of data; every figure means it by "best".
-    frames : further frames by name, for sections that show something new.
-    alone : models of the cells whose method learns nothing from data: their path is that of the physics.
+    tracks : run, set, north, east [m]. envelope : set (or "published"), quantity, unit, min, mean, max.
+    repairs : kind, column, count, note. best : the physics model that validation prefers at the largest amount of data.
+    frames : further frames by name. alone : models whose method learns nothing from data: their path is the physics'.
     """
 
     answer: Sequence[AnswerSentence] = ()

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from shipid.report.content import Floats, ReportContent, rows_as_tuples
+from shipid.report.content import ReportContent, rows_as_tuples
 from shipid.report.figure import (
     INK,
     LINE_DASHES,
+    MOST_LINE_POINTS,
     NAIVE,
     Chip,
     Control,
     PageFigure,
     Panel,
     Trace,
+    even_places,
     make_axis,
     make_line,
     make_plot,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import (
     FEW_RUNS,
     SOURCE_DASHES,
@@ -36,14 +36,12 @@ from shipid.report.selection import (
     nothing_learns,
     over_seeds,
     spread_items,
-    thin_lines,
 )
-from shipid.report.tables import PageTable, TableColumn, frame_table
+from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text
 
 LINE_COLUMNS = ["model", "source", "N_D"]
-ERROR_HEIGHT, COMMAND_GAP, COMMAND_HEIGHT, AROUND = 270, 30, 104, 56  # heights of the parts of error over time [px]
-PLOT_DETAIL = 540  # twice the height of the error over time
+ERROR_HEIGHT, COMMAND_HEIGHT = 326, 134  # of the error over time and of a row of commands below it [px]
 HORIZON_ERRORS = {  # option -> column of the frame, title of the axis, unit
     "mean": ("mean", "position error, mean", "m"),
     "90th percentile": ("p90", "position error, 90th percentile", "m"),
@@ -57,20 +55,18 @@ BY_AXIS = (
     "where the ship truly makes 0.2 m/s or more."
 )
 KIND_COLUMNS = {
-    "kind of run": TableColumn("kind"),
-    "test runs": TableColumn("runs"),
-    "model": TableColumn("model"),
-    "how": TableColumn("how"),
-    "over the horizon [m]": TableColumn("mean", "length"),
-    "at its end [m]": TableColumn("end", "length"),
+    "kind of run": "kind",
+    "test runs": "runs",
+    "model": "model",
+    "how": "how",
+    "over the horizon [m]": "mean",
+    "at its end [m]": "end",
 }
 HOW_PREDICTED = {"naive": CONSTANT_MOTION, "physics": "physics alone", "cooperative": "with data"}
 
 
-def horizon_figure(content: ReportContent) -> PageFigure | None:
-    """Mean and 90th percentile of the error at each second ahead; None without rows."""
-    if content.horizon.empty:
-        return None
+def horizon_figure(content: ReportContent) -> PageFigure:
+    """Mean and 90th percentile of the error at each second ahead."""
     frame = _rows_of_close_up(content.horizon, content)
     statistics = [word for word, (column, *_) in HORIZON_ERRORS.items() if column in frame]
     columns, counts = [HORIZON_ERRORS[word][0] for word in statistics], figure_sizes(frame.N_D)
@@ -122,7 +118,7 @@ def time_figure(content: ReportContent) -> PageFigure | None:
         + _models_of_close_up(content)
         + (f" {counted_text(left, 'test run')} more are not drawn." if left else ""),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
-        height=AROUND + ERROR_HEIGHT + (COMMAND_HEIGHT + COMMAND_GAP) * len(units),
+        height=ERROR_HEIGHT + COMMAND_HEIGHT * len(units),
         draw=lambda run: [_draw_time(content, means[means.run == run], content.commands[content.commands.run == run])],
         controls=[Control("Test run", runs, 0 if worst is None else runs.index(worst.run))],
         chips=[*close_up_chips(content, set(means.source)), *chips],
@@ -143,7 +139,7 @@ def close_up_chips(content: ReportContent, sources: set[str]) -> list[Chip]:
 
 
 def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFrame:
-    """Return the rows of the models in the close-up; physics and naive do not depend on N_D and have N_D = 0."""
+    """The rows of the models in the close-up; physics and naive do not depend on N_D and have N_D = 0."""
     frame = frame.assign(N_D=frame.N_D.where(frame.source.eq("cooperative"), 0).astype(int))
     frame["model"] = frame.model.astype(object).where(frame.source.ne("naive"), "")
     kept = frame.model.isin(close_up_models(content)) | frame.source.eq("naive")
@@ -151,7 +147,7 @@ def _rows_of_close_up(frame: pd.DataFrame, content: ReportContent) -> pd.DataFra
 
 
 def _models_of_close_up(content: ReportContent) -> str:
-    """Return a sentence on which models are drawn; empty if all are."""
+    """A sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
     names = join_few_names(shown, 6)
     words = f" Of {total} models, the middle one of each family by A, and the best in validation: {names}."
@@ -161,43 +157,25 @@ def _models_of_close_up(content: ReportContent) -> str:
 def _error_lines(content: ReportContent, means: pd.DataFrame, over: str, column: str, unit: str = "m") -> list[Trace]:
     """A line for each model and source; what has no physics first: thick ink must not cover the others."""
     looks, pure, traces = close_styles(content), data_driven(content), []
-    every = means[[over, column]].to_numpy(dtype=float)
-    places: dict[Any, Any] = dict(means.groupby(["model", "source"], sort=False).indices)
-    groups = sorted(places, key=lambda key: (key[0] != pure, key[1]))
-    visible = _visible_points([every[places[key]] for key in groups])
-    for (model, given), points in zip(groups, visible, strict=True):
-        source, keys = line_source(content, model, given)
-        look = looks.get(model)
-        ink = {"color": look.colour, "width": look.width if given == "cooperative" else 1.5} if look else {}
-        ink = {"color": NAIVE, "width": 1.5, **ink, "dash": SOURCE_DASHES[source]}
-        mark = {"symbol": look.symbol if look else "", "size": 7, "color": ink["color"], "maxdisplayed": 9}
-        more: Trace = {"mode": "lines+markers", "marker": mark} if look and given == "cooperative" else {}
-        name = name_of_line(content, model, source)
-        traces.append(make_line(name, points[:, 0], points[:, 1], keys, unit, line=ink, **more))
+    groups: list[Any] = list(means.groupby(["model", "source"], sort=False))
+    for (model, given), mine in sorted(groups, key=lambda group: (group[0][0] != pure, group[0][1])):
+        points, look = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)], line_look(content, model, given)
+        mark = {"symbol": looks[model].symbol, "size": 7, "maxdisplayed": 9} if model in looks else {}
+        more: Trace = {"mode": "lines+markers", "marker": mark} if mark and given == "cooperative" else {}
+        ends = points[over], points[column], look["keys"], unit
+        traces.append(make_line(look["name"], *ends, line=look["line"], **more))
     return traces
 
 
-def line_source(content: ReportContent, model: str, source: str) -> tuple[str, list[str]]:
-    """Source that a line of a close-up is called by, and the keys of the chips that hide it."""
-    called = drawn_source(content, model, source)
-    return called, [f"source:{called}", *([f"model:{model}"] if model else [])]
-
-
-def name_of_line(content: ReportContent, model: str, source: str) -> str:
-    """Name of a line of a close-up, of a source as it is called."""
-    if source == "naive" or model == data_driven(content):
-        return CONSTANT_MOTION if source == "naive" else model
-    return f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
-
-
-def _visible_points(lines: Sequence[Floats]) -> list[Floats]:
-    """Points of lines (n, 2) that differ visibly at the height of the plot; a line with gaps keeps all."""
-    kept = list(lines)
-    whole = [i for i, points in enumerate(lines) if len(points) and np.isfinite(points).all()]
-    unit = [lines[i] / np.maximum(np.ptp(lines[i], axis=0), 1e-9) for i in whole]
-    for i, chosen in zip(whole, thin_lines(unit, 1 / PLOT_DETAIL), strict=True):
-        kept[i] = lines[i][chosen]
-    return kept
+def line_look(content: ReportContent, model: str, given: str) -> dict[str, Any]:
+    """`name`, `keys` of the chips that hide it, and `line` of a path or an error of a close-up."""
+    source, look = drawn_source(content, model, given), close_styles(content).get(model)
+    name = f"{model}, {'compensated' if source == 'cooperative' else 'physics alone'}"
+    name = model if model == data_driven(content) else name
+    width = look.width if look and given == "cooperative" else 1.5
+    ink = {"color": look.colour if look else NAIVE, "dash": SOURCE_DASHES[source], "width": width}
+    keys = [f"source:{source}", *[f"model:{model}"] * bool(model)]
+    return {"name": CONSTANT_MOTION if source == "naive" else name, "keys": keys, "line": ink}
 
 
 def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
@@ -210,27 +188,19 @@ def _commands_by_unit(commands: pd.DataFrame) -> dict[str, list[str]]:
 
 def _draw_time(content: ReportContent, means: pd.DataFrame, commands: pd.DataFrame) -> Panel:
     """Error on top; below, one row per unit of the commands, all on one time axis."""
-    units = _commands_by_unit(commands)
-    traces, total, axes = (
-        _error_lines(content, means, "t", "error"),
-        ERROR_HEIGHT + (COMMAND_HEIGHT + COMMAND_GAP) * len(units),
-        {},
-    )
+    units, traces = _commands_by_unit(commands), _error_lines(content, means, "t", "error")
+    share, axes = COMMAND_HEIGHT / (ERROR_HEIGHT + COMMAND_HEIGHT * len(units)), {}
     for row, (unit, columns) in enumerate(units.items(), start=2):
         for i, column in enumerate(columns):
-            changed = np.flatnonzero(np.diff(commands[column]) != 0)
-            held = commands.iloc[np.unique([0, *changed, *(changed + 1), len(commands) - 1])]  # what a step line needs
             ink = {"color": INK, "width": 1.5, "dash": LINE_DASHES[i % 4], "shape": "hv"}
             name, place = column.partition("[")[0].strip(), {"xaxis": "x", "yaxis": f"y{row}"}
-            traces.append(make_line(name, held.t, held[column], [f"command:{column}"], unit, line=ink, **place))
-        low = (len(units) - row + 1) * (COMMAND_HEIGHT + COMMAND_GAP) / total
+            traces.append(make_line(name, commands.t, commands[column], [f"command:{column}"], unit, line=ink, **place))
+        low = (len(units) - row + 1) * share
         shared = ", ".join(sorted({column.partition("[")[0].split()[-1] for column in columns}))
-        axes[f"yaxis{row}"] = make_axis(
-            f"{shared} [{unit}]", domain=[low, low + COMMAND_HEIGHT / total], anchor="x", nticks=4
-        )
+        axes[f"yaxis{row}"] = make_axis(f"{shared} [{unit}]", domain=[low, low + 0.78 * share], anchor="x", nticks=4)
     # The time axis belongs to the lowest row, so that it is drawn at the bottom and shared by all.
     x = make_axis("time in the run [s]", anchor=f"y{len(units) + 1}" if units else "y")
-    y = make_axis("position error [m]", rangemode="tozero", domain=[1 - ERROR_HEIGHT / total, 1.0])
+    y = make_axis("position error [m]", rangemode="tozero", domain=[len(units) * share, 1.0])
     return make_plot(traces, x, y, hovermode="x unified", **axes)
 
 
@@ -239,43 +209,34 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     together, alone = (end[end.source == source].set_index("model")["mean"] for source in ("cooperative", "physics"))
     if together.empty:
         return "No compensated model gave a prediction."
-    pure, known = data_driven(content), content.best in together.index
-    best = content.best if known else str(together.idxmin())
-    of = "" if known or len(together) < 2 else f", the least of {len(together)} models"
-    text = f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is "
-    text += f"{metres_text(together[best])} off on average{of}"
-    text += f", its physics alone {metres_text(alone[best])}" if best in alone.index else ""
-    other = (
-        f"; {in_words(pure)} {metres_text(together[pure])}" if pure and pure != best and pure in together.index else ""
+    pure, best = data_driven(content) or "", content.best if content.best in together.index else str(together.idxmin())
+    text = (
+        f"{means.ahead.max():g} s ahead and with N_D = {size}, {in_words(best)} is {metres_text(together[best])} off "
     )
-    return f"{text}{other}."
+    text += "on average" + (f", its physics alone {metres_text(alone[best])}" if best in alone.index else "")
+    rival = pure and pure != best and pure in together.index
+    return text + (f"; {in_words(pure)} {metres_text(together[pure])}." if rival else ".")
 
 
 def _worst_instant(content: ReportContent, means: pd.DataFrame) -> Any | None:
     """Row of the run and instant at which the best model, compensated, errs most; None without one."""
     together = means[means.source == "cooperative"]
-    if together.empty:
-        return None
-    best = content.best if content.best in set(together.model) else str(together.model.iloc[0])
-    return together[together.model == best].nlargest(1, "error").iloc[0]
+    known = together[together.model == content.best] if content.best in set(together.model) else together
+    return None if known.empty else known.nlargest(1, "error").iloc[0]
 
 
 def _takeaway_time(worst: Any | None, means: pd.DataFrame) -> str:
     if worst is None:
         return "No compensated model gave a prediction."
     text = f"{in_words(worst.model)} errs most in {worst.run} at t = {worst.t:g} s: {metres_text(worst.error)}"
-    same = means[
-        means.model.eq(worst.model) & means.source.eq("physics") & means.run.eq(worst.run) & means.t.eq(worst.t)
-    ]
+    same = means[means.source.eq("physics")].merge(worst.to_frame().T[["model", "run", "t"]].astype({"t": float}))
     alone = f", where its physics alone errs by {metres_text(float(same.error.iloc[0]))}" if len(same) else ""
     return f"{text} on average over the horizon{alone}."
 
 
-def error_by_kind(content: ReportContent) -> PageTable | None:
-    """Error over the horizon and at its end, by kind of test run; None without rows."""
+def error_by_kind(content: ReportContent) -> PageTable:
+    """Error over the horizon and at its end, by kind of test run."""
     frame = content.frame("kinds")
-    if frame.empty:
-        return None
     how = [
         HOW_PREDICTED[row.source] + (f", {counted_text(int(row.N_D), 'run')}" if row.N_D else "")
         for row in rows_as_tuples(frame[["source", "N_D"]])
@@ -294,6 +255,9 @@ def error_by_kind(content: ReportContent) -> PageTable | None:
 
 WHERE_ERRORS_GROW = Section(
     "Where the error grows",
-    draw=lambda content: (horizon_figure(content), error_by_kind(content), time_figure(content)),
-    anchors=("horizon", "kinds", "over-time"),
+    {
+        "horizon": (horizon_figure, "horizon"),
+        "kinds": (error_by_kind, "kinds"),
+        "over-time": (time_figure, "over_time"),
+    },
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,35 +11,32 @@ from shipid.report.content import DATA_DRIVEN, ReportContent, model_text, rows_a
 from shipid.report.figure import (
     INK,
     MARKERS,
-    MUTED,
     Chip,
     PageFigure,
     Panel,
     category_colour,
     escape_name,
+    log_axis,
     make_axis,
     make_line,
     make_plot,
-    row_name,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import models_by_accuracy
-from shipid.report.tables import PageTable, TableColumn, frame_table, with_cells, word_cell
+from shipid.report.tables import PageTable, frame_table, with_cells, word_cell
 from shipid.report.wording import counted_text, join_few_names, metres_text, number_text, shorten_name
 
 STRIP_HEIGHT = 42  # height of a model [px]
-MOST_LETTERS_OF_ROW = 11  # characters of a name that fit beside its errors on a phone
-FACTOR_TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 5.0, 10.0, 20.0, 50.0, 100.0)
 MODEL_COLUMNS = {
-    "model": TableColumn("model"),
-    "family": TableColumn("family"),
-    "A [m]": TableColumn("A", "length"),
-    "A_90 [m]": TableColumn("A_90", "length"),
-    "rms [m]": TableColumn("A_rms", "length"),
-    "A along [m]": TableColumn("A_along", "length"),
-    "A across [m]": TableColumn("A_across", "length"),
-    "status": TableColumn("status"),
-    "what it is": TableColumn("description"),
+    "model": "model",
+    "family": "family",
+    "A [m]": "A",
+    "A_90 [m]": "A_90",
+    "rms [m]": "A_rms",
+    "A along [m]": "A_along",
+    "A across [m]": "A_across",
+    "status": "status",
+    "what it is": "description",
 }
 
 
@@ -78,44 +74,34 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
 
 
 def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) -> Panel:
-    logs = np.log(frame.factor[frame.factor > 0].to_numpy(dtype=float))
-    least = math.log(1.25)  # at least a quarter down and up
-    low, high = min(float(logs.min(initial=0.0)), -least), max(float(logs.max(initial=0.0)), least)
-    edge, room, removed = low - 0.08 * (high - low), 0.03 * (high - low), frame.factor[frame.factor <= 0]
+    positive = frame.factor[frame.factor > 0].to_numpy(dtype=float)
+    low, high = positive.min(initial=0.8), positive.max(initial=1.25)  # at least a quarter down and up
+    edge = low * (low / high) ** 0.08
     groups, traces = pd.unique(frame.group), []
     for i, group in enumerate(groups):
         mine = frame[frame.group.eq(group) & frame.model.isin(names)]
         # Each group is drawn a little below the one before, so that equal factors do not hide each other.
         y = np.array([names.index(name) for name in mine.model]) + 0.24 * i / max(1, len(groups) - 1)
-        x = [math.log(factor) if factor > 0 else edge for factor in mine.factor]
         marker = {"symbol": MARKERS[i % len(MARKERS)], "size": 8, "color": category_colour(i), "opacity": 0.75}
-        words = [
-            f"{escape_name(row.model)}: {escape_name(row.path)} × {row.factor:.3g}" for row in rows_as_tuples(mine)
-        ]
+        words = [escape_name(f"{row.model}: {row.path} × {row.factor:.3g}") for row in rows_as_tuples(mine)]
+        x = mine.factor.where(mine.factor > 0, edge)
         traces.append(make_line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
-    shown = [1.0]
-    for tick in sorted(FACTOR_TICKS, key=lambda value: abs(math.log(value))):
-        far = all(abs(math.log(tick / other)) > 0.08 * (high - low) for other in shown)
-        shown += [tick] * (far and low - 0.02 <= math.log(tick) <= high + 0.02)
-    ticks = {math.log(tick): f"{tick:g}" for tick in shown}
-    ticks |= {edge: "0" if removed.eq(0).all() else "≤ 0"} if len(removed) else {}
-    span = [(edge if len(removed) else low) - room, high + room]
-    x_axis = make_axis("factor [1]", range=span, tickvals=list(ticks), ticktext=list(ticks.values()))
-    y_axis = make_axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, showgrid=False)
-    texts = [row_name(row, _words_of_row(content, name)) for row, name in enumerate(names)]
-    rule: dict[str, Any] = {"type": "line", "layer": "below", "line": {"color": MUTED, "width": 0.5}}
-    rules = [{**rule, "x0": span[0], "x1": span[1], "y0": row, "y1": row} for row in range(len(names))]
-    rules.append({**rule, "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "line": {"color": INK, "width": 1}})
+    removed = bool((frame.factor <= 0).any())
+    room, ends = 0.03 * math.log10(high / low), np.log10([edge if removed else low, high])
+    x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room])
+    y_axis = make_axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, tickvals=list(range(len(names))))
+    place = {"x": 0, "xref": "paper", "xanchor": "left", "yshift": 17, "showarrow": False, "bgcolor": "var(--page)"}
+    texts = [{**place, "y": row, "text": _words_of_row(content, name)} for row, name in enumerate(names)]
+    rule = {"type": "line", "layer": "below", "yref": "paper", "x0": 1, "x1": 1, "y0": 0, "y1": 1}
+    rule |= {"line": {"color": INK, "width": 1}}
     margin = {"l": 12, "r": 12, "t": 4, "b": 44}
-    return make_plot(traces, x_axis, y_axis, annotations=texts, shapes=rules, margin=margin)
+    return make_plot(traces, x_axis, y_axis, annotations=texts, shapes=[rule], margin=margin)
 
 
 def _words_of_row(content: ReportContent, name: str) -> str:
     """Name of a model and its accuracy."""
-    words, mine = (
-        f"<b>{escape_name(shorten_name(name, MOST_LETTERS_OF_ROW))}</b>",
-        content.models[content.models.model == name],
-    )
+    words = f"<b>{escape_name(shorten_name(name))}</b>"
+    mine = content.models[content.models.model == name]
     if mine.empty:
         return words
     record = mine.iloc[0]
@@ -129,16 +115,12 @@ def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:
     """How many numbers, how far from 1, and which model is farthest from its base."""
     positive, removed = frame[frame.factor > 0], int((frame.factor == 0).sum())
     kept, models = frame.factor[frame.factor != 0], counted_text(len(names), "model")
-    text = f"{models} changed"
-    if len(kept):
-        low, high = number_text(kept.min()), number_text(kept.max())
-        text = f"{counted_text(len(kept), 'number')} in {models}, times "
-        text += low if low == high else f"factors from {low} to {high}"
+    span = " to ".join(dict.fromkeys((number_text(kept.min()), number_text(kept.max()))))
+    text = f"{counted_text(len(kept), 'number')} in {models}, times {span}" if len(kept) else f"{models} changed"
     text += f"; {counted_text(removed, 'term')} removed" if removed else ""
     if positive.model.nunique() > 1:
-        away = positive.factor.map(lambda factor: math.log(factor) ** 2).groupby(positive.model).mean()
-        text += f"; {away.idxmax()} is farthest from its base, by a factor of {math.exp(math.sqrt(away.max())):.2f}"
-        text += f" (root mean square{' of those not removed' if removed else ''})"
+        away = np.exp(np.sqrt((np.log(positive.factor) ** 2).groupby(positive.model).mean()))
+        text += f"; {away.idxmax()} is farthest from its base, by a factor of {away.max():.2f} (root mean square)"
     return f"{text}."
 
 
@@ -169,9 +151,4 @@ def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
     return with_cells(frame, status=cells)
 
 
-THE_MODELS = Section(
-    "The models",
-    draw=lambda content: (factors_figure(content), models_table(content)),
-    needs=("models",),
-    anchors=("factors", "models"),
-)
+THE_MODELS = Section("The models", {"factors": (factors_figure, "factors"), "models": (models_table, "models")})

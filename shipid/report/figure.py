@@ -1,15 +1,15 @@
 """What every figure is made of: colours, axes, lines, the legend, and the words around it.
 
-A figure of a page names CSS variables, `var(--ink)`, instead of colours: one serves a light, a dark and a printed
-page. `draw_alone` puts colours in their place.
+A figure of a page names CSS variables, `var(--ink)`: one serves a light, a dark and a printed page.
 """
 
 from __future__ import annotations
 
 import html
+import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any, TypeAlias
@@ -19,10 +19,10 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
+from plotly.utils import PlotlyJSONEncoder
 
 from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, Indices
-from shipid.report.wording import scientific_text
 
 INK, MUTED, GRID, TRUTH, NAIVE = "var(--ink)", "var(--muted)", "var(--grid)", "var(--truth)", "var(--muted)"
 TRANSPARENT = "rgba(0,0,0,0)"
@@ -52,14 +52,14 @@ Panel = dict[str, Any]  # a figure as Plotly takes it: `data`, a list of traces,
 
 
 def category_colour(index: int) -> str:
-    """Return the CSS variable of the index-th category colour."""
+    """The CSS variable of the index-th category colour."""
     return f"var(--category-{index % len(OKABE_ITO)})"
 
 
 def page_colours(theme: str) -> dict[str, str]:
     """Name of a CSS variable -> colour of the `light` or `dark` page, with viridis and the Okabe-Ito colours.
 
-    `scale-0` to `scale-23` are for lines: those of viridis with contrast to the page; `heat-0` on are all of it.
+    `scale-0` on are for lines: those of viridis with contrast to the page; `heat-0` on are all of it.
     """
     dark = theme == "dark"
     # Dark blue has contrast to white but not to black: the dark page takes sky blue instead, and the reverse.
@@ -73,10 +73,7 @@ def page_colours(theme: str) -> dict[str, str]:
 
 
 def least_coloured(span: tuple[float, float]) -> float:
-    """Where a scale of colours begins: at its least magnitude; where that is nothing or rounding, at 1e-4 of its end.
-
-    Above 0, also for a scale of zeros alone.
-    """
+    """Where a scale of colours begins, above 0: at its least magnitude; where that is rounding, at 1e-4 of its end."""
     low, high = span
     return (low if low >= ROUNDING_SHARE * high else 1e-4 * high) or 1.0
 
@@ -122,12 +119,8 @@ class ColourScale:
 class PageFigure:
     """A figure of the page.
 
-    Parameters
-    ----------
-    id, title, takeaway, how, alternative : texts; the alternative says what a reader who cannot see it would miss.
-    height : of one panel [px].
-    draw : an option of each control -> panels, as many for all options.
-    captions : of the panels; empty for none.
+    alternative : what a reader who cannot see it would miss. height : of one panel [px].
+    draw : an option of each control -> panels, as many for all options. captions : of the panels; empty for none.
     browser : whether the page draws the window that a reader picks, instead of `draw`.
     """
 
@@ -161,12 +154,9 @@ def zero_axis(title: str, colour: str = GRID, **options: Any) -> dict[str, Any]:
     return make_axis(title, zeroline=True, zerolinecolor=colour, **options)
 
 
-def log_axis(title: str, steps: Sequence[float] = (1, 2, 5), **options: Any) -> dict[str, Any]:
-    """Make a logarithmic axis with whole numbers at its ticks: Plotly would write 0.5 as 5."""
-    ticks = [float(f"{step}e{decade}") for decade in range(-8, 5) for step in steps]
-    return make_axis(
-        title, type="log", **{"tickvals": ticks, "ticktext": [scientific_text(tick) for tick in ticks], **options}
-    )
+def log_axis(title: str, **options: Any) -> dict[str, Any]:
+    """Make a logarithmic axis; its format writes whole numbers at all ticks: Plotly would write 0.5 as 5."""
+    return make_axis(title, type="log", tickformat="~g", **options)
 
 
 def names_axis(names: Sequence[object], title: str = "", **options: Any) -> dict[str, Any]:
@@ -214,11 +204,7 @@ def make_line(
 ) -> Trace:
     """One line or its points, in single precision.
 
-    Parameters
-    ----------
-    name : in the hover box and in what a reader saves.
-    keys : of the chips that hide it.
-    unit : of y.
+    name : in the hover box and in what a reader saves. keys : of the chips that hide it. unit : of y.
     hover : template of the hover box, or the text of each point; empty for no box, None for name and y.
     """
     template = "%{customdata}" if not isinstance(hover, str | None) else hover
@@ -242,12 +228,6 @@ def error_bars(middle: Floats, low: Floats, high: Floats, colour: str) -> dict[s
     return {"type": "data", "symmetric": False, "color": colour, "thickness": 1.5, "width": 4, **reach}
 
 
-def row_name(row: int, words: str) -> dict[str, Any]:
-    """Annotation above a row of a figure, at its left edge: long names need no margin there."""
-    place = {"x": 0, "xref": "paper", "xanchor": "left", "y": row, "yshift": 17, "showarrow": False}
-    return {**place, "text": words, "font": {"size": 12}, "bgcolor": "var(--page)", "borderpad": 0}
-
-
 def spread_places(places: Sequence[float], gap: float, most: float) -> list[float]:
     """Move rising places at least `gap` apart and none beyond `most`, each as little as those before it allow."""
     moved: list[float] = []
@@ -260,7 +240,7 @@ def spread_places(places: Sequence[float], gap: float, most: float) -> list[floa
 
 def even_places(length: int, most: int) -> Indices:
     """At most so many indices of a sequence at even distances, the first and the last included."""
-    return np.unique(np.linspace(0, length - 1, min(length, most)).round().astype(int))
+    return np.linspace(0, length - 1, min(length, most)).round().astype(int)
 
 
 def names_in(frame: pd.DataFrame, column: str = "run") -> list[str]:
@@ -271,12 +251,7 @@ def names_in(frame: pd.DataFrame, column: str = "run") -> list[str]:
 def draw_alone(figure: PageFigure, chosen: Sequence[object] = (), *, dark: bool = False) -> go.Figure:
     """Draw a figure of a page as one Plotly figure with title, legend and real colours.
 
-    Parameters
-    ----------
-    chosen : an option of each control of the figure, in order; None for the one that the page shows first.
-    dark : light ink on a dark ground.
-
-    Raises ShipidError for an option that does not exist.
+    chosen : an option of each control, in order; None for the one that the page shows first; ShipidError for another.
     """
     given = [*chosen, *[None] * (len(figure.controls) - len(chosen))]
     options = [_find_option(control, value) for control, value in zip(figure.controls, given, strict=True)]
@@ -314,20 +289,10 @@ def dress_panels(figure: PageFigure, panels: Sequence[Panel], *, dark: bool = Fa
     whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
     whole.update_layout(showlegend=bool(figure.chips))
     colours = page_colours("dark" if dark else "light")
-    data = [_put_colours(trace.to_plotly_json(), colours) for trace in whole.data]
-    layout = {**_put_colours(whole.layout.to_plotly_json(), colours), "paper_bgcolor": colours["page"]}
-    return go.Figure(data, layout)
-
-
-def _put_colours(value: Any, colours: Mapping[str, str]) -> Any:
-    """Replace the names of colours, `var(--ink)`, in the options of a figure by colours."""
-    if isinstance(value, str):
-        return re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], value)
-    if isinstance(value, Mapping):
-        return {key: _put_colours(item, colours) for key, item in value.items()}
-    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype.kind in "OU"):
-        return [_put_colours(item, colours) for item in value]
-    return value
+    whole.update_layout(paper_bgcolor=colours["page"])
+    parts = {"data": [trace.to_plotly_json() for trace in whole.data], "layout": whole.layout.to_plotly_json()}
+    plain = json.dumps(parts, cls=PlotlyJSONEncoder)
+    return go.Figure(json.loads(re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], plain)))
 
 
 def _legend_entry(chip: Chip) -> Trace:

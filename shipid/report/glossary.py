@@ -24,11 +24,7 @@ AFTER = re.compile(r"\b(by|its|is|has|error|below|equal|along|less) (A|H)(?![\w-
 
 def mark_short_names(text: str) -> Markup:
     """Escape a text and mark its short names with what they mean."""
-
-    def mark(match: re.Match[str]) -> str:
-        return _abbreviation(match[0])
-
-    marked = PATTERN.sub(mark, str(escape(text)))
+    marked = PATTERN.sub(lambda match: _abbreviation(match[0]), str(escape(text)))
     return Markup(AFTER.sub(lambda match: f"{match[1]} {_abbreviation(match[2])}", marked))
 
 

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from textwrap import wrap
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame
+from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MUTED,
@@ -20,6 +19,7 @@ from shipid.report.figure import (
     Panel,
     Trace,
     category_colour,
+    error_bars,
     escape_name,
     make_axis,
     make_line,
@@ -29,20 +29,19 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.motion import LOG_SERIES, MOTION_AXES, motion_figure
-from shipid.report.page import write_page
-from shipid.report.section import Section
+from shipid.report.page import Section, write_page
 from shipid.report.structures import group_errors
 from shipid.report.tables import (
     MISSING,
     PageTable,
     TableCell,
-    TableColumn,
-    decimals_for_median,
+    digits_cell,
     frame_table,
+    note_cells,
     with_cells,
     word_cell,
 )
-from shipid.report.wording import counted_text, join_few_names, number_text, scientific_text, set_sentence
+from shipid.report.wording import counted_text, join_few_names, number_text, set_sentence
 from shipid.units import interval_text
 
 PARAMETER_HEIGHT, HEAD = 22, 74  # height of a parameter, and of what is around them [px]
@@ -50,38 +49,42 @@ WIDTH, SIDE = 18, 150  # of a cell of the heat map, and of what is around them [
 MOST_NAMED = 16  # estimates whose names have room below the columns on a phone
 FARTHEST_INTERVAL = 4.0  # an interval may reach so many spans of the estimates beyond them before it is cut
 BEFORE, AFTER = "before", "after"
+ESTIMATE_CHIPS = (
+    Chip("identified", "identified", category_colour(0), symbol="circle"),
+    Chip("vague", "not identified", MUTED, symbol="circle-open"),
+)
 RUN_INKS = {
     LOG_SERIES: {"color": INK, "dash": "solid"},
     BEFORE: {"color": category_colour(1), "dash": "dot"},
     AFTER: {"color": category_colour(0), "dash": "solid"},
 }
 ESTIMATE_COLUMNS = {
-    "parameter": TableColumn("words"),
-    "unit": TableColumn("unit"),
-    "base": TableColumn("base", numeric=True),
-    "estimate": TableColumn("value", numeric=True),
-    "standard error": TableColumn("error", numeric=True),
-    "factor": TableColumn("factor", numeric=True),
-    "factor, 95 %": TableColumn("interval", numeric=True),
-    "identified": TableColumn("identified"),
+    "parameter": "words",
+    "unit": "unit",
+    "base": "base",
+    "estimate": "value",
+    "standard error": "error",
+    "factor": "factor",
+    "factor, 95 %": "interval",
+    "identified": "identified",
 }
 MEASURES_BEFORE_AND_AFTER = {
-    "manoeuvre": TableColumn("manoeuvre"),
-    "measure": TableColumn("measure"),
-    BEFORE: TableColumn(BEFORE, numeric=True),
-    AFTER: TableColumn(AFTER, numeric=True),
-    "band from": TableColumn("low", numeric=True),
-    "to": TableColumn("high", numeric=True),
-    "unit": TableColumn("unit"),
-    "why missing": TableColumn("missing"),
+    "manoeuvre": "manoeuvre",
+    "measure": "measure",
+    BEFORE: BEFORE,
+    AFTER: AFTER,
+    "band from": "low",
+    "to": "high",
+    "unit": "unit",
+    "why missing": "missing",
 }
 PROGRAMME_COLUMNS = {
-    "manoeuvre": TableColumn("manoeuvre"),
-    "time [h]": TableColumn("hours", 2),
-    "gain [bit]": TableColumn("gain", 2),
-    "gain [bit/h]": TableColumn("per_hour", 2),
-    "narrows most": TableColumn("narrows"),
-    "by [%]": TableColumn("by", 0),
+    "manoeuvre": "manoeuvre",
+    "time [h]": "hours",
+    "gain [bit]": "gain",
+    "gain [bit/h]": "per_hour",
+    "narrows most": "narrows",
+    "by [%]": "by",
 }
 
 
@@ -89,23 +92,19 @@ PROGRAMME_COLUMNS = {
 class IdentificationContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : the vessel in words, and a short name.
     estimates : `name`, `path`, `with`, `unit`, `base`, `value`, `error`, `factor`, `factor_low`, `factor_high`,
-        `identified`, `reason`; infinite where nothing is known.
-    correlations : (n, n) of the estimates, in their order.
-    unseen, warnings : sentences.
+    `identified`, `reason`; infinite where nothing is known. correlations : (n, n) of them.
     errors : `set` (`fit`, `test`), `run` (`all` at first), `model` (`before`, `after`), root mean squares `u`, `v`
-        [m/s], `r` [rad/s], `position` [m].
+    [m/s], `r` [rad/s], `position` [m].
     series : `run`, `piece`, `t` [s], `model` (`measured`, `before`, `after`), `north`, `east` [m], `psi` [rad],
-        `u`, `v` [m/s], `r` [rad/s], of runs held out; of fitted ones where `held_out` is empty.
-    held_out, ahead : runs, and length of a free run [s], 0 for whole runs.
-    manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`, `note`.
+    `u`, `v` [m/s], `r` [rad/s], of runs held out; of fitted ones where `held_out` is empty.
+    ahead : length of a free run [s], 0 for whole runs. manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`,
+    `note`.
     colours : `signal`, `lag` [s], `correlation` of the residuals.
-    profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point; without rows there is no figure.
-    groups : errors by side, helm and speed. beyond : sentences on manoeuvres that go farther than the data.
-    programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`; may be empty.
+    profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point. groups : errors by side, helm and
+    speed.
+    beyond : sentences on manoeuvres that go farther than the data.
+    programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`.
     """
 
     estimates: pd.DataFrame
@@ -127,10 +126,8 @@ class IdentificationContent(PageContent):
     def answer(self) -> list[AnswerSentence]:
         """Sentences: how many parameters are identified, errors on runs held out before and after, warnings."""
         known, count = int(self.estimates["identified"].sum()), len(self.estimates)
-        sentences = [
-            AnswerSentence(f"{known} of {counted_text(count, 'parameter')} are identified by these runs.", "estimates")
-        ]
-        sentences.append(AnswerSentence(_errors_before_and_after(self), "free-runs"))
+        first = f"{known} of {counted_text(count, 'parameter')} are identified by these runs."
+        sentences = [AnswerSentence(first, "estimates"), AnswerSentence(_errors_before_and_after(self), "free-runs")]
         return [*sentences, *(AnswerSentence(f"Careful: {warning}.") for warning in self.warnings)]
 
 
@@ -174,10 +171,7 @@ def estimates_figure(content: IdentificationContent) -> PageFigure:
         alternative="Estimates with intervals; the table below has the numbers.",
         height=PARAMETER_HEIGHT * len(frame) + HEAD,
         draw=lambda: [_draw_estimates(frame, low, high)],
-        chips=[
-            Chip("identified", "identified", category_colour(0), symbol="circle"),
-            Chip("vague", "not identified", MUTED, symbol="circle-open", width=1.2),
-        ],
+        chips=ESTIMATE_CHIPS,
     )
 
 
@@ -185,19 +179,18 @@ def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> Panel:
     base_ink = {"color": INK, "width": 1, "dash": "dot"}
     traces = [make_line("base", [1.0, 1.0], [-0.7, len(frame) - 0.3], [], line=base_ink, hover="")]
     numbered = frame.assign(row=np.arange(len(frame), dtype=float))
-    for known, key, ink, width, symbol in (
-        (True, "identified", category_colour(0), 2.5, "circle"),
-        (False, "vague", MUTED, 1.2, "circle-open"),
-    ):
-        mine = numbered[frame["identified"].astype(bool) == known]
-        ends = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high)
-        x = np.column_stack([ends, np.full(len(mine), np.nan)]).ravel()
-        bars: Trace = {"line": {"color": ink, "width": width}, "hover": ""}
-        traces.append(make_line("interval", x, np.repeat(mine["row"], 3), [key], **bars))
-        marker = {"symbol": symbol, "color": ink, "size": 9, "line": {"color": ink, "width": 2}}
-        words = [_estimate_words(row) for row in mine.to_dict("records")]
+    for chip in ESTIMATE_CHIPS:
+        mine = numbered[frame["identified"].astype(bool) == (chip.key == "identified")]
+        near, far = np.clip(mine[["factor_low", "factor_high"]].to_numpy(dtype=float), low, high).T
+        marker = {"symbol": chip.symbol, "color": chip.colour, "size": 9, "line": {"color": chip.colour, "width": 2}}
+        look: Trace = {"marker": marker, "error_x": error_bars(mine["factor"].to_numpy(float), near, far, chip.colour)}
+        words = [
+            f"<b>{escape_name(row.path)}</b> x {row.factor:.4g}, 95 % {interval_text(row.factor_low, row.factor_high)}"
+            f"<br>{'<br>'.join(wrap(escape_name(row.reason), 70))}"
+            for row in rows_as_tuples(mine)
+        ]
         traces.append(
-            make_line("estimate", mine["factor"], mine["row"], [key], mode="markers", marker=marker, hover=words)
+            make_line("estimate", mine["factor"], mine["row"], [chip.key], mode="markers", hover=words, **look)
         )
     y = names_axis(list(frame["name"]), showgrid=False, range=[len(frame) - 0.4, -0.6])
     x_axis = make_axis("factor on the base value [1]", nticks=9, range=[low, high])
@@ -205,7 +198,7 @@ def _draw_estimates(frame: pd.DataFrame, low: float, high: float) -> Panel:
 
 
 def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
-    """Return the range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
+    """The range of factors drawn: all estimates, and intervals as far as estimates stay distinguishable."""
     dots = np.append(frame["factor"].to_numpy(dtype=float), 1.0)
     reach = FARTHEST_INTERVAL * max(float(np.ptp(dots)), 0.25)
     given = frame[["factor_low", "factor_high"]].to_numpy(dtype=float)
@@ -214,17 +207,11 @@ def _span_of_factors(frame: pd.DataFrame) -> tuple[float, float]:
     return low - 0.04 * (high - low), high + 0.04 * (high - low)
 
 
-def _estimate_words(row: Mapping[Any, Any]) -> str:
-    interval = interval_text(row["factor_low"], row["factor_high"])
-    words = [f"<b>{escape_name(row['path'])}</b> x {row['factor']:.4g}, 95 % {interval}"]
-    return "<br>".join([*words, *wrap(escape_name(row["reason"]), 70)])
-
-
 def estimates_table(content: IdentificationContent) -> PageTable:
-    """Return the table of all estimates in their units."""
+    """The table of all estimates in their units."""
     frame = content.estimates
     words = [row["path"] + (f" (with {row['with']})" if row["with"] else "") for row in frame.to_dict("records")]
-    numbers = {name: list(map(_scientific_cell, frame[name])) for name in ("base", "value", "error", "factor")}
+    numbers = {name: list(map(digits_cell, frame[name])) for name in ("base", "value", "error", "factor")}
     intervals = [
         TableCell(interval_text(low, high, " … ").replace("-", "−"), float(low))
         if np.isfinite(high - low)
@@ -236,15 +223,11 @@ def estimates_table(content: IdentificationContent) -> PageTable:
     return frame_table("numbers", "Every estimate", "", shown, ESTIMATE_COLUMNS)
 
 
-def _scientific_cell(value: float) -> TableCell:
-    return TableCell(scientific_text(value), float(value)) if np.isfinite(value) else TableCell("–", MISSING)
-
-
-def unseen_table(content: IdentificationContent) -> PageTable | None:
-    """Return the table of what is not identified, and why; None if everything is."""
+def unseen_table(content: IdentificationContent) -> PageTable:
+    """The table of what is not identified, and why."""
     rows = [[word_cell(set_sentence(f"{sentence[0].upper()}{sentence[1:]}"))] for sentence in content.unseen]
     takeaway = "Fix, tie or give priors to some of these, or run manoeuvres that separate them."
-    return PageTable("unseen", "What is not identified", takeaway, ["why"], [False], rows) if rows else None
+    return PageTable("unseen", "What is not identified", takeaway, ["why"], [False], rows)
 
 
 def correlations_figure(content: IdentificationContent) -> PageFigure | None:
@@ -268,13 +251,11 @@ def correlations_figure(content: IdentificationContent) -> PageFigure | None:
 
 def _draw_correlations(names: Sequence[str], matrix: Floats) -> Panel:
     scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
-    title = {"text": "correlation [1]", "side": "right", "font": {"size": 13}}
+    bar = {"thickness": 12, "title": {"text": "correlation [1]", "side": "right"}}
     heat: Trace = {"type": "heatmap", "z": matrix.astype(np.float32), "x": names, "y": names, "zmin": -1, "zmax": 1}
-    heat |= {"colorscale": scale, "xgap": 1, "ygap": 1, "colorbar": {"thickness": 12, "dtick": 0.5, "title": title}}
-    heat |= {"hovertemplate": "%{y} and %{x}: %{z:.2f}<extra></extra>"}
-    both = {"showgrid": False, "tickmode": "array", "tickvals": names, "ticktext": names}
-    x = make_axis("", tickangle=-90, showticklabels=len(names) <= MOST_NAMED, **both)
-    return make_plot([heat], x, make_axis("", autorange="reversed", **both), margin={"l": 8, "r": 8, "t": 8, "b": 8})
+    heat |= {"colorscale": scale, "colorbar": bar, "hovertemplate": "%{y} and %{x}: %{z:.2f}<extra></extra>"}
+    x = make_axis("", tickangle=-90, showticklabels=len(names) <= MOST_NAMED, showgrid=False)
+    return make_plot([heat], x, make_axis("", autorange="reversed"), margin={"l": 8, "r": 8, "t": 8, "b": 8})
 
 
 def free_runs_figure(content: IdentificationContent) -> PageFigure:
@@ -296,30 +277,17 @@ def free_runs_figure(content: IdentificationContent) -> PageFigure:
 
 def free_run_errors(content: IdentificationContent) -> PageTable:
     """Root mean square errors of the free runs, run by run: of all runs first, and of those held out before others."""
-    places, words = decimals_for_median(content.errors["position"]), {"fit": "fitted", "test": "held out"}
     factors = {name: factor for name, (_, _, factor) in MOTION_AXES.items()} | {"position": 1.0}
-    by_model = {name: content.errors.pivot(index=["set", "run"], columns="model", values=name) for name in factors}
-    wide = pd.DataFrame(
-        {
-            f"{name} {model}": factor * by_model[name][model].astype(float)
-            for name, factor in factors.items()
-            for model in (BEFORE, AFTER)
-        }
-    )
-    pairs = dict.fromkeys((row["set"], row["run"]) for row in content.errors.to_dict("records"))
+    scaled = content.errors.assign(**{name: factor * content.errors[name] for name, factor in factors.items()})
+    wide = scaled.pivot(index=["set", "run"], columns="model", values=list(factors))
+    wide.columns = wide.columns.map(" ".join)
+    pairs = dict.fromkeys(zip(content.errors["set"], content.errors["run"], strict=True))
     wide = wide.reindex(sorted(pairs, key=lambda pair: (pair[1] != "all", pair[0] != "test"))).reset_index()
-    heads = {
-        f"{name} {model}": TableColumn(f"{name} {model}", places if name == "position" else 3)
-        for name in factors
-        for model in (BEFORE, AFTER)
-    }
-    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map(words))
+    named = wide["run"].where(wide["run"].ne("all"), "all " + wide["set"].map({"fit": "fitted", "test": "held out"}))
+    heads = ["run", "set", *(f"{name} {model}" for name in factors for model in (BEFORE, AFTER))]
     title = f"Root mean square errors of free runs {_run_length(content)}"
-    takeaway, columns = (
-        "u, v in m/s, r in deg/s, position in m.",
-        {"run": TableColumn("run"), "set": TableColumn("set"), **heads},
-    )
-    return frame_table("errors", title, takeaway, wide.assign(run=named), columns)
+    takeaway = "u, v in m/s, r in deg/s, position in m."
+    return frame_table("errors", title, takeaway, wide.assign(run=named), dict(zip(heads, heads, strict=True)))
 
 
 def manoeuvres_before_and_after(content: IdentificationContent) -> PageTable | None:
@@ -328,20 +296,18 @@ def manoeuvres_before_and_after(content: IdentificationContent) -> PageTable | N
     if performed.empty:
         return None
     numbers = [name for name in (BEFORE, AFTER, "low", "high") if name in performed]
-    shown = with_cells(performed, **{name: list(map(_scientific_cell, performed[name])) for name in numbers})
+    shown = with_cells(performed, **{name: list(map(digits_cell, performed[name])) for name in numbers})
     if performed["note"].ne("").any():
-        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in performed["note"]])
+        shown = with_cells(shown, missing=note_cells(performed["note"]))
     takeaway = "Simulated in calm deep water, from U_0 of the vessel or a Froude number of 0.2."
     takeaway += "".join(f" Extrapolated: {sentence}." for sentence in content.beyond)
     takeaway += " The band is what the uncertainty of the estimates leaves open." if "low" in performed else ""
     return frame_table("manoeuvres", "Standard manoeuvres", takeaway, shown, MEASURES_BEFORE_AND_AFTER)
 
 
-def residuals_figure(content: IdentificationContent) -> PageFigure | None:
-    """Autocorrelation of the residuals; None without any."""
+def residuals_figure(content: IdentificationContent) -> PageFigure:
+    """Autocorrelation of the residuals."""
     frame = content.colours
-    if frame.empty:
-        return None
     parts = {name: frame[frame["signal"] == name] for name in names_in(frame, "signal")}
     first = [f"{name} {number_text(([*mine['correlation'], 0.0, 0.0])[1])}" for name, mine in parts.items()]
     return PageFigure(
@@ -367,10 +333,8 @@ def _draw_residuals(parts: Mapping[str, pd.DataFrame]) -> Panel:
     return make_plot(traces, make_axis("lag [s]", nticks=9), y)
 
 
-def profiles_figure(content: IdentificationContent) -> PageFigure | None:
-    """Return the figure of the profile likelihoods; None if none was asked for."""
-    if content.profiles.empty:
-        return None
+def profiles_figure(content: IdentificationContent) -> PageFigure:
+    """The figure of the profile likelihoods."""
     curves = content.profiles.groupby("path", sort=False)
     return PageFigure(
         id="profiles",
@@ -395,18 +359,16 @@ def _draw_profile(path: str, mine: pd.DataFrame) -> Panel:
     return make_plot(traces, make_axis(f"factor of {escape_name(path)} [1]", nticks=6), y)
 
 
-def programme_table(content: IdentificationContent) -> PageTable | None:
-    """Return the table of manoeuvres to run next; None if it was not asked for."""
+def programme_table(content: IdentificationContent) -> PageTable:
+    """The table of manoeuvres to run next."""
     frame = content.programme
-    if frame.empty:
-        return None
     takeaway = f"Most information per hour about these parameters: {frame['manoeuvre'].iloc[0]}."
     shown = frame.assign(by=100 * (1 - frame["after"] / frame["before"]))
     return frame_table("programme", "Candidates", takeaway, shown, PROGRAMME_COLUMNS)
 
 
-def errors_by_side(content: IdentificationContent) -> PageTable | None:
-    """Errors by side, helm and speed; None without rows."""
+def errors_by_side(content: IdentificationContent) -> PageTable:
+    """Errors by side, helm and speed."""
     runs = "Runs held out" if content.held_out else "Fitted runs"
     return group_errors(content.groups, f"{runs}, over the horizon of the fit.")
 
@@ -414,31 +376,29 @@ def errors_by_side(content: IdentificationContent) -> PageTable | None:
 IDENTIFICATION_PAGE = {
     "what-is-known": Section(
         "What is known",
-        lambda content: (
-            estimates_figure(content),
-            estimates_table(content),
-            unseen_table(content),
-            correlations_figure(content),
-        ),
-        needs=("estimates",),
-        anchors=("estimates", "numbers", "unseen", "correlations"),
+        {
+            "estimates": (estimates_figure, "estimates"),
+            "numbers": (estimates_table, "estimates"),
+            "unseen": (unseen_table, "unseen"),
+            "correlations": (correlations_figure, "estimates"),
+        },
     ),
     "what-it-buys": Section(
         "What it buys",
-        lambda content: (free_runs_figure(content), free_run_errors(content), manoeuvres_before_and_after(content)),
-        needs=("series", "errors"),
-        anchors=("free-runs", "errors", "manoeuvres"),
+        {
+            "free-runs": (free_runs_figure, "series"),
+            "errors": (free_run_errors, "errors"),
+            "manoeuvres": (manoeuvres_before_and_after, "manoeuvres"),
+        },
     ),
     "what-is-left": Section(
         "What is left over",
-        lambda content: (errors_by_side(content), residuals_figure(content), profiles_figure(content)),
-        anchors=("sides", "residuals", "profiles"),
+        {
+            "sides": (errors_by_side, "groups"),
+            "residuals": (residuals_figure, "colours"),
+            "profiles": (profiles_figure, "profiles"),
+        },
     ),
-    "next": Section(
-        "What to run next",
-        lambda content: (programme_table(content),),
-        needs=("programme",),
-        anchors=("programme",),
-    ),
+    "next": Section("What to run next", {"programme": (programme_table, "programme")}),
 }
 write_identification = partial(write_page, "identification", IDENTIFICATION_PAGE)

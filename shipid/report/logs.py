@@ -6,6 +6,7 @@ import pandas as pd
 
 from shipid.report.content import PUBLISHED, ReportContent
 from shipid.report.figure import (
+    MOST_LINE_POINTS,
     MUTED,
     Chip,
     PageFigure,
@@ -13,6 +14,7 @@ from shipid.report.figure import (
     Trace,
     category_colour,
     escape_name,
+    even_places,
     make_axis,
     make_chart,
     make_line,
@@ -20,18 +22,16 @@ from shipid.report.figure import (
     names_axis,
     names_in,
 )
-from shipid.report.section import Section
-from shipid.report.selection import thin_lines
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, word_cell
+from shipid.report.page import Section
+from shipid.report.tables import PageTable, TableCell, frame_table, word_cell
 from shipid.report.wording import counted_text, distance_text, join_few_names, number_text
 
 TRAINING_COLOUR, TEST_COLOUR, VALIDATION_COLOUR = (category_colour(i) for i in range(3))
-TRACK_DETAIL = 2000  # a track needs no more detail than extent / PIXELS
 REPAIR_COLUMNS = {
-    "repair": TableColumn("kind"),
-    "column": TableColumn("column"),
-    "samples [1]": TableColumn("count", 0),
-    "note": TableColumn("note"),
+    "repair": "kind",
+    "column": "column",
+    "samples [1]": "count",
+    "note": "note",
 }
 
 
@@ -41,11 +41,9 @@ def set_colour(name: str) -> str:
     return next((colour for start, colour in starts.items() if name.lower().startswith(start)), TRAINING_COLOUR)
 
 
-def tracks_figure(content: ReportContent) -> PageFigure | None:
-    """Tracks of all manoeuvres by set, north up, equal axes; None without rows. Takes the content of any page."""
+def tracks_figure(content: ReportContent) -> PageFigure:
+    """Tracks of all manoeuvres by set, north up, equal axes. Takes the content of any page."""
     tracks = content.tracks
-    if tracks.empty:
-        return None
     bounds = [(float(tracks[column].min()), float(tracks[column].max())) for column in ("east", "north")]
     names, counts = names_in(tracks, "set"), tracks.groupby("set").run.nunique()
     east, north = (distance_text(high - low) for low, high in bounds)
@@ -54,7 +52,7 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
         id="manoeuvres",
         title="The manoeuvres",
         takeaway=f"{runs} cover {north} from south to north and {east} from west to east.",
-        how="Logged positions, north up, equal axes; points closer to the line than a pixel are left out.",
+        how="Logged positions, north up, equal axes; a run of many rows is drawn by some of them.",
         alternative="Map of the tracks of all manoeuvres, coloured by set.",
         height=520,
         draw=lambda: [_draw_tracks(tracks, bounds)],
@@ -64,22 +62,19 @@ def tracks_figure(content: ReportContent) -> PageFigure | None:
 
 def _draw_tracks(tracks: pd.DataFrame, bounds: list[tuple[float, float]]) -> Panel:
     """Tracks on a map; those of the test last, so that they lie on top."""
-    detail, traces = max(high - low for low, high in bounds) / TRACK_DETAIL, []
+    traces = []
     for name in sorted(names_in(tracks, "set"), key=lambda name: set_colour(name) == TEST_COLOUR):
         for run, mine in tracks[tracks["set"] == name].groupby("run", sort=False):
-            points = mine[["east", "north"]].to_numpy(dtype=float)
-            points = points[thin_lines([points], detail)[0]]
+            shown = mine.iloc[even_places(len(mine), MOST_LINE_POINTS)]
             ink = {"color": set_colour(name), "width": 2.2 if set_colour(name) == TEST_COLOUR else 1.2}
             words = f"{escape_name(run)} ({escape_name(name)})"
-            traces.append(make_line(str(run), points[:, 0], points[:, 1], [f"set:{name}"], line=ink, hover=words))
+            traces.append(make_line(str(run), shown.east, shown.north, [f"set:{name}"], line=ink, hover=words))
     return make_chart(traces, "east [m]", "north [m]", bounds)
 
 
-def envelope_figure(content: ReportContent) -> PageFigure | None:
-    """Range and mean of every input per set, one panel per quantity; None without rows."""
+def envelope_figure(content: ReportContent) -> PageFigure:
+    """Range and mean of every input per set, one panel per quantity."""
     frame = content.envelope
-    if frame.empty:
-        return None
     by_count = frame["set"].str.fullmatch(r"D_\d+").any()  # sets called by their number of runs
     return PageFigure(
         id="envelope",
@@ -102,10 +97,8 @@ def _draw_ranges(mine: pd.DataFrame) -> Panel:
         dot: Trace = {"color": set_colour(name), "size": 11}
         traces.append(make_line(name, [low, high], [row, row], [], hover=words, **bar))
         traces.append(make_line(name, [mean], [row], [], mode="markers", marker=dot, hover=words))
-    low, high = float(mine["min"].min()), float(mine["max"].max())
-    room = 0.06 * (high - low) or 1.0
     y_axis = names_axis(names_in(mine, "set"), showgrid=False, range=[len(mine) - 0.4, -0.6])
-    x_axis = make_axis(f"{escape_name(quantity)} [{escape_name(unit)}]", nticks=6, range=[low - room, high + room])
+    x_axis = make_axis(f"{escape_name(quantity)} [{escape_name(unit)}]", nticks=6)
     return make_plot(traces, x_axis, y_axis, margin={"l": 8, "r": 12, "t": 4, "b": 44})
 
 
@@ -130,11 +123,9 @@ def _beyond_words(frame: pd.DataFrame) -> str:
     return f"The test reaches outside what the other sets cover in {reach}: {join_few_names(outside)}."
 
 
-def input_ranges(content: ReportContent) -> PageTable | None:
-    """Smallest, mean and largest value of every input, a row per set; None without rows."""
+def input_ranges(content: ReportContent) -> PageTable:
+    """Smallest, mean and largest value of every input, a row per set."""
     frame = content.envelope
-    if frame.empty:
-        return None
     ranges = {
         (row["set"], row["quantity"]): TableCell(_range_words(row["min"], row["mean"], row["max"]), float(row["mean"]))
         for row in frame.to_dict("records")
@@ -142,17 +133,13 @@ def input_ranges(content: ReportContent) -> PageTable | None:
     sets = sorted(names_in(frame, "set"), key=lambda name: name == PUBLISHED)
     units = dict(zip(frame["quantity"], frame["unit"], strict=True))
     rows = {name: [ranges.get((of, name), word_cell(None)) for of in sets] for name in units}
-    columns = {f"{name} [{unit}]": TableColumn(name, numeric=True) for name, unit in units.items()}
+    columns = {f"{name} [{unit}]": name for name, unit in units.items()}
     shown = pd.DataFrame({"the set": sets, **rows})
-    return frame_table(
-        "envelope-table", "Minimum / mean / maximum", "", shown, {"set": TableColumn("the set"), **columns}
-    )
+    return frame_table("envelope-table", "Minimum / mean / maximum", "", shown, {"set": "the set", **columns})
 
 
-def repairs_table(content: ReportContent) -> PageTable | None:
-    """Return the table of repairs by the importer; None if nothing is recorded. Takes the content of any page."""
-    if content.repairs.empty:
-        return None
+def repairs_table(content: ReportContent) -> PageTable:
+    """The table of repairs by the importer. Takes the content of any page."""
     kinds = names_in(content.repairs, "kind")
     takeaway = f"{counted_text(len(content.repairs), 'repair')}: {join_few_names(kinds)}."
     return frame_table("repairs", "What the importer repaired", takeaway, content.repairs, REPAIR_COLUMNS)
@@ -160,11 +147,10 @@ def repairs_table(content: ReportContent) -> PageTable | None:
 
 THE_DATA = Section(
     "The data",
-    draw=lambda content: (
-        tracks_figure(content),
-        envelope_figure(content),
-        input_ranges(content),
-        repairs_table(content),
-    ),
-    anchors=("manoeuvres", "envelope", "envelope-table", "repairs"),
+    {
+        "manoeuvres": (tracks_figure, "tracks"),
+        "envelope": (envelope_figure, "envelope"),
+        "envelope-table": (input_ranges, "envelope"),
+        "repairs": (repairs_table, "repairs"),
+    },
 )

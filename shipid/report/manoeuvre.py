@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
+    MOST_LINE_POINTS,
     MUTED,
     Chip,
     PageFigure,
     Panel,
     Trace,
     category_colour,
+    even_places,
     make_axis,
     make_chart,
     make_line,
@@ -25,41 +26,36 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.motion import DEGREES
-from shipid.report.page import write_page
+from shipid.report.page import Section, write_page
 from shipid.report.paths import outline_at
-from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableColumn, frame_table, number_cell, with_cells, word_cell
+from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells, with_cells, word_cell
 from shipid.report.wording import distance_text, number_text
 
-MOST_ROWS = 2000  # of the log: a line needs no more
 OUTLINES = 12  # ships drawn along the track
 EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
 MOST_HEADING_WITH_HELM = 120.0  # deg: a heading that stays within this is drawn with the helm
-CONSTANT_WITHIN = (
-    1e-9  # deg, m/s, deg/s, rpm: what changes by less is constant, and an axis is no picture of its rounding
-)
 MEASURE_COLUMNS = {
-    "measure": TableColumn("measure"),
-    "value": TableColumn("value", numeric=True),
-    "unit": TableColumn("unit"),
-    "ship lengths": TableColumn("lengths", 2),
-    "why missing": TableColumn("missing"),
+    "measure": "measure",
+    "value": "value",
+    "unit": "unit",
+    "ship lengths": "lengths",
+    "why missing": "missing",
 }
 CRITERION_COLUMNS = {
-    "criterion": TableColumn("criterion"),
-    "value": TableColumn("value", 2),
-    "limit": TableColumn("limit", 2),
-    "unit": TableColumn("unit"),
-    "verdict": TableColumn("verdict"),
-    "note": TableColumn("note"),
+    "criterion": "criterion",
+    "value": "value",
+    "limit": "limit",
+    "unit": "unit",
+    "verdict": "verdict",
+    "note": "note",
 }
-MANOEUVRE_LINES = {  # key -> name, unit, index of the colour, whether it is held from order to order
-    "heading": ("heading", "deg", 0, False),
-    "helm": ("helm", "deg", 1, True),
-    "u": ("ahead, u", "m/s", 0, False),
-    "v": ("to starboard, v", "m/s", 2, False),
-    "r": ("yaw rate, r", "deg/s", 3, False),
-    "shaft": ("shaft", "rpm", 4, True),
+MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
+    "heading": ("heading", "deg", False),
+    "helm": ("helm", "deg", True),
+    "u": ("ahead, u", "m/s", False),
+    "v": ("to starboard, v", "m/s", False),
+    "r": ("yaw rate, r", "deg/s", False),
+    "shaft": ("shaft", "rpm", True),
 }
 
 
@@ -67,14 +63,11 @@ MANOEUVRE_LINES = {  # key -> name, unit, index of the colour, whether it is hel
 class ManoeuvreContent(PageContent):
     """Everything the page shows.
 
-    Parameters
-    ----------
-    title, name : the manoeuvre in words, and its kind.
     first : names of the measures that the answer says.
     log : `t` [s], `north`, `east` [m], `psi`, `helm` [rad], `u`, `v` [m/s], `r` [rad/s], `shaft` [rev/s].
     measures, criteria : rows from `shipid.measures.rows`.
-    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed; without rows there is no figure.
-    outline : (k, 2) outline of the ship from above, body axes x ahead, y to starboard [m].
+    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed.
+    outline : (k, 2) of the ship from above, body axes x ahead, y to starboard [m].
     """
 
     first: Sequence[str]
@@ -86,7 +79,7 @@ class ManoeuvreContent(PageContent):
 
     @property
     def answer(self) -> list[AnswerSentence]:
-        """Return sentences: the main measures, and how many criteria are met."""
+        """Sentences: the main measures, and how many criteria are met."""
         known = self.measures[self.measures["measure"].isin(self.first)]
         measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in rows_as_tuples(known)]
         sentences = [AnswerSentence("; ".join(measures).capitalize() + ".", "measures")]
@@ -106,32 +99,22 @@ def _amount_words(value: float, unit: str) -> str:
 def measures_table(content: ManoeuvreContent) -> PageTable:
     """Every measure; one that is missing says why."""
     frame = content.measures
-    values = [number_cell(row.value, _decimals_of_measure(row.value, row.unit)) for row in rows_as_tuples(frame)]
-    shown = with_cells(frame, value=values)
+    shown = with_cells(frame, value=[digits_cell(round(value, 3), 3) for value in frame["value"]])
     if frame["note"].ne("").any():
-        shown = with_cells(shown, missing=[word_cell(note, bad=bool(note)) for note in frame["note"]])
+        shown = with_cells(shown, missing=note_cells(frame["note"]))
     return frame_table("measures", "Measures", "", shown, MEASURE_COLUMNS)
 
 
-def _decimals_of_measure(value: float, unit: str) -> int:
-    """Return the number of decimals for three digits: at most three; none for a count."""
-    if not np.isfinite(value) or abs(value) < 1e-3:
-        return 0 if unit == "-" and value == 0 else 2
-    return 0 if unit == "-" and value == round(value) else int(np.clip(2 - np.floor(np.log10(abs(value))), 0, 3))
-
-
-def criteria_table(content: ManoeuvreContent) -> PageTable | None:
-    """Criteria of IMO MSC.137(76) that apply to this kind of manoeuvre; None without."""
+def criteria_table(content: ManoeuvreContent) -> PageTable:
+    """Criteria of IMO MSC.137(76) that apply to this kind of manoeuvre."""
     frame = content.criteria
-    if frame.empty:
-        return None
     shown = with_cells(frame, verdict=[word_cell(verdict, bad=verdict == "not met") for verdict in frame["verdict"]])
     return frame_table("criteria", "Criteria of IMO MSC.137(76)", "", shown, CRITERION_COLUMNS)
 
 
 def track_figure(content: ManoeuvreContent) -> PageFigure:
     """Path of the ship with its outline to scale, north up, equal axes."""
-    log = content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)]
+    log = content.log.iloc[even_places(len(content.log), MOST_LINE_POINTS)]
     poses = log[["north", "east", "psi"]].iloc[np.linspace(0, len(log) - 1, OUTLINES).astype(int)]
     gap = np.full((1, 2), np.nan)
     hulls = [np.vstack([outline_at(content.outline, pose), gap]) for pose in poses.to_numpy()]
@@ -162,14 +145,10 @@ def track_figure(content: ManoeuvreContent) -> PageFigure:
 
 def histories_figure(content: ManoeuvreContent) -> PageFigure:
     """Heading, helm, speeds, yaw rate and shaft over time."""
-    log, executed = (
-        content.log.iloc[:: max(1, len(content.log) // MOST_ROWS)],
-        _value_of_measure(content, EXECUTE_HEADING),
-    )
-    degrees = DEGREES * log[["psi", "helm", "r"]]
-    values = log[["u", "v"]].assign(
-        heading=degrees["psi"] - degrees["psi"].iloc[0], helm=degrees["helm"], r=degrees["r"], shaft=60 * log["shaft"]
-    )
+    log = content.log.iloc[even_places(len(content.log), MOST_LINE_POINTS)]
+    executed, degrees = _value_of_measure(content, EXECUTE_HEADING), DEGREES * log[["psi", "helm", "r"]]
+    values = degrees.assign(heading=degrees["psi"] - degrees["psi"].iloc[0], shaft=60 * log["shaft"])
+    values = values.assign(u=log["u"], v=log["v"]).round(6)  # an axis is no picture of the rounding of a constant
     panels = {"heading, helm [deg]": ["heading", "helm"]}
     if np.ptp(values["heading"]) >= MOST_HEADING_WITH_HELM:
         panels = {"heading [deg]": ["heading"], "helm [deg]": ["helm"]}
@@ -185,12 +164,12 @@ def histories_figure(content: ManoeuvreContent) -> PageFigure:
         alternative="Heading, helm, speeds and yaw rate over time.",
         height=270,
         draw=lambda: [_draw_history(log["t"], values[keys], title, executed) for title, keys in panels.items()],
-        chips=[
-            Chip(key, MANOEUVRE_LINES[key][0], category_colour(MANOEUVRE_LINES[key][2]))
-            for keys in panels.values()
-            for key in keys
-        ],
+        chips=[Chip(key, MANOEUVRE_LINES[key][0], _line_colour(key)) for keys in panels.values() for key in keys],
     )
+
+
+def _line_colour(key: str) -> str:
+    return category_colour([*MANOEUVRE_LINES].index(key))
 
 
 def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, executed: float) -> Panel:
@@ -200,13 +179,10 @@ def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, execute
         rule = {"color": MUTED, "width": 1, "dash": "dot"}
         traces.append(make_line(f"{level:g} deg", [t.iloc[0], t.iloc[-1]], [level] * 2, ["heading"], "deg", line=rule))
     for key in values:
-        name, unit, colour, held = MANOEUVRE_LINES[str(key)]
-        ink = {"color": category_colour(colour), "width": 2} | ({"shape": "hv"} if held else {})
+        name, unit, held = MANOEUVRE_LINES[str(key)]
+        ink = {"color": _line_colour(str(key)), "shape": "hv" if held else "linear"}
         traces.append(make_line(name, t, values[key], [str(key)], unit, line=ink))
-    drawn = np.concatenate([trace["y"] for trace in traces])
-    low, high = float(np.nanmin(drawn)), float(np.nanmax(drawn))
-    span: dict[str, Any] = {"range": [low - 1, high + 1]} if high - low < CONSTANT_WITHIN else {}
-    return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6, **span))
+    return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6))
 
 
 def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
@@ -215,16 +191,11 @@ def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
     return float(values.iloc[0]) if len(values) else float("nan")
 
 
-def spiral_figure(content: ManoeuvreContent) -> PageFigure | None:
-    """Steady yaw rate over helm; None where no level was held."""
-    if content.levels.empty:
-        return None
+def spiral_figure(content: ManoeuvreContent) -> PageFigure:
+    """Steady yaw rate over helm."""
     levels = np.rad2deg(content.levels[["helm", "rate"]].astype(float))
-    look: Trace = {
-        "line": {"color": category_colour(3), "width": 2},
-        "marker": {"color": category_colour(3), "size": 7},
-    }
-    trace = make_line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", **look)
+    ink = {"color": category_colour(3)}
+    trace = make_line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", line=ink)
     axes = zero_axis("helm [deg]", nticks=9), zero_axis("yaw rate [deg/s]", nticks=8)
     return PageFigure(
         id="spiral",
@@ -239,15 +210,11 @@ def spiral_figure(content: ManoeuvreContent) -> PageFigure | None:
 
 MANOEUVRE_PAGE = {
     "results": Section(
-        "What was measured",
-        lambda content: (measures_table(content), criteria_table(content)),
-        anchors=("measures", "criteria"),
+        "What was measured", {"measures": (measures_table, "measures"), "criteria": (criteria_table, "criteria")}
     ),
     "motion": Section(
         "What the ship did",
-        lambda content: (track_figure(content), histories_figure(content), spiral_figure(content)),
-        needs=("log",),
-        anchors=("track", "histories", "spiral"),
+        {"track": (track_figure, "log"), "histories": (histories_figure, "log"), "spiral": (spiral_figure, "levels")},
     ),
 }
 write_manoeuvre = partial(write_page, "manoeuvre", MANOEUVRE_PAGE)

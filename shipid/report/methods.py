@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import pandas as pd
@@ -29,47 +30,35 @@ from shipid.report.figure import (
     names_in,
     zero_axis,
 )
-from shipid.report.section import Section
-from shipid.report.tables import PageTable, TableCell, TableColumn, frame_table, with_cells, word_cell
+from shipid.report.page import Section, write_page
+from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells, word_cell
 from shipid.report.wording import counted_text, difference_text, ends_text, join_few_names, number_text, shorten_name
 from shipid.units import plural_word
 
 ALL_WITH_PHYSICS = "with physics"
-AXIS_STEPS = (  # greatest by least error below which an axis has these ticks in a decade: two at least are within it
-    (2.5, (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 3.5, 4, 5, 6, 7, 8, 9)),
-    (6.0, (1, 1.5, 2, 3, 4, 6, 8)),
-    (100.0, (1, 2, 5)),
-)
 METHOD_HEIGHT, METHODS_MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
 ALIKE_ERRORS = 1e-9  # relative: errors that differ by rounding
-MOST_LETTERS_OF_METHOD = 20  # characters of a name at the axis: half of a narrow window
 METHOD_COLUMNS = {
-    "condition": TableColumn("condition"),
-    "family": TableColumn("family"),
-    "method": TableColumn("method"),
-    "N_D [1]": TableColumn("N_D", 0),
-    "H [m]": TableColumn("H", "length"),
-    "H_90 [m]": TableColumn("H_90", "length"),
-    "end [m]": TableColumn("end", "length"),
-    "core-seconds [s]": TableColumn("seconds", 1),
-    "trials [1]": TableColumn("trials", 0),
-    "no result": TableColumn("without", numeric=True),
-    "difference of H [m]": TableColumn("difference", "length"),
-    "95 % interval, runs [m]": TableColumn("over_runs", numeric=True),
-    "better runs": TableColumn("better_runs", numeric=True),
-    "by world [m]": TableColumn("by_world", numeric=True),
+    "condition": "condition",
+    "family": "family",
+    "method": "method",
+    "N_D [1]": "N_D",
+    "H [m]": "H",
+    "H_90 [m]": "H_90",
+    "end [m]": "end",
+    "core-seconds [s]": "seconds",
+    "trials [1]": "trials",
+    "no result": "without",
+    "difference of H [m]": "difference",
+    "95 % interval, runs [m]": "over_runs",
+    "better runs": "better_runs",
+    "by world [m]": "by_world",
 }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MethodsContent(PageContent):
-    """The page of a study of several parts.
-
-    Parameters
-    ----------
-    title, name : the question, and the short name of the study.
-    frames : `methods_figure`, as in the page of a study.
-    """
+    """The page of a study of several parts; `frames` has `methods`, as in the page of a study."""
 
     frames: Mapping[str, pd.DataFrame]
 
@@ -155,10 +144,7 @@ def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
 
 
 def _order_of_methods(frame: pd.DataFrame) -> list[str]:
-    """Methods by falling mean H, so that the best is at the top; those without any result first.
-
-    The mean is that with physics, or without where a method has none.
-    """
+    """Methods by falling mean H with physics (or without), the best last; those without any result first."""
     pure, physics = (
         frame[frame.family.eq(family)].groupby("method").H.mean() for family in (DATA_DRIVEN, ALL_WITH_PHYSICS)
     )
@@ -169,11 +155,8 @@ def _order_of_methods(frame: pd.DataFrame) -> list[str]:
 def _family_marker(family: str, families: Sequence[str]) -> dict[str, Any]:
     """Colour and marker of a family: ink without physics, as in every figure; further markers beyond the colours."""
     k = families.index(family)
-    return {
-        "color": INK if family == DATA_DRIVEN else category_colour(k),
-        "symbol": MARKERS[k // len(OKABE_ITO)],
-        "size": 8,
-    }
+    colour = INK if family == DATA_DRIVEN else category_colour(k)
+    return {"color": colour, "symbol": MARKERS[k // len(OKABE_ITO)], "size": 8}
 
 
 def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[str]) -> list[Panel]:
@@ -189,12 +172,9 @@ def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[s
         dots = _dots_of_family(family, families, paired, paired.difference, order, shift, words)
         middle, low, high = (paired[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         differences.append(dots | {"error_x": error_bars(middle, low, high, dots["marker"]["color"])})
-    positive = mine.H[mine.H > 0]
-    span = float(positive.max() / positive.min()) if len(positive) else 1.0
-    fine = next((steps for most, steps in AXIS_STEPS if span < most), (1,))
-    y = names_axis([shorten_name(name, MOST_LETTERS_OF_METHOD) for name in order], range=[-0.6, len(order) - 0.4])
+    y = names_axis([shorten_name(name, 20) for name in order], range=[-0.6, len(order) - 0.4])
     return [
-        make_plot(errors, log_axis("position error, H [m]", fine), y),
+        make_plot(errors, log_axis("position error, H [m]"), y),
         make_plot(differences, zero_axis("difference of H [m]", INK), y),
     ]
 
@@ -229,14 +209,14 @@ def methods_table(content: ReportContent | MethodsContent) -> PageTable:
     takeaway = "Core-seconds and errors are means over the cells of a row; differences are to "
     takeaway += f"{frame.reference.iloc[0]}. "
     takeaway += f"{bad} of {every} gave no result." if bad else f"All {every} gave a result."
-    return frame_table("methods-table", "Every method", takeaway, shown, METHOD_COLUMNS, like="H")
+    return frame_table("methods-table", "Every method", takeaway, shown, METHOD_COLUMNS)
 
 
 def _paired_cell(row: Mapping[Any, Any], name: str) -> TableCell:
     """Interval over runs, count of better runs, or range over worlds of a difference; a dash where there is none."""
     known = row["method"] != row["reference"] and math.isfinite(row["difference"])
-    if known and name == "over_runs" and math.isfinite(row["low"]):
-        return TableCell(ends_text(row["low"], row["high"]), float(row["low"]))
+    if known and name == "over_runs":
+        return range_cell(row["low"], row["high"])
     if known and name == "better_runs":
         return TableCell(f"{row['better']} of {row['runs']}", float(row["better"]))
     if known and name == "by_world" and row["worlds"] > 1:
@@ -246,9 +226,5 @@ def _paired_cell(row: Mapping[Any, Any], name: str) -> TableCell:
     return word_cell(None)
 
 
-THE_METHODS = Section(
-    "Methods",
-    draw=lambda content: (methods_figure(content), methods_table(content)),
-    needs=("methods",),
-    anchors=("methods", "methods-table"),
-)
+THE_METHODS = Section("Methods", {"methods": (methods_figure, "methods"), "methods-table": (methods_table, "methods")})
+write_comparison = partial(write_page, "methods", {"the-methods": THE_METHODS})

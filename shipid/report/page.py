@@ -1,11 +1,12 @@
-"""Put the figures and tables into one file that needs nothing else."""
+"""Sections of a page, and the one file that needs nothing else into which they are put."""
 
 from __future__ import annotations
 
 import base64
 import json
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from itertools import product
@@ -19,16 +20,64 @@ from plotly.io.json import to_json_plotly
 
 from shipid.errors import ResultError
 from shipid.files import write_text
-from shipid.report.content import AnswerSentence, ReportContent
 from shipid.report.figure import PageFigure, Panel, page_colours
 from shipid.report.glossary import mark_short_names
-from shipid.report.paths import window_data
-from shipid.report.section import OF_EVERY_PAGE, Section, declared_anchors, draw_sections
-from shipid.report.sections import SECTIONS
-from shipid.report.tables import cell_html
+from shipid.report.tables import PageTable, cell_html
 from shipid.report.wording import number_text, set_sentence
 
+Item = PageFigure | PageTable
+OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
 FIRST_SENTENCES = 3  # sentences of the answer that a reader sees; the others unfold
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of a page, as a registry such as `sections.SECTIONS` holds it.
+
+    items : id of a figure or table, to which a sentence may link -> what draws it from the content of the page, or
+    returns None, and the part of the content (a field, or a key of its `frames`) without which it is left out.
+    """
+
+    title: str
+    items: Mapping[str, tuple[Callable[[Any], Item | None], str]]
+
+    def draw_item(self, name: str, content: object) -> Item | None:
+        """Draw an item; None where the content lacks what it needs, or has nothing to show."""
+        draw, need = self.items[name]
+        return draw(content) if not need or _has_part(content, need) else None
+
+
+@dataclass(frozen=True)
+class DrawnSection:
+    """A section ready for the page: its id, its heading, its figures and tables."""
+
+    id: str
+    title: str
+    items: Sequence[Item]
+
+
+def declared_anchors(sections: Mapping[str, Section]) -> set[str]:
+    """Ids that a sentence of a page with these sections may link to."""
+    return {name for section in sections.values() for name in section.items} | set(OF_EVERY_PAGE)
+
+
+def draw_sections(
+    sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None
+) -> list[DrawnSection]:
+    """Draw the sections that have something to show, in order; `say` is called with the heading of each before."""
+    result = []
+    for name, section in sections.items():
+        if say and any(not need or _has_part(content, need) for _, need in section.items.values()):
+            say(f"drawing: {section.title}")
+        items = [item for one in section.items if (item := section.draw_item(one, content)) is not None]
+        result += [DrawnSection(name, section.title, items)] if items else []
+    return result
+
+
+def _has_part(content: object, name: str) -> bool:
+    """Whether the content has a field of that name, or an entry of `frames`, that is not empty."""
+    value = getattr(content, name, getattr(content, "frames", {}).get(name))
+    return value is not None and not (isinstance(value, Sized) and len(value) == 0)
 
 
 def render_page(
@@ -40,11 +89,7 @@ def render_page(
 ) -> str:
     """Write the sections that have something to show as one page of HTML.
 
-    Parameters
-    ----------
-    kind : what kind of page it is, above the title.
-    sections : registry of the page: id -> section, in order.
-    content : `PageContent` with an `answer`; what `draw` of each section takes.
+    kind : above the title. content : `PageContent` with an `answer`.
     windows : what page.js lets a reader browse, as `window_data` returns it.
     say : called with the heading of each section that is about to be drawn.
 
@@ -53,7 +98,9 @@ def render_page(
     parts = draw_sections(sections, content, say)
     items = [item for part in parts for item in part.items]
     figures = [item for item in items if isinstance(item, PageFigure)]
-    _check_links(content.answer, {item.id for item in items} | set(OF_EVERY_PAGE) | declared_anchors(sections))
+    known = {item.id for item in items} | declared_anchors(sections)
+    if unknown := {sentence.figure for sentence in content.answer} - known - {""}:
+        raise ValueError(f"no figure is called {min(unknown)!r}; valid: {', '.join(sorted(known))}")
     return _template().render(
         content=content,
         kicker=kind,
@@ -65,28 +112,19 @@ def render_page(
         numbers={figure.id: i for i, figure in enumerate(figures, start=1)},
         views={figure.id: _draw_views(figure) for figure in figures if not figure.browser},
         windows=pack_text(json.dumps(windows, separators=(",", ":"), allow_nan=False)) if windows else "",
-        palette={theme: Markup(_declare_colours(theme)) for theme in ("light", "dark")},
+        palette={
+            theme: Markup(" ".join(f"--{name}: {colour};" for name, colour in page_colours(theme).items()))
+            for theme in ("light", "dark")
+        },
         style=Markup(_resource("style.css")),
         script=Markup(_resource("page.js")),
         plotly=_plotly() if figures else None,
     )
 
 
-def _check_links(answer: Sequence[AnswerSentence], known: set[str]) -> None:
-    for sentence in answer:
-        if sentence.figure and sentence.figure not in known:
-            raise ValueError(f"no figure is called {sentence.figure!r}; valid: {', '.join(sorted(known))}")
-
-
 def write_page(kind: str, sections: Mapping[str, Section], content: Any, file: Path) -> Path:
     """Write a page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
     return write_whole(render_page(kind, sections, content), file)
-
-
-def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
-    """Write the page of a study as one HTML file that makes no request; returns the file, or raises ResultError."""
-    windows = window_data(content) if content.snapshots else None
-    return write_whole(render_page("study", SECTIONS, content, windows, say), file)
 
 
 def write_whole(text: str, file: Path) -> Path:
@@ -125,10 +163,6 @@ def _panel_json(panel: Panel) -> str:
 def pack_text(text: str) -> Markup:
     """Compress a text (zlib, base64) for a script element: no character in it can end the element or start a tag."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
-
-
-def _declare_colours(theme: str) -> str:
-    return " ".join(f"--{name}: {colour};" for name, colour in page_colours(theme).items())
 
 
 @cache

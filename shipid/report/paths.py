@@ -14,10 +14,9 @@ import pandas as pd
 
 from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, PathKey, ReportContent, WindowSnapshot
-from shipid.report.errors_over import close_up_chips, line_source, name_of_line
+from shipid.report.errors_over import close_up_chips, line_look
 from shipid.report.figure import (
     MUTED,
-    NAIVE,
     TRUTH,
     Chip,
     Control,
@@ -29,25 +28,22 @@ from shipid.report.figure import (
     make_chart,
     make_line,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import (
     FEW_RUNS,
-    SOURCE_DASHES,
-    close_styles,
     close_up_models,
     data_driven,
     drawn_source,
     figure_sizes,
     in_words,
     spread_items,
-    thin_lines,
 )
 from shipid.report.wording import counted_text, metres_text
 
 MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_SHOWN_WINDOWS = 600  # in all
 MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
-WINDOW_DETAIL = 1000  # a window is drawn about half as large
+MOST_POINTS = 40  # of a path or of the outline of a band
+PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
 HOW_WINDOWS = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
@@ -62,8 +58,8 @@ def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
         by_run.setdefault(snapshot.run, []).append(snapshot)
     shown = set(close_up_models(content))
     paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
-    windows = min(MOST_SHOWN_WINDOWS, MOST_PATHS // max(1, paths))
-    result, most = {}, min(MOST_INSTANTS, max(1, windows // max(1, min(FEW_RUNS, len(by_run)))))
+    runs = max(1, min(FEW_RUNS, len(by_run)))
+    result, most = {}, min(MOST_INSTANTS, max(1, MOST_PATHS // (runs * max(1, paths))))
     for run in spread_items(sorted(by_run), FEW_RUNS):
         ordered = sorted(by_run[run], key=lambda window: window.t)
         result[run] = [ordered[i] for i in even_places(len(ordered), most)]
@@ -97,27 +93,24 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
 
 
 def window_data(content: ReportContent) -> dict[str, Any]:
-    """Collect what page.js draws: layout, line styles, ship outline and the windows by run.
+    """What page.js draws: layout, line styles, ship outline and the windows by run.
 
-    A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one;
-    `line` is an index into `lines`, `size` into the N_D offered or -1 for a path that does not depend on N_D. Lengths
-    are metres, angles radians.
+    A path is `[line, size, x, y, end error]`, then x, y of its band's outline if it has one; `line` is an index into
+    `lines`, `size` into the N_D offered or -1. Lengths are metres, angles radians.
     """
     runs, counts = windows_of(content), window_sizes(content)
     lines: dict[tuple[str, str], int] = {}
     shots = [window for windows in runs.values() for window in windows]
-    detail = _half_pixel(shots)
-    # All paths are thinned together: it takes a fifth of the time.
-    every = [track for window in shots for track in (window.truth, *window.paths.values(), *window.bands.values())]
-    columns = dict(zip(map(id, every), _thinned_columns(every, detail), strict=True))
+    extents = [np.ptp(np.vstack([window.truth, window.outline]), axis=0).max() for window in shots]
+    places = max(0, PLACES_OF_METRE - math.floor(math.log10(np.median(extents)))) if shots else 0
 
     def path_of(window: WindowSnapshot, key: PathKey) -> list[Any]:
         model, source, size = key
         which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
         error = round(_end_error(window, window.paths[key]), 6)
-        band = columns[id(window.bands[key])] if key in window.bands else []
-        at = counts.index(size) if source == "cooperative" else -1
-        return [which, at, *columns[id(window.paths[key])], error if math.isfinite(error) else None, *band]
+        band = _rounded_columns(window.bands[key], places) if key in window.bands else []
+        at, path = counts.index(size) if source == "cooperative" else -1, _rounded_columns(window.paths[key], places)
+        return [which, at, *path, error if math.isfinite(error) else None, *band]
 
     packed = [
         [
@@ -125,7 +118,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
                 "t": window.t,
                 "psi": round(window.psi_end, 4),
                 "wind": None if window.wind is None else [round(value, 3) for value in window.wind],
-                "truth": columns[id(window.truth)],
+                "truth": _rounded_columns(window.truth, places),
                 "paths": [path_of(window, key) for key in window.paths if _is_drawn(content, key, counts)],
             }
             for window in windows
@@ -136,7 +129,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     return {
         "runs": packed,
         "outline": outline,
-        "lines": [_line_style(content, model, source) for model, source in lines],
+        "lines": [line_look(content, model, source) for model, source in lines],
         "truth": {"color": TRUTH, "width": 9},
         "layout": make_chart([], TO_STARBOARD, AHEAD)["layout"],
     }
@@ -161,20 +154,14 @@ def draw_window(
         fill: Trace = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
         traces.append(_path_line("ship", hull, ["ship"], hover="", **fill))
     for key in (key for key in window.paths if _is_drawn(content, key, [size])):
-        look = _line_style(content, "" if key[1] == "naive" else key[0], key[1])
+        look = line_look(content, "" if key[1] == "naive" else key[0], key[1])
         if key in window.bands:
-            shade: Trace = {
-                "line": {**look["line"], "width": 0.5},
-                "fill": "toself",
-                "fillcolor": look["line"]["color"],
-            }
+            colour = look["line"]["color"]
+            shade: Trace = {"line": {"color": colour, "width": 0.5}, "fill": "toself", "fillcolor": colour}
             keys = [*look["keys"], "band"]
             traces.append(_path_line(look["name"], window.bands[key], keys, hover="", opacity=0.15, **shade))
-        traces.append(
-            _path_line(
-                look["name"], window.paths[key], look["keys"], line=look["line"], hover=escape_name(look["name"])
-            )
-        )
+        words, ink = escape_name(look["name"]), look["line"]
+        traces.append(_path_line(look["name"], window.paths[key], look["keys"], line=ink, hover=words))
     return make_chart(traces, TO_STARBOARD, AHEAD)
 
 
@@ -193,14 +180,9 @@ def outline_at(outline: Floats, pose: Floats) -> Floats:
 def find_window(
     content: ReportContent, run: str | None, t: float | None, N_D: int | None
 ) -> tuple[WindowSnapshot, int]:
-    """A window of a test run, and the N_D to draw it with.
+    """A window of a test run (default: the first), and the N_D to draw it with (default: the most).
 
-    Parameters
-    ----------
-    run : test run; default: the first.
     t : instant of prediction [s], the nearest recorded one is taken; default: the middle of the run.
-    N_D : manoeuvres that compensated models were trained on; default: the most that were recorded.
-
     Raises ShipidError for a run or an N_D that no window holds.
     """
     runs, counts = windows_of(content), window_sizes(content)
@@ -215,14 +197,6 @@ def find_window(
     return window, N_D or counts[-1]
 
 
-def _line_style(content: ReportContent, model: str, given: str) -> dict[str, Any]:
-    style, cell = close_styles(content).get(model), given == "cooperative"
-    source, keys = line_source(content, model, given)
-    ink = {"color": style.colour if style else NAIVE, "dash": SOURCE_DASHES[source]}
-    width = style.width if style and cell else 1.5
-    return {"name": name_of_line(content, model, source), "keys": keys, "line": {**ink, "width": width}}
-
-
 def _window_chips(content: ReportContent) -> list[Chip]:
     """Legend of the windows."""
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
@@ -230,52 +204,32 @@ def _window_chips(content: ReportContent) -> list[Chip]:
     return [*chips, *[Chip("band", "bands", MUTED, width=9)] * any(window.bands for window in content.snapshots)]
 
 
-def _half_pixel(windows: Sequence[WindowSnapshot]) -> float:
-    """Return half the length [m] of a pixel in a usual window, as wide as the ship or its path over the horizon."""
-    extents = [float(np.ptp(np.vstack([window.truth, window.outline]), axis=0).max()) for window in windows]
-    return float(np.median(extents)) / WINDOW_DETAIL if extents else 0.0
-
-
-def _thinned_columns(paths: Sequence[Floats], detail: float) -> list[list[list[float | None]]]:
-    """Columns x and y of paths (n, 2), of the points that differ by `detail` [m]; one that diverged keeps its gaps."""
-    kept = [np.asarray(path, dtype=float) for path in paths]
-    sound = [i for i, path in enumerate(kept) if detail > 0 and np.isfinite(path).all()]
-    for i, chosen in zip(sound, thin_lines([kept[i] for i in sound], detail), strict=True):
-        kept[i] = kept[i][chosen]
-    places = max(0, math.ceil(-math.log10(detail or 0.001)))
-    with np.errstate(over="ignore"):  # a path that diverged: its points are left out
-        columns = [np.round(path.T, places).tolist() for path in kept]
-    return [[[value if math.isfinite(value) else None for value in column] for column in pair] for pair in columns]
+def _rounded_columns(path: Floats, places: int) -> list[list[float | None]]:
+    """Columns x and y [m] of a path (n, 2), of some points where it has many; None where it diverged."""
+    some = np.asarray(path, dtype=float)[even_places(len(path), MOST_POINTS)]
+    with np.errstate(over="ignore"):
+        columns = np.round(some.T, places).tolist()
+    return [[value if math.isfinite(value) else None for value in column] for column in columns]
 
 
 def _end_error(window: WindowSnapshot, points: Floats) -> float:
     return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
 
 
-def _mean_end_error(windows: Sequence[WindowSnapshot], keys: set[PathKey]) -> float:
-    errors = [_end_error(w, points) for w in windows for key, points in w.paths.items() if key in keys]
-    return float(np.mean(errors)) if errors else float("nan")
-
-
 def _takeaway_windows(content: ReportContent, size: int) -> str:
     """Mean end errors over all windows, per source."""
     pure, drawn, windows = data_driven(content), close_up_models(content), content.snapshots
-    keys = {key for window in windows for key in window.paths if key[0] in drawn and key[2] in (0, size)}
-    called = {key: drawn_source(content, key[0], key[1]) if key[0] != pure else "pure" for key in keys}
     words = {"cooperative": "the compensated paths", "physics": "physics alone", "pure": in_words(pure or "")}
-    errors = []
-    for source, word in words.items():
-        mine = {key for key, name in called.items() if name == source and (source != "pure" or key[2] == size)}
-        value = _mean_end_error(windows, mine)
-        errors += [f"{word} by {metres_text(value)}"] * bool(np.isfinite(value))
+    ends: dict[str, list[float]] = {source: [] for source in words}
+    for window, (model, source, N_D) in [(shot, key) for shot in windows for key in shot.paths]:
+        if model in drawn and N_D in ([size] if model == pure else [0, size]):
+            error = _end_error(window, window.paths[model, source, N_D])
+            ends["pure" if model == pure else drawn_source(content, model, source)].append(error)
+    means = {source: float(np.mean(some)) for source, some in ends.items() if some}
+    errors = [f"{words[source]} by {metres_text(mean)}" for source, mean in means.items() if math.isfinite(mean)]
     where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
     text = f"In the {counted_text(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
     return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
-PREDICTIONS = Section(
-    "The predictions",
-    draw=lambda content: (browser_figure(content),),
-    needs=("snapshots",),
-    anchors=("browser",),
-)
+PREDICTIONS = Section("The predictions", {"browser": (browser_figure, "snapshots")})

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.ndimage import gaussian_filter
 
 from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -31,9 +32,10 @@ from shipid.report.figure import (
     make_plot,
     spread_places,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import (
     FEW_MODELS,
+    MOST_MODELS,
     accuracy_range,
     data_driven,
     errors_over_seeds,
@@ -52,13 +54,9 @@ HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
 NAME_HEIGHT = 13  # of a row [px]
 INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
-MOST_LEVELS = 5
 NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
 FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
-NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # digits that a level may have
-TICKS_OF_A = (1, 5, 10, 2, 20, 50, 100, 200, 500, 1000, 30, 15, 3, 7, 0.5)  # of A [m], the welcome ones first
-MOST_LETTERS_BESIDE = 12  # characters of a name beside a row
-MOST_LINES, FAR_APART = 12, 30.0  # models with physics that have a line; H by the least H that needs a logarithmic axis
+ROUND_DIGITS = (1, 2, 5)  # of the ticks of A
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
     "mean": ("H", "mean"),
     "90th percentile": ("H_90", "p90"),
@@ -84,35 +82,24 @@ def map_figure(content: ReportContent) -> PageFigure | None:
     if shown is None or nothing_learns(content):
         return None
     rows, cells = shown
-    lines, bounded = _isolines(shown, content.frame("intervals"))
-    many = [f"{FEWEST_RADII * width:.0f}" for width in NEIGHBOURS]
-    lined = f" Lines of equal error follow H [m], averaged over neighbouring models where there are {many[0]} or more, "
-    lined += f"and over neighbouring N_D where there are {many[1]} or more. No line is drawn beside a cell without a "
-    lined += "result."
-    if bounded:
-        lined += " Dotted: the same lines through the ends of the 95 % interval of H over test manoeuvres. Between the "
-        lined += "two dotted lines of a level the data do not say on which side of the level H lies; one that is "
-        lined += "missing lies beyond the cells."
+    hatched = f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
+    lined = " Lines of equal error follow H [m], averaged over neighbouring models where there are {:.0f} or more, and "
+    lined += "over neighbouring N_D where there are {:.0f} or more. No line is drawn beside a cell without a result."
     return PageFigure(
         id="map",
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
-        + (
-            f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
-            if cells.worse.any()
-            else ""
-        )
-        + (lined if lines else "")
+        + (hatched if cells.worse.any() else "")
+        + lined.format(*(FEWEST_RADII * width for width in NEIGHBOURS))
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
         alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
         "The numbers are in the table of cells.",
         height=HEIGHT,
-        draw=lambda: [draw_map(shown, lines)],
-        chips=([Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [])
-        + ([Chip("bounds", "ends of the 95 % interval", INK, "dot", 1.5)] if bounded else []),
+        draw=lambda: [draw_map(shown, [_isolines(shown)])],
+        chips=[Chip("iso", "lines of equal H", INK, width=1.5)],
         scale=ColourScale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
     )
 
@@ -141,20 +128,13 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
     cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
     cells = cells.merge(errors_over_seeds(content)[["model", "N_D", "H"]], how="left")
     learned = cells.N_D.map(cells[cells.model.eq(data_driven(content) or "")].set_index("N_D").H)
-    worse = cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned)
     groups = {key: mine.to_dict("records") for key, mine in content.cells.groupby(["model", "N_D"])}
-    words = [
-        _cell_words(groups[row.model, row.N_D], row, learned[row.Index] if worse[row.Index] else None)
-        for row in rows_as_tuples(cells)
-    ]
-    return CellMap(rows, cells.assign(worse=worse, words=words))
+    words = [_cell_words(groups[row.model, row.N_D], row) for row in rows_as_tuples(cells)]
+    return CellMap(rows, cells.assign(worse=cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned), words=words))
 
 
 def _rows_of_map(content: ReportContent) -> pd.DataFrame:
-    """The models of the cells as `CellMap.rows`.
-
-    Of several methods on the same physics, which have one place, the first: the one judged, where it is among them.
-    """
+    """The models of the cells as `CellMap.rows`; of several methods on the same physics the first."""
     frame = overview_models(content)
     frame = frame[~same_physics(frame)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
@@ -165,8 +145,8 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
     return frame.assign(y=np.sqrt(frame.A).where(frame.A.notna(), strips), short=short)
 
 
-def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float | None) -> str:
-    """Return the lines of the hover box of one model and N_D, of which there are some cells."""
+def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
+    """The lines of the hover box of one model and N_D, of which there are some cells."""
     good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
     accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
     lines = [f"<b>{escape_name(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
@@ -174,24 +154,18 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any, learned: float |
         first = cells[0]
         return "<br>".join([*lines, escape_name(f"{first['status']}: {first['sentence']}".rstrip(": "))])
     best, worst = good[0], good[-1]
-    lines.append(f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}")
-    if len(cells) > 1:
-        lines.append(f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}")
-    if len(good) < len(cells):
-        lines.append(f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result")
-    if learned is not None:
-        lines.append(f"no better than no physics, {metres_text(learned)}")
-    return "<br>".join([*lines, escape_name(best["hyperparameters"])] if best.get("hyperparameters") else lines)
+    spread = f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}"
+    lost = f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result"
+    lines += [f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}"]
+    lines += [spread] * (len(cells) > 1) + [lost] * (len(good) < len(cells))
+    return "<br>".join(filter(None, [*lines, escape_name(best.get("hyperparameters", ""))]))
 
 
 def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
     rows, cells = shown
     top, counts = float(rows.y.max()) * 1.04, np.unique(cells.N_D)
-    # Most of the way to the nearer neighbour, but no cell much wider than another.
-    gaps = np.diff(counts)
-    nearest = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
-    widths = dict(zip(counts.tolist(), 0.86 * np.minimum(nearest, 1.5 * gaps.min()), strict=True))
+    width = 0.86 * float(np.diff(counts).min())
     good, bad = cells[cells.H.notna()], cells[cells.H.isna()]
     span = float(good.H.min()), float(good.H.max())
     shades = [f"var(--heat-{colour_level(value, span)})" for value in good.H]
@@ -200,11 +174,11 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     hatched = {"marker": {"color": TRANSPARENT, "line": {"width": 1.2, "color": INK}, "pattern": lattice}}
     cross = {"symbol": "x-thin", "size": 8, "line": {"width": 2, "color": "var(--bad)"}}
     traces: list[Trace] = [
-        {**_cell_bars(good, widths), **box, "hovertemplate": "%{customdata}<extra></extra>"},
-        {**_cell_bars(good[good.worse], widths), **hatched, "hoverinfo": "skip"},
+        {**_cell_bars(good, width), **box, "hovertemplate": "%{customdata}<extra></extra>"},
+        {**_cell_bars(good[good.worse], width), **hatched, "hoverinfo": "skip"},
         make_line("no result", bad.N_D, bad.y, [], mode="markers", marker=cross, hover=list(bad.words)),
     ]
-    ends = [counts[0] - 0.75 * widths[counts[0]], counts[-1] + 0.75 * widths[counts[-1]]]
+    ends = [counts[0] - 0.75 * width, counts[-1] + 0.75 * width]
     x = make_axis("manoeuvres, N_D [1]", tickvals=counts.tolist(), range=ends, showgrid=False)
     y = make_axis("error of the physics alone, A [m]", range=[0, top], **_ticks_of_map(rows))
     edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
@@ -215,18 +189,14 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     return make_plot([*traces, *lines], x, y, barmode="overlay", **more)
 
 
-def _cell_bars(cells: pd.DataFrame, widths: dict[int, float]) -> Trace:
+def _cell_bars(cells: pd.DataFrame, width: float) -> Trace:
     """Bars around each cell."""
-    size = {"y": (cells.low + cells.high).round(4), "width": cells.N_D.map(widths)}
-    columns = {"x": cells.N_D, "base": (cells.y - cells.low).round(4), **size}
-    return {"type": "bar", **{name: values.tolist() for name, values in columns.items()}}
+    columns = {"x": cells.N_D, "y": (cells.low + cells.high).round(4), "base": (cells.y - cells.low).round(4)}
+    return {"type": "bar", "width": width, **{name: values.tolist() for name, values in columns.items()}}
 
 
 def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
-    """Names of the models with an A, right of their cells; of more than have room there, some at even distances.
-
-    A few always have their names, even where their cells cover each other.
-    """
+    """Names of the models with an A, right of their cells; of more than have room there, some at even distances."""
     known = rows[rows.A.notna()].reset_index(drop=True)
     room = 1 + int(np.ptp(known.y) / top * INSIDE / NAME_HEIGHT)
     some = even_places(len(known), max(room, FEW_MODELS))
@@ -236,7 +206,7 @@ def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
         {
             **place,
             "y": height,
-            "text": escape_name(shorten_name(name, MOST_LETTERS_BESIDE)),
+            "text": escape_name(shorten_name(name)),
             "font": {"size": 11, "color": INK},
         }
         for height, name in zip(heights, known.short[some], strict=True)
@@ -244,71 +214,45 @@ def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
 
 
 def _ticks_of_map(rows: pd.DataFrame) -> dict[str, list[Any]]:
-    """Ticks of A where the rows are, far enough apart to read; a row without A has its name there."""
+    """Round ticks of A, those near 0 left out: there is no room for them; a row without A has its name there."""
     largest, strips = float(rows.A.max()), rows[rows.A.isna()]
-    decade = math.floor(math.log10(max(largest, 1e-6)))
-    scale = decade - 1 if decade < 0 else max(decade - 3, 0)  # a model in a basin errs by centimetres
-    values = [0.0]
-    for tick in (float(f"{tick}e{scale}") for tick in TICKS_OF_A):
-        apart = all(abs(math.sqrt(tick) - math.sqrt(other)) > 0.06 * rows.y.max() for other in values)
-        values += [tick] * (tick <= largest and apart)
-    names = [escape_name(shorten_name(name, MOST_LETTERS_BESIDE)) for name in strips.short]
+    decades = range(math.floor(math.log10(max(largest, 1e-6))) - 1, math.ceil(math.log10(max(largest, 1e-6))) + 1)
+    ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
+    values = [0.0, *(tick for tick in ticks if largest / 40 <= tick <= largest)]
+    names = [escape_name(shorten_name(name)) for name in strips.short]
     return {"tickvals": [*np.sqrt(values), *strips.y], "ticktext": [*(f"{value:g}" for value in values), *names]}
 
 
-def _isolines(shown: CellMap, ends: pd.DataFrame) -> tuple[list[Trace], bool]:
-    """Lines of equal H through the models with physics, and whether there are those of the ends of its intervals.
-
-    ends : model, N_D, low, high [m]; may be empty.
-    """
-    physics, ends = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], ends.dropna()
-
-    def grid(frame: pd.DataFrame, column: str) -> Floats:
-        table = frame.pivot(index="model", columns="N_D", values=column)
-        return smooth_cells(
-            table.reindex(index=physics.model, columns=np.unique(shown.cells.N_D)).to_numpy(), NEIGHBOURS
-        )
-
-    mean = grid(shown.cells[shown.cells.model.isin(physics.model)], "H")
-    base = {"type": "contour", "x": np.unique(shown.cells.N_D).tolist(), "y": physics.y.tolist(), "hoverinfo": "skip"}
-    base |= {"showscale": False, "autocontour": False, "xaxis": "x2", "yaxis": "y2"}  # Plotly draws bars over contours
-    inks = {"rim": {"color": "var(--page)", "width": 4}, "iso": {"color": INK, "width": 1.5}}
-    inks |= {"low": {"color": INK, "width": 1.2, "dash": "dot"}, "high": {"color": INK, "width": 1.2, "dash": "dot"}}
-    heights = {"rim": mean, "iso": mean, **({side: grid(ends, side) for side in ("low", "high")} if len(ends) else {})}
-    traces = []
-    for (kind, z), level in [(item, level) for item in heights.items() for level in nice_levels(mean, MOST_LEVELS)]:
-        label = {"showlabels": kind == "iso", "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
-        lines = {"start": level, "end": level, "size": level, "coloring": "none", **label}
-        keys = ["bounds"] if kind in ends else ["iso"]
-        traces.append({**base, "z": z, "contours": lines, "line": {**inks[kind], "smoothing": 0}, "meta": keys})
-    return traces, len(ends) > 0 and len(traces) > 0
-
-
-def nice_levels(values: Floats, most: int) -> list[float]:
-    """At most `most` round levels inside the middle three fifths of the finite values."""
-    finite = values[np.isfinite(values) & (values > 0)]
-    if finite.size < 4:
-        return []
-    low, high = np.quantile(finite, [0.2, 0.8])
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    inside = [digit * 10.0**decade for decade in decades for digit in NICE if low < digit * 10.0**decade < high]
-    return [inside[i] for i in even_places(len(inside), most)] if inside else []
+def _isolines(shown: CellMap) -> Trace:
+    """Lines of equal H through the models with physics."""
+    physics, sizes = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], np.unique(shown.cells.N_D)
+    H = shown.cells.pivot(index="model", columns="N_D", values="H").reindex(index=physics.model, columns=sizes)
+    lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
+    base = {
+        "type": "contour",
+        "x": sizes.tolist(),
+        "y": physics.y.tolist(),
+        "z": smooth_cells(H.to_numpy(), NEIGHBOURS),
+    }
+    base |= {"ncontours": 5, "contours": lines, "line": {"color": INK, "width": 1.5, "smoothing": 0}, "meta": ["iso"]}
+    return base | {
+        "hoverinfo": "skip",
+        "showscale": False,
+        "xaxis": "x2",
+        "yaxis": "y2",
+    }  # Plotly draws bars over lines
 
 
 def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
     """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
 
-    Values that are not finite stay so and have no weight. A grid with fewer rows or columns than six radii is not
-    smoothed along them.
+    Values that are not finite stay so and have no weight. Rows or columns fewer than six radii are not smoothed along.
     """
     finite = np.isfinite(values) & (values > 0)
-    total, weight = np.where(finite, np.log(np.where(finite, values, 1.0)), 0.0), finite.astype(float)
-    for side, width in enumerate(radius):
-        count = values.shape[side]
-        if count >= FEWEST_RADII * width:
-            bell = np.exp(-((np.subtract.outer(np.arange(count), np.arange(count)) / width) ** 2) / 2)
-            total, weight = (np.moveaxis(np.tensordot(bell, part, (1, side)), 0, side) for part in (total, weight))
-    return np.where(finite, np.exp(total / np.where(weight > 0, weight, 1.0)), np.nan)
+    widths = [width if count >= FEWEST_RADII * width else 0 for count, width in zip(values.shape, radius, strict=True)]
+    logs = np.log(values, where=finite, out=np.zeros(values.shape))
+    total, weight = (gaussian_filter(part, widths, mode="constant") for part in (logs, finite.astype(float)))
+    return np.where(finite, np.exp(total / np.where(finite, weight, 1.0)), np.nan)
 
 
 def _not_on_map(content: ReportContent) -> str:
@@ -322,17 +266,16 @@ def _model_without_physics(rows: pd.DataFrame) -> str:
     return next(iter(rows.model[rows.family == DATA_DRIVEN]), NO_PHYSICS)
 
 
-def ends_of_map(cells: pd.DataFrame) -> tuple[str, str]:
-    """The least and the greatest H, each with its model and N_D."""
+def ends_of_map(cells: pd.DataFrame) -> str:
+    """The least and the greatest H, each with its model and N_D, as `least to greatest`."""
     ends = rows_as_tuples(cells.loc[[cells.H.idxmin(), cells.H.idxmax()]])
-    least, greatest = (f"{metres_text(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
-    return least, greatest
+    return " to ".join(f"{metres_text(row.H)} ({row.model}, N_D = {row.N_D})" for row in ends)
 
 
 def _takeaway_map(shown: CellMap) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
     good, rival = shown.cells[shown.cells.H.notna()], _model_without_physics(shown.rows)
-    text = "H runs from {} to {}".format(*ends_of_map(good))
+    text = f"H runs from {ends_of_map(good)}"
     pure = good.family.eq(DATA_DRIVEN)
     physics = good[~pure & good.N_D.isin(good.N_D[pure])]
     if physics.empty:
@@ -346,13 +289,13 @@ def _takeaway_map(shown: CellMap) -> str:
 
 def cells_without_result(content: ReportContent) -> str:
     """Sentence naming the cells that gave no result; empty if all did."""
-    names, by = [], ["model", "N_D"]
-    every = content.cells.groupby(by, sort=False).size().to_dict()
+    by, every = ["model", "N_D"], content.cells.groupby(["model", "N_D"]).size().to_dict()
     bad = content.cells[content.cells.status.ne("ok") | content.cells.H.isna()]
-    for (model, size), failed in bad.groupby(by, sort=False):
-        count = every[model, size]
-        share = f", {len(failed)} of {count} seeds" if len(failed) < count else ""
-        names.append(f"{model} at N_D = {size} ({failed.status.iloc[0]}{share})")
+    names = [
+        f"{key[0]} at N_D = {key[1]} ({failed.status.iloc[0]}"
+        + (f", {len(failed)} of {every[key]} seeds)" if len(failed) < every[key] else ")")
+        for key, failed in bad.groupby(by, sort=False)
+    ]
     return f" Not plotted: {join_few_names(names, 6)}; reasons in the table of cells." if names else ""
 
 
@@ -379,7 +322,6 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         alone = content.models.assign(N_D=0).rename(columns={"A": "H", "A_90": "H_90", "A_rms": "rms"})
         means = pd.concat([alone[["model", "N_D", "H", "H_90", "rms"]], means])
     looks, span, (order, drawn) = model_styles(content), accuracy_range(content), _models_with_line(content)
-    heights = means.H[means.model.isin(order) & means.H.gt(0)]
     accuracy = content.cells.groupby("model").A.first()
     words = {name: f"{name}, A {metres_text(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
     return PageFigure(
@@ -398,13 +340,11 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         + cells_without_result(content),
         alternative=f"Lines of the position error over N_D for {counted_text(len(order), 'model')}. "
         "The numbers are in the table of cells.",
-        height=460 if len(order) <= 10 else 560,
+        height=460,
         draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],
         controls=[
             Control("Position error", list(ERROR_STATISTICS)),
-            Control(
-                "Axis", ["linear", "logarithmic"], int(len(heights) > 0 and heights.max() > FAR_APART * heights.min())
-            ),
+            Control("Axis", ["linear", "logarithmic"]),
         ],
         chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT_MOTION, NAIVE, "dash")],
         scale=ColourScale("error of the physics alone, A [m]", *span) if span else None,
@@ -416,14 +356,13 @@ def _models_with_line(content: ReportContent) -> tuple[list[str], str]:
     frame = overview_models(content)
     pure = frame.family.eq(DATA_DRIVEN)
     physics = [str(name) for name in frame.model[~pure]]
-    kept = {*spread_items(physics, MOST_LINES), content.best, *frame.model[pure]}
+    kept = {*spread_items(physics, MOST_MODELS), content.best, *frame.model[pure]}
     order = [str(name) for name in frame.model if name in kept]
     few = len(order) - int(pure.sum())
-    if few == len(physics):
-        return order, ""
-    words = f" Of {len(physics)} models with physics, {few} have a line: some spread over A"
-    words += " and the best in validation" if content.best else ""
-    return order, f"{words}; the others are in the map and in the table of cells."
+    words = (
+        f" Of {len(physics)} models with physics, {few} spread over A have a line; the others are in the map and in "
+    )
+    return order, f"{words}the table of cells." if few < len(physics) else ""
 
 
 def _draw_sizes(
@@ -432,8 +371,7 @@ def _draw_sizes(
     """Lines over N_D; what has no physics first: it must not cover the others."""
     column, looks = ERROR_STATISTICS[statistic][0], model_styles(content)
     sizes = sorted({*content.cells.N_D, *means.N_D})
-    ended = content.cells[content.cells.status.eq("ok")]
-    traces = []
+    ended, traces = content.cells[content.cells.status.eq("ok")], []
     for name in (name for name in reversed(order) if means.model.eq(name).any()):
         look, keys, seeds = looks[name], [f"model:{name}"], ended[ended.model.eq(name)]
         marker = {"symbol": look.symbol, "size": 8, "color": look.colour}
@@ -468,8 +406,5 @@ def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
 
 
 WHAT_PHYSICS_AND_DATA_BUY = Section(
-    "What physics and data buy",
-    draw=lambda content: (map_figure(content), gain_figure(content)),
-    needs=("cells",),
-    anchors=("map", "gain"),
+    "What physics and data buy", {"map": (map_figure, "cells"), "gain": (gain_figure, "cells")}
 )

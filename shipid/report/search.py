@@ -24,18 +24,15 @@ from shipid.report.figure import (
     make_line,
     make_plot,
 )
-from shipid.report.section import Section
+from shipid.report.page import Section
 from shipid.report.selection import figure_sizes
-from shipid.report.tables import PageTable, TableColumn, frame_table
-from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, short_text
+from shipid.report.tables import PageTable, frame_table
+from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, scientific_text
 
-MOST_DOTS = 1200  # in one panel: more hide each other
-MOST_CHOSEN = 200
+MOST_DOTS = 1200  # of a kind in one panel: more hide each other
 MEDIAN_BINS = 9  # of the middle line
 WIDE_RANGE = 3.0  # largest / smallest value from which an axis is logarithmic
-MOST_DECADES = 4.0  # with a tick each: more have no room
-HIGHEST_RATIO = 4.0  # times the best of the cell: farther off is drawn here
-DIVERGED_RATIO = HIGHEST_RATIO * 1.25  # where diverged trials lie
+HIGHEST_RATIO, DIVERGED_RATIO = 4.0, 5.0  # times the best of the cell: farther off is drawn here, and what diverged
 HYPERPARAMETER_UNITS = {"delays": "s"}  # others have none
 # The kinds of memory that a trial may have, by number.
 MEMORY_WORDS = (
@@ -57,7 +54,7 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         return None
     counts = figure_sizes(frame.N_D) if frame.N_D.nunique() > 1 else []
     early = "triangles are those that a part of the windows judged, and that were not among the best; "
-    thinned = f"of many, at most {MOST_DOTS + MOST_CHOSEN:,} are drawn in a panel; "
+    thinned = f"of many, at most {MOST_DOTS:,} are drawn in a panel; "
     tried = sorted({int(kind) for kind in frame.memory.dropna()}) if "memory" in names else []
     memories = f" Memory: {', '.join(f'{kind} {MEMORY_WORDS[kind]}' for kind in tried)}." if tried else ""
     return PageFigure(
@@ -65,7 +62,7 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         title="Trials of the search",
         takeaway=_takeaway_search(frame, names),
         how="Each dot is a trial: the root of its validation error over the best of its cell; "
-        + (thinned if len(frame) > MOST_DOTS + MOST_CHOSEN else "")
+        + (thinned if len(frame) > MOST_DOTS else "")
         + (early if frame.state.eq("stopped").any() else "")
         + "diamonds are those whose networks the cell uses; those beyond "
         f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians. "
@@ -85,7 +82,10 @@ def search_figure(content: ReportContent) -> PageFigure | None:
             ),
             Chip("median", "median", INK),
         ],
-        captions=[_correlation_words(frame, name) for name in names],
+        captions=[
+            f"rank correlation {fixed_text(value, 2)}" if math.isfinite(value) else "no rank correlation"
+            for value in (trial_rank_correlation(frame, name) for name in names)
+        ],
     )
 
 
@@ -93,11 +93,6 @@ def searched_names(content: ReportContent) -> list[str]:
     """Names of the searched hyperparameters: further columns of the trials that take more than one value."""
     frame = content.trials
     return [str(name) for name in frame.columns if name not in TRIAL_COLUMNS and frame[name].nunique() > 1]
-
-
-def _hyperparameter_title(name: str) -> str:
-    """Name of a hyperparameter in words, with its unit; most have none."""
-    return f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
 
 
 def trial_rank_correlation(frame: pd.DataFrame, name: str) -> float:
@@ -119,14 +114,12 @@ def _with_ratio(trials: pd.DataFrame) -> pd.DataFrame:
 
 def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Panel:
     """One hyperparameter; its axis holds `every` value, so that it stays when N_D changes."""
-    chosen, traces = frame.chosen.astype(bool), []
-    others, best = frame[~chosen], frame[chosen]
-    others, best = others.iloc[even_places(len(others), MOST_DOTS)], best.iloc[even_places(len(best), MOST_CHOSEN)]
+    states, traces = frame.state.mask(frame.chosen.astype(bool), "chosen"), []
+    drawn = frame.iloc[even_places(len(frame), MOST_DOTS)]
     unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
     for state, (_, symbol, colour) in STATES_OF_TRIALS.items():
-        mine = best if state == "chosen" else others[others.state == state]
-        size, shade = (4, 0.45) if state == "complete" else (6, 0.7)
-        marker = {"symbol": symbol, "size": size, "color": colour, "opacity": shade}
+        mine = drawn[states[drawn.index] == state]
+        marker = {"symbol": symbol, "size": 4 if state == "complete" else 6, "color": colour, "opacity": 0.6}
         known = "" if state == "diverged" else ", %{y:.2f} times the best of its cell"
         hover = f"{state}: {escape_name(name.replace('_', ' '))} %{{x:.3g}}{unit}{known}"
         y = mine.ratio.fillna(DIVERGED_RATIO).where(mine.ratio.isna(), mine.ratio.clip(upper=HIGHEST_RATIO)).round(3)
@@ -135,12 +128,9 @@ def _draw_trials(frame: pd.DataFrame, name: str, every: pd.Series[float]) -> Pan
     ink = {"color": INK, "width": 2.5}
     traces.insert(3, make_line("median", middle[:, 0], middle[:, 1], ["median"], "times the best", line=ink))
     ticks = {1: "1", 1.5: "1.5", 2: "2", 3: "3", HIGHEST_RATIO: f"≥{HIGHEST_RATIO:g}", DIVERGED_RATIO: "div."}
-    y_axis: dict[str, Any] = {
-        "range": [-0.02, math.log10(DIVERGED_RATIO) + 0.04],
-        "tickvals": list(ticks),
-        "ticktext": list(ticks.values()),
-    }
-    return make_plot(traces, _axis_of_values(name, every), log_axis("error / best of cell [1]", **y_axis))
+    span = [-0.02, math.log10(DIVERGED_RATIO) + 0.04]
+    up = log_axis("error / best of cell [1]", tickvals=list(ticks), ticktext=list(ticks.values()), range=span)
+    return make_plot(traces, _axis_of_values(name, every), up)
 
 
 def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
@@ -156,26 +146,14 @@ def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
 
 def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     """Axis of a hyperparameter: yes and no, logarithmic where its values are factors apart, or linear."""
-    low, high, title = float(every.min()), float(every.max()), escape_name(_hyperparameter_title(name))
     if _yes_or_no(every):
-        return make_axis(
-            escape_name(name.replace("_", " ")), range=[-0.3, 1.3], tickvals=[0, 1], ticktext=["no", "yes"]
-        )
-    if low > 0 and high / low > WIDE_RANGE:
-        first, last = math.log10(low), math.log10(high)
-        room, steps = 0.04 * (last - first), (1,) if last - first > 1.5 else (1, 2, 3, 5)
-        x = log_axis(title, steps, range=[first - room, last + room])
-        each = max(1, math.ceil((last - first) / MOST_DECADES))
-        return x | {key: x[key][::each] for key in ("tickvals", "ticktext")}
-    room, counts = 0.04 * (high - low), sorted(set(every.dropna()))
-    whole = len(counts) <= 6 and all(count == round(count) for count in counts)
-    ticks = {"tickvals": counts} if whole else {"nticks": 6}
-    return make_axis(title, range=[low - room, high + room], **ticks)
-
-
-def _correlation_words(frame: pd.DataFrame, name: str) -> str:
-    correlation = trial_rank_correlation(frame, name)
-    return f"rank correlation {fixed_text(correlation, 2)}" if math.isfinite(correlation) else "no rank correlation"
+        return make_axis(escape_name(name.replace("_", " ")), tickvals=[0, 1], ticktext=["no", "yes"])
+    ends = np.array([every.min(), every.max()], dtype=float)
+    axis = log_axis if ends[0] > 0 and ends[1] / ends[0] > WIDE_RANGE else make_axis
+    low, high = np.log10(ends) if axis is log_axis else ends
+    room = 0.04 * (high - low)
+    title = f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
+    return axis(escape_name(title), range=[low - room, high + room], nticks=3)
 
 
 def _yes_or_no(values: pd.Series[float]) -> bool:
@@ -183,7 +161,7 @@ def _yes_or_no(values: pd.Series[float]) -> bool:
 
 
 def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
-    """Return the median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
+    """The median ratio of a trial to the best of its cell, and the hyperparameter most correlated with it."""
     if frame.ratio.isna().all():
         return f"None of {counted_text(len(frame), 'trial')} ended with a value."
     text = (
@@ -203,36 +181,30 @@ def search_table(content: ReportContent) -> PageTable:
     frame, names = content.trials, searched_names(content)
     states = pd.crosstab(frame.N_D, frame.state).reindex(columns=["stopped", "diverged"], fill_value=0)
     groups = frame.groupby("N_D", sort=True)
-    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), seconds=groups.seconds.sum())
-    shown = shown.assign(epochs=groups.epochs.sum()) if frame.epochs.any() else shown
+    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), epochs=groups.epochs.sum())
     columns = {
-        "N_D [1]": TableColumn("N_D", 0),
-        "cells [1]": TableColumn("cells", 0),
-        "trials [1]": TableColumn("trials", 0),
-        "stopped [1]": TableColumn("stopped", 0),
-        "diverged [1]": TableColumn("diverged", 0),
-        "epochs [1]": TableColumn("epochs", 0),
-        "time [s]": TableColumn("seconds", 1),
-        "time per cell [s]": TableColumn("each", 1),
+        "N_D [1]": "N_D",
+        "cells [1]": "cells",
+        "trials [1]": "trials",
+        "stopped [1]": "stopped",
+        "diverged [1]": "diverged",
+        "epochs [1]": "epochs",
+        "time [s]": "seconds",
+        "time per cell [s]": "each",
     }
     tried = []
     for name in names:
         unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        span = f"{short_text(frame[name].min())} to {short_text(frame[name].max())}{unit}"
+        span = f"{scientific_text(frame[name].min(), 2)} to {scientific_text(frame[name].max(), 2)}{unit}"
         tried.append(f"{name.replace('_', ' ')} {'yes or no' if _yes_or_no(frame[name]) else span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
-    takeaway = f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: "
-    takeaway += (
-        f"{stopped} stopped early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
+    takeaway = (
+        f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: {stopped} stopped "
     )
+    takeaway += f"early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
     takeaway += f" Tried: {', '.join(tried)}." if tried else ""
-    shown = shown.assign(each=shown.seconds / shown.cells).reset_index()
+    shown = shown.assign(seconds=groups.seconds.sum(), each=groups.seconds.sum() / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
 
 
-THE_SEARCH = Section(
-    "The search",
-    draw=lambda content: (search_figure(content), search_table(content)),
-    needs=("trials",),
-    anchors=("search", "search-table"),
-)
+THE_SEARCH = Section("The search", {"search": (search_figure, "trials"), "search-table": (search_table, "trials")})

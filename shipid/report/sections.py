@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 from shipid.report import bands, cells, errors_over, factors, logs, methods, paths, physics_and_data, search
-from shipid.report.section import Section
+from shipid.report.content import ReportContent
+from shipid.report.page import Section, render_page, write_whole
 
 SECTIONS: dict[str, Section] = {
     "results": physics_and_data.WHAT_PHYSICS_AND_DATA_BUY,
@@ -16,3 +20,9 @@ SECTIONS: dict[str, Section] = {
     "the-search": search.THE_SEARCH,
     "all-cells": cells.THE_CELLS,
 }
+
+
+def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
+    """Write the page of a study as one HTML file that makes no request; returns the file, or raises ResultError."""
+    windows = paths.window_data(content) if content.snapshots else None
+    return write_whole(render_page("study", SECTIONS, content, windows, say), file)

@@ -9,24 +9,13 @@ from functools import lru_cache
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, Indices, ReportContent, rows_as_tuples
-from shipid.report.figure import INK, MARKERS, MUTED, OKABE_ITO, Chip, category_colour, colour_level
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, ReportContent, rows_as_tuples
+from shipid.report.figure import INK, MARKERS, MUTED, OKABE_ITO, Chip, category_colour, colour_level, even_places
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
 FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
 SOURCE_DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
-# Of the second, third, ... model without physics: all are ink.
-FURTHER_MARKERS = (
-    "cross",
-    "circle-open",
-    "square-open",
-    "diamond-open",
-    "triangle-up-open",
-    "star",
-    "square",
-    "diamond",
-)
 
 
 @dataclass(frozen=True)
@@ -40,17 +29,12 @@ class Style:
 
 def spread_items(items: Sequence[str], count: int) -> list[str]:
     """At most `count` items at even distances, first and last included."""
-    if len(items) <= count:
-        return list(items)
-    return [items[i] for i in np.linspace(0, len(items) - 1, count).round().astype(int)]
+    return [items[i] for i in even_places(len(items), count)]
 
 
 @lru_cache(maxsize=4)  # every figure asks for it
 def models_by_accuracy(content: ReportContent) -> pd.DataFrame:
-    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, those without last.
-
-    The frame is cached and shared: do not change it.
-    """
+    """One row per model: model, family, A [m] (NaN without physics); physics by rising A, those without last."""
     known = content.models[["model", "family", "A"]]
     trained = content.cells[["model", "family", "A"]]
     joined = pd.concat([known, trained]).astype({"model": str, "family": str, "A": float})
@@ -117,10 +101,7 @@ def words_on_left_out(content: ReportContent) -> str:
 
 @lru_cache(maxsize=4)
 def close_up_models(content: ReportContent) -> list[str]:
-    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation.
-
-    The list is shared by all who ask: not to be changed.
-    """
+    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation."""
     names = [str(name) for name in models_by_accuracy(content).model]
     middle = {*middle_models(content).values(), content.best}
     return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
@@ -151,10 +132,7 @@ def model_styles(content: ReportContent) -> Mapping[str, Style]:
 
 @lru_cache(maxsize=4)
 def close_styles(content: ReportContent) -> Mapping[str, Style]:
-    """Style of the models of a close-up: a colour and a marker each, whatever their A; no physics in ink.
-
-    When all colours are used, they come again with other markers: 36 models are told apart.
-    """
+    """Style of the models of a close-up: a colour and a marker each (36 are told apart); no physics in ink."""
     of_family = dict(zip(*models_by_accuracy(content)[["model", "family"]].to_numpy().T, strict=True))
     physics = [name for name in close_up_models(content) if of_family[name] != DATA_DRIVEN]
     result = _styles_without_physics([name for name in close_up_models(content) if name not in physics])
@@ -166,8 +144,8 @@ def close_styles(content: ReportContent) -> Mapping[str, Style]:
 
 def _styles_without_physics(names: Sequence[str]) -> dict[str, Style]:
     """Ink: thick for the first model without physics, thin and with other markers for others."""
-    looks = [Style(INK, "x", 3.0), *(Style(INK, symbol, 1.5) for symbol in FURTHER_MARKERS)]
-    return {name: looks[min(i, 1 + (i - 1) % len(FURTHER_MARKERS))] for i, name in enumerate(names)}
+    thin = [Style(INK, f"{symbol}-open", 1.5) for symbol in MARKERS]
+    return {name: thin[i % len(thin)] if i else Style(INK, "x", 3.0) for i, name in enumerate(names)}
 
 
 def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping[str, str] | None = None) -> list[Chip]:
@@ -182,7 +160,7 @@ def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping
 def figure_sizes(values: pd.Series[int], count: int = 3) -> list[int]:
     """Small, middle and large N_D among those present; physics alone (N_D = 0) counts only if there is nothing else."""
     present = sorted({int(value) for value in values if value > 0}) or [0]
-    return [int(size) for size in spread_items([str(size) for size in present], count)]
+    return [present[i] for i in even_places(len(present), count)]
 
 
 def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.DataFrame:
@@ -195,32 +173,3 @@ def errors_over_seeds(content: ReportContent) -> pd.DataFrame:
     good = content.cells[content.cells.status.eq("ok") & content.cells.H.notna()]
     means = over_seeds(good, ["model", "N_D"], ["H", "H_90", "rms"])
     return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
-
-
-def thin_lines(lines: Sequence[Floats], tolerance: float) -> list[Indices]:
-    """Find the points of each line, by index, that differ visibly on a screen (Ramer 1972; Douglas and Peucker 1973).
-
-    Parameters
-    ----------
-    lines : points (n, 2) of each, in the same unit as tolerance; at least one point a line.
-    tolerance : largest distance of a dropped point from the line that is kept.
-    """
-    if not lines:
-        return []
-    points, ends = np.concatenate(lines), np.cumsum([len(line) for line in lines])
-    keep = np.zeros(len(points), dtype=bool)
-    keep[ends - 1] = keep[np.concatenate([[0], ends[:-1]])] = True
-    while True:  # all pieces between points that are kept at once; from one line to the next there is nothing between
-        kept = np.flatnonzero(keep)
-        piece = np.cumsum(keep) - 1
-        along = np.diff(points[kept], axis=0, append=points[-1:])
-        from_start, mine = points - points[kept[piece]], along[piece]
-        # Distance from the segment, not from its line: a track may come back to where it began.
-        share = (from_start * mine).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12)[piece]
-        apart = from_start - np.clip(share, 0.0, 1.0)[:, None] * mine
-        away = np.sqrt(np.square(apart).sum(axis=1))
-        worst = np.maximum.reduceat(away, kept)[piece]
-        far = np.flatnonzero((away == worst) & (worst > tolerance))
-        if not len(far):
-            return [np.flatnonzero(one) for one in np.split(keep, ends[:-1])]
-        keep[far[np.unique(piece[far], return_index=True)[1]]] = True  # of equal distances the first

@@ -12,30 +12,20 @@ import pandas as pd
 
 from shipid.report.content import AnswerSentence, PageContent, rows_as_tuples
 from shipid.report.motion import DEGREES
-from shipid.report.page import write_page
-from shipid.report.section import Section
-from shipid.report.tables import (
-    PageTable,
-    TableCell,
-    TableColumn,
-    decimals_for_median,
-    frame_table,
-    number_cell,
-    with_cells,
-    word_cell,
-)
-from shipid.report.wording import fixed_text, join_few_names
+from shipid.report.page import Section, write_page
+from shipid.report.tables import PageTable, TableCell, frame_table, range_cell, with_cells, word_cell
+from shipid.report.wording import fixed_text
 from shipid.units import digit_decimals
 
 GROUP_ERRORS = {
-    "group": TableColumn("group"),
-    "turning to": TableColumn("side"),
-    "rows": TableColumn("rows", 0),
-    "u [m/s]": TableColumn("u", 3),
-    "v [m/s]": TableColumn("v", 3),
-    "r [deg/s]": TableColumn("r", 3),
-    "turning [%]": TableColumn("turning", 1),
-    "standard error": TableColumn("error", 1),
+    "group": "group",
+    "turning to": "side",
+    "rows": "rows",
+    "u [m/s]": "u",
+    "v [m/s]": "v",
+    "r [deg/s]": "r",
+    "turning [%]": "turning",
+    "standard error": "error",
 }
 
 
@@ -58,30 +48,25 @@ class StructuresContent(PageContent):
     def answer(self) -> list[AnswerSentence]:
         """The structure chosen, and the sentences on it."""
         words = [f"{sentence[0].upper()}{sentence[1:]}." for sentence in self.sentences]
-        return [AnswerSentence(text, "structures" if i == 0 else "") for i, text in enumerate(words)]
+        return [AnswerSentence(text, "" if i else "structures") for i, text in enumerate(words)]
 
 
 def structures_table(content: StructuresContent) -> PageTable:
     """Mean errors on runs that the fit has not seen, best first, with paired intervals."""
-    frame, places = content.table, decimals_for_median(content.table[["position", "test"]])
-    between = [
-        TableCell(f"{fixed_text(row.low, places)} … {fixed_text(row.high, places)}", row.low)
-        if np.isfinite(row.low + row.high)
-        else number_cell(None, 0)
-        for row in rows_as_tuples(frame)
-    ]
+    frame = content.table
+    between = [range_cell(row.low, row.high) for row in rows_as_tuples(frame)]
     columns = {
-        "structure": TableColumn("structure"),
-        "numbers": TableColumn("numbers", 0),
-        "u [m/s]": TableColumn("u", 3),
-        "v [m/s]": TableColumn("v", 3),
-        "r [deg/s]": TableColumn("r", 3),
-        "position [m]": TableColumn("position", places),
-        "above the least [m]": TableColumn("more", places),
-        "95 % interval [m]": TableColumn("between", numeric=True),
-        "test runs [m]": TableColumn("test", places),
-        "not worse": TableColumn("equal"),
-        "why missing": TableColumn("note"),
+        "structure": "structure",
+        "numbers": "numbers",
+        "u [m/s]": "u",
+        "v [m/s]": "v",
+        "r [deg/s]": "r",
+        "position [m]": "position",
+        "above the least [m]": "more",
+        "95 % interval [m]": "between",
+        "test runs [m]": "test",
+        "not worse": "equal",
+        "why missing": "note",
     }
     equal = frame["equal"].map({True: "yes", False: "no"})
     shown = with_cells(frame.assign(r=DEGREES * frame["r"], equal=equal), between=between)
@@ -94,14 +79,10 @@ def structures_table(content: StructuresContent) -> PageTable:
 def runs_table(content: StructuresContent) -> PageTable:
     """Error of the position, run by run."""
     known = content.errors[content.errors["run"] != "all"]
-    names, places = _structures_in(content, known), decimals_for_median(content.errors["position"])
     wide = known.pivot(index=["set", "run"], columns="structure", values="position").reset_index()
-    order = known[["set", "run"]].drop_duplicates()
-    shown = order.merge(wide, how="left")
+    shown = known[["set", "run"]].drop_duplicates().merge(wide, how="left")
     shown = shown.assign(set=np.where(shown["set"].eq("test"), "test", "held out"))
-    columns = {"run": TableColumn("run"), "set": TableColumn("set")} | {
-        f"{name} [m]": TableColumn(name, places) for name in names
-    }
+    columns = {"run": "run", "set": "set"} | {f"{name} [m]": name for name in _structures_in(content, known)}
     return frame_table("runs", "Position, run by run", "Root mean square errors.", shown, columns)
 
 
@@ -119,19 +100,11 @@ def structure_manoeuvres(content: StructuresContent) -> PageTable:
     shown = known.drop_duplicates(place)[[*place, "unit"]].merge(by_structure, how="left")
     shown = shown.merge(content.spread[[*place, "spread", "width"]], how="left")
     takeaway = "" if content.level is None else f"With {100 * content.level:g} % intervals. "
-    takeaway += "Between: range over the structures not shown to be worse; "
-    takeaway += "within: the widest interval of one of them."
-    cautions = {
-        why: [name for name, own in content.cautions.items() if own == why] for why in content.cautions.values()
-    }
-    words = [f"{join_few_names(which, len(which))}: {why}" for why, which in cautions.items() if why]
+    takeaway += "Between: range over the structures not shown to be worse; within: the widest interval of one of them."
+    words = [f"{name}: {why}" for name, why in content.cautions.items() if why]
     takeaway += f" Intervals may be too narrow. {'; '.join(words)}." if words else ""
-    columns = {name: TableColumn(name) for name in place} | {name: TableColumn(name, numeric=True) for name in names}
-    columns |= {
-        "between structures": TableColumn("spread", 3),
-        "within one": TableColumn("width", 3),
-        "unit": TableColumn("unit"),
-    }
+    columns = {name: name for name in (*place, *names)}
+    columns |= {"between structures": "spread", "within one": "width", "unit": "unit"}
     return frame_table("manoeuvres", "Standard manoeuvres in calm deep water", takeaway, shown, columns)
 
 
@@ -145,10 +118,13 @@ def _measure_cell(row: Mapping[Any, Any]) -> TableCell:
     return TableCell(fixed_text(value, places) + ends, value)
 
 
-def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable | None:
-    """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`; None without rows."""
-    if frame.empty:
-        return None
+def structure_sides(content: StructuresContent) -> PageTable:
+    """Errors of the structure chosen by side, helm and speed."""
+    return group_errors(content.groups, f"{content.chosen}, on runs that the fit has not seen.")
+
+
+def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable:
+    """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`."""
     shown = frame.assign(r=DEGREES * frame["r"], turning=100 * frame["turning"], error=100 * frame["error"])
     takeaway += " Turning: predicted change of heading over the measured one, less 1."
     return frame_table("sides", "Errors by side, helm and speed", takeaway, shown, GROUP_ERRORS)
@@ -156,22 +132,11 @@ def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable | None:
 
 STRUCTURES_PAGE = {
     "structures": Section(
-        "Which structure",
-        lambda content: (structures_table(content), runs_table(content)),
-        needs=("table", "errors"),
-        anchors=("structures", "runs"),
+        "Which structure", {"structures": (structures_table, "table"), "runs": (runs_table, "errors")}
     ),
     "manoeuvres": Section(
-        "What each says of standard manoeuvres",
-        lambda content: (structure_manoeuvres(content),),
-        needs=("manoeuvres",),
-        anchors=("manoeuvres",),
+        "What each says of standard manoeuvres", {"manoeuvres": (structure_manoeuvres, "manoeuvres")}
     ),
-    "sides": Section(
-        "Where it is wrong",
-        lambda content: (group_errors(content.groups, f"{content.chosen}, on runs that the fit has not seen."),),
-        needs=("groups",),
-        anchors=("sides",),
-    ),
+    "sides": Section("Where it is wrong", {"sides": (structure_sides, "groups")}),
 }
 write_structures = partial(write_page, "structures", STRUCTURES_PAGE)

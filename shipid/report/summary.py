@@ -29,7 +29,8 @@ def summary_text(content: ReportContent) -> str:
         f"## {CONSTANT_MOTION.capitalize()}",
         f"Mean error {mean}, 90th percentile {p90}, root mean square {rms}.",
     ]
-    for table in filter(None, (error_by_kind(content), models_table(content), cells_table(content))):
+    by_kind = [error_by_kind(content)] if len(content.frame("kinds")) else []
+    for table in (*by_kind, models_table(content), cells_table(content)):
         rows = [[cell.text for cell in row] for row in table.rows]
         parts += [f"## {table.title}", _one_line(table.takeaway), _markdown_table(table.columns, rows)]
     parts += ["## Provenance", _markdown_table(["", ""], content.provenance.items())]

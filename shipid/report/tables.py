@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from markupsafe import Markup, escape
 
-from shipid.report.wording import fixed_text
+from shipid.report.wording import ends_text, fixed_text, scientific_text
 
 LONG_TEXT = 30  # characters that a column shows of a text
 MISSING = 1e300  # sorts after every number (page.js knows it)
@@ -38,54 +38,26 @@ class PageTable:
     rows: Sequence[Sequence[TableCell]]
 
 
-@dataclass(frozen=True)
-class TableColumn:
-    """A column of a table.
+def frame_table(id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, str]) -> PageTable:
+    """Make a table of a frame of values, or of cells as they are.
 
-    Parameters
-    ----------
-    source : column of the frame.
-    decimals : of its numbers; "length" for what leaves two digits to the median length [m], two decimals at least;
-        "digits" for three digits of the median, three decimals at most; None for words.
-    numeric : whether cells are set flush right; default: if there are decimals.
+    Lengths, whose heading ends with [m], have as many decimals as leave two digits to their median, two at least; whole
+    numbers none; others three digits of their median, three decimals at most.
+
+    columns : heading -> column of the frame; one that it lacks is left out.
     """
-
-    source: str
-    decimals: int | str | None = None
-    numeric: bool | None = None
-
-
-def frame_table(
-    id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, TableColumn], *, like: str = ""
-) -> PageTable:
-    """Make a table of a frame.
-
-    Parameters
-    ----------
-    frame : values, or cells as they are.
-    columns : heading -> column; one that the frame lacks is left out.
-    like : column whose lengths give the decimals of all columns of lengths, if not each its own.
-    """
-    known = {heading: column for heading, column in columns.items() if column.source in frame}
-    places = {column.source: _decimals_of_column(frame, column, like) for column in known.values()}
-    rows = [
-        [_cell_of_value(record[column.source], places[column.source]) for column in known.values()]
-        for record in frame.to_dict("records")
-    ]
-    numeric = [column.decimals is not None if column.numeric is None else column.numeric for column in known.values()]
-    return PageTable(id, title, takeaway, list(known), numeric, rows)
+    known = {heading: source for heading, source in columns.items() if source in frame}
+    cells = [_column_cells(frame[source], heading.endswith("[m]")) for heading, source in known.items()]
+    numeric = [any(isinstance(cell.key, float | int) for cell in column) for column in cells]
+    return PageTable(id, title, takeaway, list(known), numeric, list(zip(*cells, strict=True)))
 
 
-def _decimals_of_column(frame: pd.DataFrame, column: TableColumn, like: str) -> int | None:
-    if column.decimals == "length":
-        return decimals_for_median(frame[like or column.source], 2, 2, 6)
-    return decimals_for_median(frame[column.source]) if isinstance(column.decimals, str) else column.decimals
-
-
-def _cell_of_value(value: Any, places: int | None) -> TableCell:
-    if isinstance(value, TableCell):
-        return value
-    return word_cell(value) if places is None else number_cell(value, places)
+def _column_cells(values: pd.Series[Any], lengths: bool) -> list[TableCell]:
+    if values.dtype == object or values.dtype == bool or not pd.api.types.is_numeric_dtype(values):
+        return [value if isinstance(value, TableCell) else word_cell(value) for value in values]
+    places = decimals_for_median(values, 2, 2, 6) if lengths else decimals_for_median(values)
+    places = 0 if not lengths and values.dropna().mod(1).eq(0).all() else places
+    return [number_cell(value, places) for value in values]
 
 
 def with_cells(frame: pd.DataFrame, **cells: Sequence[TableCell]) -> pd.DataFrame:
@@ -96,7 +68,7 @@ def with_cells(frame: pd.DataFrame, **cells: Sequence[TableCell]) -> pd.DataFram
 def cell_html(cell: TableCell, numeric: bool, first: bool) -> Markup:
     """Write a cell as an element of HTML; its key is left out where page.js reads the same from the text.
 
-    Of a long text the begin is shown. A long name is shown whole: names of models often differ at the end alone.
+    Of a long text the begin is shown, a long name whole: names of models often differ at the end alone.
     """
     long = len(cell.text) > LONG_TEXT
     name = long and (" + " in cell.text or max(map(len, cell.text.split()), default=0) > LONG_TEXT)
@@ -119,6 +91,21 @@ def number_cell(value: object, decimals: int) -> TableCell:
     """Make a cell with a number of fixed decimals, so that points align; NaN is a dash and sorts last."""
     amount = math.nan if value is None or value is pd.NA else float(str(value))
     return TableCell(fixed_text(amount, decimals), amount) if math.isfinite(amount) else TableCell("–", MISSING)
+
+
+def digits_cell(value: float, digits: int = 4) -> TableCell:
+    """Make a cell with a number of so many digits; a dash that sorts last where it is not finite."""
+    return TableCell(scientific_text(value, digits), float(value)) if math.isfinite(value) else TableCell("–", MISSING)
+
+
+def note_cells(notes: Iterable[str]) -> list[TableCell]:
+    """Make cells of notes on what is missing, empty for none."""
+    return [word_cell(note, bad=bool(note)) for note in notes]
+
+
+def range_cell(low: float, high: float) -> TableCell:
+    """Make a cell of two lengths [m], sorted by the lower; a dash where one is not finite."""
+    return TableCell(ends_text(low, high), low) if math.isfinite(high - low) else TableCell("–", MISSING)
 
 
 def decimals_for_median(values: pd.DataFrame | pd.Series[Any], digits: int = 3, least: int = 0, most: int = 3) -> int:

@@ -31,19 +31,6 @@ def fixed_text(value: float, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
-def short_text(value: float) -> str:
-    """Two digits, never with an exponent between 1e-6 and 1e6: 13, 0.51, 0.00001."""
-    if not math.isfinite(value) or value == 0:
-        return "0" if value == 0 else "–"
-    size = math.floor(math.log10(abs(value)))
-    if not -6 <= size < 6:
-        return f"{value:.1e}".replace("-", "−")
-    rounded = round(value, 1 - size)
-    return (f"{rounded:.{max(0, 1 - size)}f}".rstrip("0").rstrip(".") if size < 1 else f"{rounded:.0f}").replace(
-        "-", "−"
-    )
-
-
 def scientific_text(value: float, digits: int = 4) -> str:
     """So many digits, with a power of ten where the number is very large or small: 803, 1.175 × 10⁵, 10⁻⁶."""
     text = f"{value:.{digits}g}".replace("-", "−")
@@ -52,7 +39,7 @@ def scientific_text(value: float, digits: int = 4) -> str:
     return f"{'' if front == '1' else f'{front} × '}10{raised.translate(RAISED)}" if raised else text
 
 
-def shorten_name(name: str, most: int) -> str:
+def shorten_name(name: str, most: int = 12) -> str:
     """Name of at most so many characters, its middle left out: names that differ mostly do so at an end."""
     return name if len(name) <= most else f"{name[: most // 2 - 1]}…{name[most // 2 - most :]}"
 
@@ -89,16 +76,11 @@ def join_few_names(names: Sequence[str], limit: int = 4) -> str:
 
 def set_sentence(text: str) -> str:
     """Write a sentence as a page sets it: signs, powers of ten, a space before %, none that breaks before a unit."""
-    text = re.sub(
-        r"(?<![\w.])(\d+(?:\.\d+)?)e([+-]\d+)(?!\w)", _raised_power, text.replace("+-", "±").replace("->", "→")
-    )
+    plain = text.replace("+-", "±").replace("->", "→")
+    text = re.sub(r"(?<![\w.])(\d+(?:\.\d+)?e[+-]\d+)(?!\w)", lambda match: scientific_text(float(match[1])), plain)
     text = re.sub(r"`([^`]+)`", r"“\1”", text)
     text = re.sub(r"(?<=\d)%", " %", re.sub(r"(?<![^\s\[(])-(?=\d)", "−", text))
     return re.sub(r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:m|km|s|min|deg|rpm)\b|%)|(?<=\w) (?== \S)|(?<==) (?=\d)", "\u00a0", text)
-
-
-def _raised_power(match: re.Match[str]) -> str:
-    return f"{match[1]} × 10{str(int(match[2])).translate(RAISED)}"
 
 
 def counted_text(count: int, noun: str) -> str:

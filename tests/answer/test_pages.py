@@ -14,8 +14,8 @@ from shipid.answer import pages
 from shipid.answer.pages import report_content, write_pages
 from shipid.report import errors_over
 from shipid.report.figure import PageFigure
+from shipid.report.page import draw_sections
 from shipid.report.paths import window_data
-from shipid.report.section import draw_sections
 from shipid.report.sections import SECTIONS
 from shipid.study import seals
 from shipid.study.plan import build_plan

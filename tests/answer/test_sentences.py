@@ -12,7 +12,7 @@ import pytest
 
 from shipid.answer.sentences import _bounds, answer_sentences, best_model, errors_by_model
 from shipid.answer.worth import Estimate
-from shipid.report.section import declared_anchors
+from shipid.report.page import declared_anchors
 from shipid.report.sections import SECTIONS
 from shipid.study.results import Results
 from tests.answer.byhand import grid

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from shipid.cli import app
 from shipid.data.dataset import Dataset, write_dataset
 from shipid.errors import ShipidError
-from shipid.report import replay
+from shipid.report import motion as replay
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.vessel.load import load_vessel

@@ -59,8 +59,3 @@ def test_sets_are_as_small_as_they_can_be() -> None:
     three = next(entry for entry in sets if len(entry.paths) == 3)
     weights = np.array(three.weights) / three.weights[2]
     np.testing.assert_allclose(weights, [-1, -0.5, 1], atol=1e-3)
-
-
-def test_a_pair_is_named_in_one_sentence() -> None:
-    (pair,) = collinear_sets(correlated(0.9999) * [1.0, 2.0], ["hull.Y_v", "hull.Y_ur"])
-    assert pair.sentence() == "only Y_v and Y_ur together; +10 % of Y_v with -5 % of Y_ur has no effect on these data"

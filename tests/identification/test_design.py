@@ -5,10 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
 from shipid.identification.design import (
     InformedCandidate,
@@ -17,7 +15,6 @@ from shipid.identification.design import (
     information_of_candidates,
     information_where_possible,
     rank_candidates,
-    recorded_limits,
     within_limits,
 )
 from shipid.simulation.manoeuvre import (
@@ -30,7 +27,6 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.vessel.load import load_vessel
-from shipid.vessel.template import Particulars, first_guess
 
 SHIP = load_vessel("gunnerus-28.9")
 WEIGHTS = {"u": 0.1, "v": 0.1, "r": 0.0035}
@@ -137,14 +133,3 @@ def test_mistakes_are_reported() -> None:
         information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
     with pytest.raises(ShipidError, match="within the limits"):
         information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
-
-
-def test_recorded_limits_are_those_of_the_shafts_that_drive_the_ship() -> None:
-    """A tunnel thruster at 600 rpm allowed 600 rpm to the main shaft."""
-    ship = first_guess(Particulars(100.0, 16.0, 6.0, 0.7, 7.0, tunnel_thruster=True), "b", "b.toml").vessel
-    rows = {"run": ["a", "a", "b"], "propeller.n": [1.0, 2.0, 3.0], "bow.n": [0.0, -10.0, 0.0]}
-    rest = dict.fromkeys(("north", "east", "psi", "r"), 0.0)
-    frame = pd.DataFrame({**rows, "t": [0.0, 1.0, 2.0], "u": [3.0, 4.0, 9.0], "v": [4.0, 3.0, 0.0], **rest, "flags": 0})
-    speed, limits = recorded_limits(ship, Dataset(frame, {}), ["a"])
-    assert limits.n_rpm == pytest.approx(120.0)
-    assert speed == pytest.approx(5.0)

@@ -13,7 +13,6 @@ from shipid.identification.inverse import inverse_dynamics
 from shipid.simulation.truth import Truth, simulate_truth
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.conftest import variety
 
 SHIP = load_vessel("gunnerus-28.9")
 MAIN = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "X_rv", "Y_ur", "Y_rrr", "N_ur", "N_rrr", "N_r|r|"))
@@ -64,22 +63,6 @@ def test_a_derivative_that_the_base_lacks_needs_a_scale() -> None:
     base = SHIP.with_values({"hull.derivatives.N_ur": 0.0})
     estimate = inverse_dynamics(base, LOG, LOG.runs, [["hull.derivatives.N_ur"]], scale=[[-1e6]])
     assert estimate.factors[0] * -1e6 == pytest.approx(SHIP.parameters["hull.derivatives.N_ur"], rel=1e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["gunnerus-33.9", "kvlcc2-l7", "actuators", "six"])
-def test_every_structure_is_recovered(name: str) -> None:
-    """Its greatest forces: the first three hull parameters that data see best."""
-    vessel = variety()[name]
-    small = name == "kvlcc2-l7"
-    speeds = {"n_rpm": (300.0, 700.0), "start_speed": (0.6, 1.2)} if small else {"start_speed": (3.0, 7.0)}
-    log = log_of(vessel, alpha_deg=(-30, 30), **speeds)  # type: ignore[arg-type]
-    paths = tuple(path for path in vessel.parameters if path.startswith("hull."))
-    seen = np.linalg.norm(inverse_dynamics(vessel, log, log.runs, [[path] for path in paths]).jacobian, axis=0)
-    main = tuple(paths[j] for j in np.argsort(-seen)[:3])
-    base = wrong(main, 0.8, 1.2, vessel)
-    estimate = inverse_dynamics(base, log, log.runs, [[path] for path in main])
-    np.testing.assert_allclose(estimate.factors, truth(base, main, vessel), rtol=2e-2)
 
 
 def test_what_data_do_not_see_stays_at_the_base_and_priors_hold() -> None:

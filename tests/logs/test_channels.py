@@ -1,6 +1,5 @@
 """Channels with different clocks, delays and frames become one dataset, equal to the motion that made them."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import import_log, log_digest, read_mapping
 from tests.logs.conftest import PLAIN, as_log, turning
 
-Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
 STATES = ["north", "east", "psi", "u", "v", "r"]
 
@@ -102,20 +100,6 @@ def test_a_step_of_the_mapping_holds_orders_and_passes_north(tmp_path: Path) -> 
     np.testing.assert_allclose(np.diff(frame["t"]), 0.2)
     np.testing.assert_allclose(frame["psi"], turning(frame["t"].to_numpy())["psi"], atol=1e-9)
     assert set(frame["propeller.n"]) <= set(turning(T)["port.n"])
-
-
-@pytest.mark.parametrize("how", ["max_gap = 3.0\nstep = 0.5", "resample"])
-def test_a_wrong_date_is_no_years_of_instants(how: str, plain_mapping: Write, tmp_path: Path) -> None:
-    """The clock of a receiver begins in 1980 and is set; both dates are named before any instant is made."""
-    motion = turning(T)
-    motion["t"] += np.where(np.arange(len(T)) < 5, 315_993_600.0, 1_715_673_600.0)
-    resample = how == "resample"
-    more = "\n[resample]\nstep = 0.5\n" * resample
-    mapping = plain_mapping(more, ("" if resample else 'from = "time"', "" if resample else f'from = "time"\n{how}'))
-    dates = "after 1980-01-06 08:00:02 UTC comes 2024-05-14 08:00:02 UTC: was the clock set there"
-    with pytest.raises(DataError, match=f"2.8e[+]09 instants of 240 rows, where {dates}") as refused:
-        import_log(read_mapping(mapping), logged(motion, tmp_path))
-    assert refused.value.path == ("resample.step" if resample else "clock.step")
 
 
 def test_channels_that_share_no_time(tmp_path: Path) -> None:

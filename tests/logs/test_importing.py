@@ -1,7 +1,6 @@
 """The real log is imported to known facts; defects put into synthetic logs are detected and repaired."""
 
 import csv
-import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -11,11 +10,10 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, stretches_of_runs
-from shipid.errors import DataError, DocumentError
+from shipid.errors import DataError
 from shipid.logs import readers
-from shipid.logs.importing import import_log, read_mapping, run_files
-from shipid.logs.mapping import LogSource
-from tests.logs.conftest import CLOCKS, DATES, PLAIN, SPEEDS, as_log, turning
+from shipid.logs.importing import import_log, read_mapping
+from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -217,97 +215,9 @@ def test_rows_that_repeat_a_time_are_left_out_where_the_mapping_asks(plain_mappi
     np.testing.assert_allclose(dataset.frame["north"], motion["north"], atol=1e-6)
 
 
-def test_a_place_beyond_the_poles_is_refused(tmp_path: Path) -> None:
-    """999 deg stands for a missing fix; north and east would be thousands of kilometres."""
-    log = pd.DataFrame({"t": T, "lat": 63.0 + 1e-5 * T, "lon": 10.0, "psi": 0.1, "u": 1.0, "v": 0.0, "r": 0.0})
-    log.loc[[5, 9], "lat"] = 999.0
-    log.to_csv(tmp_path / "log.csv", index=False)
-    units = {"latitude": ("lat", "deg"), "longitude": ("lon", "deg"), "psi": ("psi", "rad")}
-    units |= {name: (name, "rad/s" if name == "r" else "m/s") for name in ("u", "v", "r")}
-    text = 'name = "m"\n[clock]\nfrom = "t"\nunit = "s"\nmax_gap = 3\n'
-    text += "".join(f'[columns.{name}]\nfrom = "{a}"\nunit = "{unit}"\n' for name, (a, unit) in units.items())
-    (tmp_path / "m.toml").write_text(text)
-    with pytest.raises(DataError, match=r"columns.latitude: 999 deg at .* one of 2 rows: .* missing"):
-        import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv")
-    (tmp_path / "m.toml").write_text(text + '[format]\nmissing = ["", "999.0"]\n')
-    assert import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame["north"].abs().max() < 200
-
-
 def test_a_folder_for_a_mapping_of_one_file_says_what_to_write(plain_mapping: Write, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"a folder, and the mapping reads one file; .* runs = "):
         import_log(read_mapping(plain_mapping()), tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "remedy"),
-    [
-        (-11.0, 349.0, r"is the unit right\? If it counts from 0 to 360 deg, write wrap = true"),
-        (436.0, 96.0, r"it goes from 96 to 436 deg, as no such angle does that begins again: is the unit"),
-    ],
-)
-def test_a_rudder_that_jumps_is_asked_for_its_unit(
-    first: float, second: float, remedy: str, plain_mapping: Write, tmp_path: Path
-) -> None:
-    """In mrad, read as degrees, it jumps by 349 when it goes hard over; `wrap = true` made it a rudder of 98 deg."""
-    file = as_log(turning(T), tmp_path / "log.csv")
-    pd.read_csv(file).assign(rudder=np.where(T < 20.0, first, second)).to_csv(file, index=False)
-    mapping = plain_mapping('[columns."rudder.delta"]\nfrom = "rudder"\nunit = "deg"\n')
-    with pytest.raises(DataError, match=rf"rudder.delta: 'rudder' jumps by a whole turn, once at 20 s: {remedy}"):
-        import_log(read_mapping(mapping), file)
-    if remedy.startswith("it"):  # nor is it imported as an angle that wraps
-        mapping = plain_mapping('[columns."rudder.delta"]\nfrom = "rudder"\nunit = "deg"\nwrap = true\n')
-        with pytest.raises(DataError, match=f"rudder.delta: 'rudder' {remedy[3:]}"):
-            import_log(read_mapping(mapping), file)
-
-
-def test_a_run_is_named_by_a_file_in_utf_8(tmp_path: Path) -> None:
-    (tmp_path / os.fsdecode(b"a\xe9.csv")).touch()
-    with pytest.raises(DataError, match="its name is not UTF-8"):
-        run_files(LogSource(runs="*.csv"), tmp_path)
-
-
-@pytest.mark.parametrize("large", [False, True])
-@pytest.mark.parametrize("value", ["8.400", "1.250.000"])
-def test_a_point_that_may_mark_thousands_is_refused_beside_a_decimal_comma(
-    value: str, large: bool, plain_mapping: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """8.400 rpm of a log with decimal commas are 8400 rpm: read as 8.4 they would be wrong without a word."""
-    monkeypatch.setattr(readers, "LARGE", 0 if large else readers.LARGE)
-    log = pd.read_csv(as_log(turning(T), tmp_path / "log.csv"))
-    mapping = plain_mapping('[format]\nseparator = ";"\ndecimal = ","\n')
-    log.assign(rpm=[value if row % 3 else "840" for row in range(len(log))]).to_csv(
-        tmp_path / "log.csv", sep=";", decimal=",", index=False
-    )
-    with pytest.raises(DataError, match=r"has a point, and the decimal is a comma \(column 'rpm'\): .* thousands\?"):
-        import_log(read_mapping(mapping), tmp_path / "log.csv")
-    log.assign(rpm=[f"0.{row:03d}" for row in range(len(log))]).to_csv(
-        tmp_path / "log.csv", sep=";", decimal=",", index=False
-    )
-    shaft = import_log(read_mapping(mapping), tmp_path / "log.csv").frame["propeller.n"]
-    np.testing.assert_allclose(60 * shaft, 0.001 * np.arange(len(log)), atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("head", "zone", "warned"), [("# tz=+01:00\n", "", True), ("# tz=+01:00\n", "+01:00", False), ("", "", False)]
-)
-def test_a_zone_that_only_the_head_says_is_warned_of(
-    head: str, zone: str, warned: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    """Times are counted as UTC; the draft asks, and a mapping may have been written without one."""
-    frame = turning(np.arange(0.0, 60.0, 0.5))
-    log = pd.read_csv(as_log(frame, tmp_path / "plain.csv"))
-    log["time"] = [
-        f"{moment.isoformat()}{zone}" for moment in pd.Timestamp("2024-05-14T08:00") + pd.to_timedelta(frame["t"], "s")
-    ]
-    (tmp_path / "log.csv").write_text(head + log.to_csv(index=False))
-    text = (
-        PLAIN.read_text().replace('from = "time"', 'from = "time"\nunit = "date"')
-        + f"\n[format]\nskip_rows = {len(head.splitlines())}\n"
-    )
-    (tmp_path / "mapping.toml").write_text(text)
-    import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
-    said = "log.csv: clock.from: '2024-05-14T08:00:00' is read as UTC, and the log says 'tz=+01:00'"
-    assert [message.startswith(said) for message in caplog.messages] == [True] * warned
 
 
 PARTED = """
@@ -395,26 +305,3 @@ def test_parts_that_cannot_be_are_named(change: dict[str, float], row: int, said
     log.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=re.escape(said)):
         import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
-
-
-@pytest.mark.parametrize(
-    ("change", "path"),
-    [
-        (('from = "psi"', 'from = ["psi", "s"]'), "columns.psi.from"),
-        (('"lon min"]\nunit = "deg"', '"lon min"]\nunit = "rad"'), "columns.longitude.from"),
-        (('date = ["year", "month", "day"]\nunit = "date"', 'unit = "s"'), "clock.unit"),
-        (('["h", "min", "s"]', '["h"]'), "clock.from"),
-    ],
-)
-def test_only_dates_and_positions_are_in_parts(change: tuple[str, str], path: str, tmp_path: Path) -> None:
-    assert change[0] in PARTED
-    (tmp_path / "mapping.toml").write_text(PARTED.replace(*change))
-    with pytest.raises(DocumentError) as caught:
-        read_mapping(tmp_path / "mapping.toml")
-    assert caught.value.path == path
-
-
-def test_one_sign_is_not_both_decimal_and_thousands(tmp_path: Path) -> None:
-    (tmp_path / "mapping.toml").write_text(PARTED.replace("[clock]", '[format]\nthousands = "."\n[clock]'))
-    with pytest.raises(DocumentError, match=r"format.thousands: .*must be another sign than decimal"):
-        read_mapping(tmp_path / "mapping.toml")

@@ -10,10 +10,8 @@ from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
 from shipid.errors import DataError
-from shipid.logs.formats import MatFormat
-from shipid.logs.guess.columns import guess
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.mat import is_mat, read_mat
+from shipid.logs.mat import is_mat
 from tests.logs.conftest import NAMES, T, assert_is_the_motion, mapping_with
 
 
@@ -75,44 +73,3 @@ def test_a_file_of_matlab_4_is_recognised(order: str, log: pd.DataFrame, tmp_pat
     for seed in range(200):
         draw = np.random.default_rng(seed)
         assert is_mat(Path("x"), draw.integers(0, 256, 200, dtype=np.uint8).tobytes()) is None
-
-
-PLACES = {"lat": 63.44 + 1e-4 * np.sin(T / 9.0), "lon": 10.4 + 2e-4 * np.cos(T / 9.0)}
-VECTORS = {"t": T, **PLACES, "heading": (90.0 + np.degrees(T / 9.0)) % 360.0, "rpm": 120.0 + T % 7}
-
-
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"heading": cells(T)}, r"can be the heading: 'heading' is an array of 120 cells.*: save heading = cell2mat"),
-        ({"t": np.array([f"08:{k // 60:02d}:{k % 60:02d}" for k in range(120)])}, r"can be the clock: 't' is text"),
-        ({"lat": T[:-1]}, r"can be the position .*: 'lat' is of 119 values, and 't' has 120"),
-        ({"heading": T + 1j}, r"can be the heading: 'heading' is complex, .*: save real\(heading\)"),
-    ],
-)
-def test_a_draft_that_stops_says_why_a_variable_cannot_be_read(
-    changed: dict[str, Any], message: str, tmp_path: Path
-) -> None:
-    savemat(tmp_path / "log.mat", {**VECTORS, **changed})
-    with pytest.raises(DataError, match=message):
-        guess(tmp_path / "log.mat")
-
-
-@pytest.mark.parametrize("signals", [2, 9, 60])
-def test_a_matrix_with_a_row_for_each_signal_is_refused_at_once(signals: int, tmp_path: Path) -> None:
-    """A column for each of its thousands of times took minutes."""
-    savemat(tmp_path / "log.mat", {"data": np.zeros((signals, 50_000))})
-    with pytest.raises(DataError, match=rf"a matrix of {signals} x 50000, a row for each signal: save data = data\.'"):
-        guess(tmp_path / "log.mat")
-
-
-def test_a_draft_takes_the_vectors_that_are_enough_for_a_log(tmp_path: Path) -> None:
-    """A second recorder, with a longer clock, was taken for the log."""
-    fast = np.arange(2400) / 10.0
-    savemat(tmp_path / "log.mat", {**VECTORS, "t_rudder": fast, "rudder": np.sin(fast)})
-    table = read_mat(tmp_path / "log.mat", MatFormat(kind="mat"), "time")
-    assert [*table] == [*VECTORS]
-    assert table.attrs["notes"] == [
-        f"{name!r} is of 2400 values, and 't' has 120: a column has a value for every time"
-        for name in ("t_rudder", "rudder")
-    ]

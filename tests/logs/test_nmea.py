@@ -243,22 +243,3 @@ def test_messages_of_ais_and_targets_of_a_radar_are_passed_over(tmp_path: Path) 
     assert table.attrs["notes"] == ["sentences of these kinds are not read: AIVDM (180), TTM (30)"]
     with pytest.raises(DataError, match="messages of AIS alone"):
         read(lines[4:5] * 20, tmp_path / "ais")
-
-
-def test_two_gyros_and_two_receivers_are_not_mixed(tmp_path: Path) -> None:
-    """Before, a column had whatever was said first at each instant, and a late receiver moved the clock back."""
-    lines = []
-    for k in range(60):
-        late = f"GNGGA,12{(k - 1) // 60 % 60:02d}{(k - 1) % 60:02d}.60,4808.0,N,01131.0,E,1,8,0.9,5.0,M,46.9,M,,"
-        heading = [f"HEHDT,{k}.0,T", *([f"GPHDT,{k + 3}.0,T"] if k != 30 else [])]
-        bodies = [RMC.format(0, k), *(heading if k % 2 else heading[::-1]), *([late] if k else [])]
-        lines += [sentence(body) for body in bodies]
-        lines += [sentence("IIRPM,S,0,90.0,,A"), sentence("IIRPM,S,1,120.0,,A"), sentence("IIRPM,S,2,110.0,,A")]
-    table = read(lines, tmp_path / "log")
-    np.testing.assert_allclose(table["time"] - table["time"][0], np.arange(60.0))
-    np.testing.assert_allclose(table["heading"], np.arange(60.0))
-    np.testing.assert_allclose((table["heading_GP"] - table["heading"]).dropna(), [3.0] * 59)
-    assert table["latitude"].nunique() == 1
-    assert table["latitude_GN"].notna().sum() == 59
-    assert (table["rpm"].iloc[0], table["rpm_2"].iloc[0], table["rpm_0"].iloc[0]) == (120.0, 110.0, 90.0)
-    assert "'heading' is said by several talkers: 'heading_GP' is that of GP" in " ".join(table.attrs["notes"])

@@ -17,7 +17,7 @@ from shipid.logs.formats import ParquetFormat, TextFormat
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.readers import check_line_width, read_log_table, require_file
 from shipid.logs.workbook import WIDEST
-from tests.draws import seeds
+from tests.drawn import seeds
 from tests.logs.conftest import NAMES, assert_is_the_motion, mapping_with
 
 Write = Callable[..., Path]
@@ -123,7 +123,7 @@ def test_the_number_of_a_wrong_line_counts_the_comments_before_it(tmp_path: Path
     assert table.attrs["ragged"] == [6]
 
 
-@pytest.mark.parametrize("seed", seeds(4))
+@pytest.mark.parametrize("seed", seeds(2, 5))
 def test_what_a_power_cut_leaves_is_named(seed: int, tmp_path: Path) -> None:
     """A whole log was said to be binary; later in the file a cell ended at its NUL, and 111.1 became 11."""
     draw = np.random.default_rng(seed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.report import AnswerSentence, ReportContent, ReportFinding, WindowSnapshot
-from shipid.report.section import DrawnSection, draw_sections
+from shipid.report.page import DrawnSection, draw_sections
 from shipid.report.sections import SECTIONS
 
 NASTY = "<script>alert('x')</script>"
@@ -264,17 +263,6 @@ def simulation() -> ReportContent:
 @pytest.fixture(scope="session")
 def full_scale() -> ReportContent:
     return _content(FULL_SCALE, [15], 1, ["zigzag 20/20"], np.arange(4150.0, 4330.0), 15)
-
-
-@pytest.fixture(scope="session")
-def away() -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    def distance(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """Distance of each point from a broken line."""
-        along, offset = np.diff(line, axis=0), points[:, None] - line[:-1]
-        share = np.clip((offset * along).sum(-1) / (along**2).sum(-1), 0, 1)
-        return np.linalg.norm(offset - share[..., None] * along, axis=-1).min(axis=1)
-
-    return distance
 
 
 @pytest.fixture(scope="session", params=["simulation", "full_scale"])

@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report.aboard import ABOARD_PAGE, AboardContent, along_run_figure, band_outline, paths_figure, write_aboard
+from shipid.report.aboard import AboardContent, along_run_figure, band_outline, paths_figure, write_aboard
 from shipid.report.content import SummaryLine
-from shipid.report.section import draw_sections
 from tests.report.views import views
 
 NASTY = "<b>run</b>"
@@ -106,8 +105,3 @@ def test_it_opens_at_the_worst_run_in_time_of_the_run() -> None:
     np.testing.assert_allclose(lines["error"]["y"], 3.0 * here.instants["error"], rtol=1e-6)
     np.testing.assert_allclose(lines["band along"]["y"], 5.0)
     np.testing.assert_allclose(lines["band across"]["y"], 2.5)
-
-
-def test_every_item_is_declared() -> None:
-    for one in draw_sections(ABOARD_PAGE, content()):
-        assert [item.id for item in one.items] == list(ABOARD_PAGE[one.id].anchors)

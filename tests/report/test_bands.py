@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 
 from shipid.report import ReportContent, bands
-from shipid.report.page import render_page
-from shipid.report.section import draw_sections
+from shipid.report.page import draw_sections
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 
@@ -69,17 +68,5 @@ def test_the_map_of_the_width(banded: ReportContent) -> None:
     assert (figure.scale.low, figure.scale.high) == (pytest.approx(least), pytest.approx(most))
 
 
-def test_the_page_holds_it_and_no_tag(banded: ReportContent) -> None:
-    only = {"how-far-off": SECTIONS["how-far-off"]}
-    none = {name: getattr(banded, name).iloc[:0] for name in ("horizon", "over_time", "trials")}
-    text = render_page("study", only, replace(banded, snapshots=[], answer=[], findings=[], **none))
-    assert "How far off it may be" in text
-    assert NASTY not in text
-    (section,) = draw_sections(only, banded)
-    assert [item.id for item in section.items] == list(bands.HOW_FAR_OFF.anchors)
-
-
 def test_without_bands_nothing_is_drawn(simulation: ReportContent) -> None:
-    assert bands.coverage_figure(simulation) is None
-    assert bands.width_figure(simulation) is None
     assert draw_sections({"how-far-off": SECTIONS["how-far-off"]}, simulation) == []

@@ -1,22 +1,8 @@
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import pandas as pd
-import pytest
 
-from shipid.report import ReportContent
 from shipid.report.content import model_text
-
-
-def test_every_frame_but_cells_and_models_may_be_absent(full_scale):
-    content = ReportContent(
-        title="Question?", name="bare", cells=full_scale.cells, naive=full_scale.naive, models=full_scale.models
-    )
-    for name in ("horizon", "over_time", "commands", "tracks", "envelope", "factors", "trials", "repairs"):
-        assert len(getattr(content, name)) == 0
-        assert set(getattr(full_scale, name).columns) >= set(getattr(content, name).columns)
-    assert content.frames == {}
-    with pytest.raises(FrozenInstanceError):
-        content.title = "Another?"
 
 
 def test_the_model_without_physics_has_one_name(full_scale):

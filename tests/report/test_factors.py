@@ -16,12 +16,12 @@ def test_one_dot_per_number_at_its_factor(simulation):
     rows = ["moderate-1", "moderate-2", "moderate-3", "high-1", "high-2"]
     for trace in plot.data:
         mine = simulation.factors[simulation.factors.group == trace.name]
-        np.testing.assert_allclose(np.exp(trace.x), mine.factor, rtol=1e-5)
+        np.testing.assert_allclose(trace.x, mine.factor, rtol=1e-5)
         assert [rows[int(y)] for y in np.asarray(trace.y)] == list(mine.model)
         assert trace.customdata[0] == f"{mine.model.iloc[0]}: {mine.path.iloc[0]} × {mine.factor.iloc[0]:.3g}"
     low, high = plot.layout.xaxis.range
-    assert low < np.log(simulation.factors.factor.min())
-    assert high > np.log(simulation.factors.factor.max())
+    assert low < np.log10(simulation.factors.factor.min())
+    assert high > np.log10(simulation.factors.factor.max())
     assert "Not perturbed: nominal." in figure.how, "what has no physics is no model that was spared"
 
 
@@ -36,7 +36,7 @@ def test_takeaway_counts_and_finds_the_farthest(simulation):
     squared = np.log(simulation.factors.factor) ** 2
     away = np.exp(np.sqrt(squared.groupby(simulation.factors.model).mean()))
     text = factors_figure(simulation).takeaway
-    assert text.startswith(f"{len(simulation.factors)} numbers in 5 models, times factors from ")
+    assert text.startswith(f"{len(simulation.factors)} numbers in 5 models, times ")
     assert f"{away.idxmax()} is farthest from its base, by a factor of {away.max():.2f}" in text
 
 
@@ -47,7 +47,7 @@ def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
         [{**row, "path": path, "factor": factor} for path, factor in zip("abc", (0.0, 0.6, 0.7), strict=True)]
     )
     assert factors_figure(replace(full_scale, factors=frame)).takeaway == (
-        "2 numbers in 1 model, times factors from 0.60 to 0.70; 1 term removed."
+        "2 numbers in 1 model, times 0.60 to 0.70; 1 term removed."
     )
     same = factors_figure(replace(full_scale, factors=frame.assign(factor=0.6))).takeaway
     assert same == "3 numbers in 1 model, times 0.60."
@@ -55,21 +55,9 @@ def test_removed_terms_are_no_numbers_times_a_factor(full_scale):
     assert factors_figure(replace(full_scale, factors=gone)).takeaway == "1 model changed; 3 terms removed."
 
 
-@pytest.mark.parametrize(("factor", "word"), [(0.0, "0"), (-0.5, "≤ 0")])
-def test_a_removed_term_lies_at_the_left_edge(full_scale, factor, word):
+@pytest.mark.parametrize("factor", [0.0, -0.5])
+def test_a_removed_term_lies_at_the_left_edge(full_scale, factor):
     figure = factors_figure(replace(full_scale, factors=full_scale.factors.assign(factor=[factor, 1.2])))
     plot = views(figure)[""][0]
-    assert plot.layout.xaxis.ticktext[-1] == word
-    assert plot.data[0].x[0] == pytest.approx(plot.layout.xaxis.tickvals[-1])
-    assert plot.layout.xaxis.range[0] < plot.data[0].x[0] < np.log(0.8)
+    assert 10 ** plot.layout.xaxis.range[0] < plot.data[0].x[0] < 0.8
     assert "0 removes the term" in figure.how
-
-
-def test_another_method_on_a_model_is_not_called_unperturbed(simulation):
-    others = simulation.cells[simulation.cells.model.eq("high-1")].assign(model="high-1 + alone")
-    figure = factors_figure(replace(simulation, cells=pd.concat([simulation.cells, others], ignore_index=True)))
-    assert "Not perturbed: nominal." in figure.how, "what has no physics is no model that was spared"
-
-
-def test_no_rows_no_figure(simulation):
-    assert factors_figure(replace(simulation, factors=simulation.factors.iloc[:0])) is None

@@ -13,7 +13,6 @@ from shipid.report.figure import (
     PageFigure,
     draw_alone,
     escape_name,
-    log_axis,
     make_axis,
     make_chart,
     make_line,
@@ -33,12 +32,6 @@ def test_a_line_is_in_single_precision_and_keeps_its_gaps():
     assert drawn["y"].dtype == np.float32
     assert drawn["connectgaps"] is False
     assert drawn["meta"] == ["model:a"]
-
-
-def test_ticks_of_a_logarithmic_axis_are_numbers_one_can_read():
-    made = log_axis("error [m]")
-    assert made["type"] == "log"
-    assert dict(zip(made["tickvals"], made["ticktext"], strict=True))[0.5] == "0.5"
 
 
 @given(st.lists(st.floats(0, 100), max_size=20).map(sorted), st.floats(0.1, 5))

@@ -15,9 +15,8 @@ from plotly.offline import get_plotlyjs_version
 from shipid.errors import ResultError
 from shipid.report import AnswerSentence, ReportContent, write_report
 from shipid.report.figure import PageFigure
-from shipid.report.page import render_page
+from shipid.report.page import declared_anchors, render_page
 from shipid.report.paths import window_data
-from shipid.report.section import declared_anchors
 from shipid.report.sections import SECTIONS
 from tests.report.views import views
 
@@ -169,9 +168,11 @@ def test_sentences_link_to_what_is_there(page):
     assert {a["href"][1:] for a, _ in parsed.all("a")} <= set(ids)
     answers = [text for _, text in parsed.all("li") if "Figure" in text and "With 30" in text]
     assert len(answers) == 1
-    # A map needs several N_D; and no section is drawn without what it needs.
-    able = {name: one for name, one in SECTIONS.items() if set(one.needs) <= {*vars(content), *content.frames}}
-    assert declared_anchors(able) - set(ids) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
+    # A map needs several N_D; an item is not drawn without what it needs.
+    parts = {*vars(content), *content.frames}
+    able = {name for one in SECTIONS.values() for name, (_, need) in one.items.items() if need in parts}
+    assert able - set(ids) == (set() if content.cells.N_D.nunique() > 1 else {"map"})
+    assert able <= declared_anchors(SECTIONS)
 
 
 def test_three_sentences_come_before_the_details_and_warnings_are_open(plain):

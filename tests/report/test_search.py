@@ -36,16 +36,6 @@ def test_a_panel_per_hyperparameter_that_varies(simulation):
     assert panels(dropped)["hidden dropout"].layout.xaxis.type is None
 
 
-def test_ticks_over_many_decades_have_room(simulation):
-    """A panel is 190 px wide: names of five powers of ten lay over each other."""
-    for decades in (2, 7, 12):
-        values = np.geomspace(10.0 ** (4 - decades), 1e4, len(simulation.trials))
-        x = panels(replace(simulation, trials=simulation.trials.assign(weight_decay=values)))["weight decay"]
-        low, high = x.layout.xaxis.range
-        shown = [tick for tick in x.layout.xaxis.tickvals if low <= np.log10(tick) <= high]
-        assert 2 <= len(shown) <= 5
-
-
 def test_dots_are_relative_to_the_best_of_their_cell(simulation):
     trials = simulation.trials
     drawn = dots(panels(simulation)["learning rate"])
@@ -63,8 +53,8 @@ def test_of_many_trials_some_are_drawn(simulation):
     many = pd.concat([simulation.trials] * 5, ignore_index=True)
     content = replace(simulation, trials=many)
     drawn = dots(panels(content)["weight decay"])
-    assert sum(len(trace.x) for name, trace in drawn.items() if name not in ("median", "chosen")) == 1200
-    assert "at most 1,400 are drawn" in search(content).how
+    assert sum(len(trace.x) for name, trace in drawn.items() if name != "median") == 1200
+    assert "at most 1,200 are drawn" in search(content).how
     assert "are drawn" not in search(simulation).how
 
 
@@ -114,9 +104,6 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     printed = search_table(content)
     assert "504 trials in 42 cells: none stopped early, none diverged" in printed.takeaway
     assert "Tried: motion scale 2 to 13, mirror yes or no." in printed.takeaway
-    row = dict(zip(printed.columns, printed.rows[0], strict=True))
-    assert "epochs [1]" not in row
-    assert "epochs [1]" in search_table(simulation).columns
     assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
 
 
@@ -140,9 +127,3 @@ def test_trials_that_all_diverged_stand(simulation):
     lost = simulation.trials.assign(state="diverged", value=np.nan, chosen=False)
     content = replace(simulation, trials=lost)
     assert search(content).takeaway.startswith("None of 504 trials ended")
-
-
-def test_no_trials_no_search(simulation):
-    none = replace(simulation, trials=simulation.trials.iloc[:0])
-    assert search(none) is None
-    assert search(replace(simulation, trials=simulation.trials[["cell", "N_D", "state", "value", "chosen"]])) is None

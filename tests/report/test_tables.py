@@ -1,4 +1,3 @@
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -7,8 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipid.report.cells import cells_table as cells
-from shipid.report.factors import models_table as models
 from shipid.report.logs import input_ranges as envelope
 from shipid.report.logs import repairs_table as repairs
 from shipid.report.tables import TableCell, cell_html, number_cell, word_cell
@@ -20,47 +17,6 @@ def test_numbers_align_and_what_is_missing_sorts_last():
     assert number_cell(np.nan, 2).text == "–"
     assert number_cell(np.nan, 2).key > 1e200
     assert word_cell(None).text == word_cell(np.nan).text == word_cell(pd.NA).text == "–"
-
-
-def test_every_cell_is_a_row(content):
-    table = cells(content)
-    assert len(table.rows) == len(content.cells)
-    column = list(table.columns).index("H [m]")
-    keys = [row[column].key for row in table.rows]
-    expected = content.cells.H.fillna(1e300).tolist()
-    assert keys == pytest.approx(expected)
-
-
-def test_the_failed_cell_gives_its_reason(full_scale):
-    table = cells(full_scale)
-    bad = [cell.text for row in table.rows for cell in row if cell.bad]
-    assert bad == ["diverged: 4 % of the test windows left the sea"]
-    assert table.takeaway == "4 cells in 3 min of computing; 1 cell gave no result."
-
-
-def test_models_are_ordered_by_accuracy(simulation):
-    table = models(simulation)
-    assert [row[0].text for row in table.rows][:2] == ["nominal", "moderate-1"]
-    assert table.takeaway == "A runs from 0.90 m (nominal) to 13.0 m (high-2)."
-
-
-def test_cells_count_their_trials(simulation):
-    table = cells(simulation)
-    first = simulation.trials[simulation.trials.cell == simulation.cells.cell.iloc[0]]
-    numbers = dict(zip(table.columns, table.rows[0], strict=True))
-    assert numbers["trials [1]"].key == len(first) == 12
-    assert numbers["diverged [1]"].key == first.state.eq("diverged").sum()
-    assert "trials [1]" not in cells(replace(simulation, trials=simulation.trials.iloc[:0])).columns
-
-
-def test_errors_of_a_small_model_are_no_zeros(simulation):
-    """A 300th of the errors, as of a model of a metre: no column of 0.00."""
-    small = simulation.cells.assign(H=simulation.cells.H / 300, A=simulation.cells.A / 300)
-    table = cells(replace(simulation, cells=small))
-    for name in ("H [m]", "A [m]"):
-        texts = [row[list(table.columns).index(name)].text for row in table.rows]
-        assert not {"0.00", "0.000"} & set(texts)
-        assert len({len(text.partition(".")[2]) for text in texts if text != "–"}) == 1, "points align"
 
 
 def test_envelope_and_repairs_hold_their_numbers(full_scale):

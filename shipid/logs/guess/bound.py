@@ -1,8 +1,4 @@
-"""Name the commands of a draft as a vessel document does, so that the imported log fits that vessel.
-
-Signal and side decide. One column may feed the commands of both sides. A screw of the vessel that does not drive it,
-such as a tunnel thruster, is taken as stopped where the log does not have it.
-"""
+"""Name the commands of a draft as a vessel document does, so that the imported log fits that vessel."""
 
 from __future__ import annotations
 
@@ -21,10 +17,7 @@ GUESSED = 0.4  # confidence of a tunnel thruster whose name says no unit, and of
 
 
 def name_commands(state: State, vessel: Vessel) -> None:
-    """Rename the commands and outputs of the draft to those of the vessel; ask where the log lacks a command.
-
-    Where some shafts drive the vessel, the others are idle, and so are angles that do not turn her.
-    """
+    """Rename the commands and outputs of the draft to those of the vessel; ask where the log lacks a command."""
     controls = Controls(vessel)
     drives, helm = controls.effects
     without = {
@@ -66,11 +59,7 @@ def _drop_guesses(state: State, signals: set[str]) -> None:
 def _command_pairs(
     state: State, wanted: Sequence[str], drafted: Sequence[Suggestion], idle: set[str], vessel: Vessel
 ) -> Iterator[tuple[str, Suggestion]]:
-    """Yield each command of the vessel with the column for it.
-
-    That whose name says the command; then that of its side or end; then the one with its number. A column feeds several
-    commands only where no other column is left for them.
-    """
+    """Yield each command of the vessel with its column: by its name, then its side or end, then its number."""
     found = {name: one for name in wanted for one in drafted if state.command_of(one.source) == name}
     said = list(found.values())
     for group in _command_groups(wanted, idle, vessel):
@@ -96,7 +85,6 @@ def _command_groups(wanted: Sequence[str], idle: set[str], vessel: Vessel) -> li
 def _group_columns(
     state: State, names: Sequence[str], drafted: Sequence[Suggestion], tunnel: bool, vessel: Vessel
 ) -> dict[str, Suggestion]:
-    """Columns for the commands of a group, of those that are left."""
     if not names:
         return {}
     places = {name: _side_or_place(name, vessel) for name in names}
@@ -156,7 +144,6 @@ def _match_in_order(state: State, names: Sequence[str], columns: Sequence[Sugges
 def _ask_about_commands(
     state: State, names: Sequence[str], columns: Sequence[Suggestion], why: str
 ) -> dict[str, Suggestion]:
-    """Commands with columns one by one, as a guess, and the question whether it is so."""
     pairs = {
         name: replace(one, confidence=min(one.confidence, GUESSED)) for name, one in zip(names, columns, strict=False)
     }
@@ -178,10 +165,7 @@ def _with_numbers(names: Sequence[str], columns: Sequence[Suggestion]) -> dict[s
 def _by_number(
     state: State, names: Sequence[str], columns: Sequence[Suggestion], vessel: Vessel
 ) -> dict[str, Suggestion]:
-    """Columns that differ by a number alone: for components with numbers, else from starboard to port, and asked.
-
-    IEC 61162-1 gives odd numbers to starboard, even ones to port.
-    """
+    """Columns that differ by a number alone: for components with numbers, else from starboard to port, and asked."""
     sides = [_side_or_place(name, vessel) for name in names]
     if _with_numbers(names, columns) or not {"port", "starboard"} <= set(sides):
         return _match_in_order(state, names, columns)
@@ -198,7 +182,7 @@ def _by_number(
 
 
 def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Suggestion:
-    """The column of an angle with the sign that turns the vessel as the log says; an azimuth forward turns as no other.
+    """The column of an angle with the sign that turns the vessel as the log says.
 
     helm : angle command -> sign that turns the vessel to starboard.
     """
@@ -245,13 +229,11 @@ def _missing_command(state: State, name: str, idle: set[str], vessel: Vessel) ->
 
 
 def _rename_output(one: Suggestion, components: dict[str, str]) -> Suggestion:
-    """An output of a component that has another name in the vessel."""
     component, dot, signal = one.name.partition(".")
     return replace(one, name=f"{components[component]}.{signal}") if dot and component in components else one
 
 
 def _place_in_name(name: str) -> str:
-    """Side or end in the name of a command; empty where there is none."""
     component = name.partition(".")[0]
     place = next((one for one in PLACES if component.lower() in words_of_side(one)), None) or side_in_name(component)
     return place if place in PLACES else ""
@@ -268,7 +250,6 @@ def _side_or_place(name: str, vessel: Vessel) -> str:
 
 
 def _side_of_component(name: str, vessel: Vessel) -> str:
-    """Side on which the vessel has the component of a command; empty on the centre line."""
     y = _lateral_position(name, vessel)
     return "port" if y < 0 else "starboard" if y > 0 else ""
 

@@ -69,7 +69,7 @@ def ask_for_changes(state: State) -> None:
 
 
 def other_part(seen: Complex, ran: Complex) -> ScalePart | None:
-    """Return the part of the windows in which seen = scale * ran has another scale than elsewhere; None if none has."""
+    """The part of the windows in which seen = scale * ran has another scale than elsewhere; None if none has."""
     if len(seen) < 40:
         return None
     nodes = np.unique(np.linspace(0, len(seen), NODES + 1).astype(int))
@@ -120,10 +120,7 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
 
 
 def _ask_for_shaft(state: State, name: str, source: str) -> None:
-    """Ask where the numbers of a shaft are at once some 6, 10 or 60 times as many, for the same way of the ship.
-
-    A ship that coasts or turns on the spot has another number of turns a metre, too, but her shaft has no such step.
-    """
+    """Ask where the numbers of a shaft are at once some 6, 10 or 60 times as many, for the same way of the ship."""
     size = np.abs(state.columns[source])
     way = np.abs(state.chosen.change(np.asarray(state.position)))
     turns = np.abs(state.chosen.change(evidence.integrate_rate(state.t, state.columns[source])))
@@ -155,10 +152,7 @@ def _ask_for_shaft(state: State, name: str, source: str) -> None:
 
 
 def _unit_change_rows(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return rows (K,) whose numbers may be the first of another unit.
-
-    The largest steps from row to row, `SPLITS` at most, and as many rows behind a pause of the clock.
-    """
+    """Rows (K,) whose numbers may be the first of another unit: the `SPLITS` largest steps, and rows behind a pause."""
     low, high = np.minimum(size[:-1], size[1:]), np.maximum(size[:-1], size[1:])
     leaps = np.flatnonzero(~broken & (low > 0.0) & (high > np.exp(min(map(abs, OF_UNITS)) - NEAR) * low))
     leaps = leaps[np.argsort(-(low * high)[leaps], kind="stable")][:SPLITS]
@@ -167,7 +161,6 @@ def _unit_change_rows(size: Array, broken: NDArray[np.bool_]) -> NDArray[np.intp
 
 
 def _from_to(state: State, first: int, end: int) -> str:
-    """Words for the rows from `first` until before `end`."""
     if state.joined:
         return "in a part of the files"
     begins, ends = (clock_text(state, float(state.t[row])) for row in (first, min(end, len(state.t) - 1)))

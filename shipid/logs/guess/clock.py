@@ -137,7 +137,7 @@ def _day_columns(fields: dict[str, str]) -> list[str]:
 def _in_columns(
     table: pd.DataFrame, columns: dict[str, Array], dates: str | None
 ) -> tuple[dict[str, Any], Array] | None:
-    """Return the clock of a log with hour, minute and second in columns; `dates` is a column of dates."""
+    """The clock of a log with hour, minute and second in columns; `dates` is a column of dates."""
     fields = _date_fields(columns)
     times, days = [fields[one] for one in ("hour", "minute", "second") if one in fields], _day_columns(fields)
     if not {"hour", "minute"} <= fields.keys():
@@ -158,10 +158,7 @@ def _in_columns(
 
 
 def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict[str, int], dict[str, Array] | None]:
-    """Return the column that says the run with the number of runs, and the clock, where it begins again with each.
-
-    The clock goes on from run to run then, after a time of `LONG` rows.
-    """
+    """The column that says the run with the number of runs, and the clock, where it begins again with each."""
     for name in filter(is_clock, columns):
         steps = np.diff(columns[name])
         if not np.isfinite(columns[name]).all() or not np.any(steps < 0) or _wrapping_clock_unit(columns[name]):
@@ -178,7 +175,7 @@ def clock_restarts(table: pd.DataFrame, columns: dict[str, Array]) -> tuple[dict
 def clock_without_repeats(
     table: pd.DataFrame, columns: dict[str, Array], file: Path
 ) -> tuple[dict[str, Any], Array, Rows]:
-    """Return the clock, its times, and which rows it takes: all but a few that repeat the row before."""
+    """The clock, its times, and which rows it takes: all but a few that repeat the row before."""
     again = rows_repeated(table)
     if 0 < again.sum() <= REPEATED * len(table):
         kept = {name: values[~again] for name, values in columns.items()}
@@ -198,7 +195,7 @@ def clock_without_repeats(
 
 
 def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | None:
-    """Return the rows that do not say the time of the row before once more; None where no clock has a few of these."""
+    """The rows that do not say the time of the row before once more; None where no clock has a few of these."""
     for name in map(str, table.columns):
         if not is_clock(name):
             continue
@@ -210,7 +207,6 @@ def _unrepeated_rows(table: pd.DataFrame, columns: dict[str, Array]) -> Rows | N
 
 
 def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) -> tuple[dict[str, Any], Array]:
-    """Return the clock: a column that rises, by its name if several do; dates; or a rounded one, by its rate."""
     finite = {name: values for name, values in columns.items() if np.isfinite(values).all() and len(values)}
     rising = [name for name, values in finite.items() if np.all(np.diff(values) > 0)]
     called = [name for name in columns if is_clock(name)]
@@ -327,11 +323,7 @@ def doubts_on(table: pd.DataFrame, clock: dict[str, Any], t: Array) -> Iterator[
 
 
 def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
-    """Yield a question where a clock of seconds that is read as since 1970, first [s], may count from another date.
-
-    GPS counts from 1980, which a name may say; without one that says 1970, numbers that are of late years then may. A
-    log of the future counts from 1904. No log is of the future.
-    """
+    """Yield a question where a clock of seconds since 1970, first [s], may count from another date (1980, 1904)."""
     now = datetime.now(UTC).timestamp()
     if clock["unit"] not in ("s", "ms", "us", "ns") or not FIRST_DATED_TIME < first < LAST_DATE:
         return
@@ -347,10 +339,7 @@ def _other_begin(clock: dict[str, Any], first: float) -> Iterator[str]:
 
 
 def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str, Any], t: Array) -> Iterator[str]:
-    """Yield a question for each further clock that goes otherwise than the times t (N,) [s] of the rows.
-
-    So it is where each channel has a time beside it, or where a second log is beside the first.
-    """
+    """Yield a question for each further clock that goes otherwise than the times t (N,) [s] of the rows."""
     of_rows = {one for key in ("from", "date") if key in clock for one in source_columns(clock[key])}
     for name in map(str, table.columns):
         if name in of_rows or not is_clock(name):
@@ -368,12 +357,11 @@ def other_clocks(table: pd.DataFrame, columns: dict[str, Array], clock: dict[str
 
 
 def column_called(table: pd.DataFrame, name: str) -> pd.Series[Any]:
-    """Return the first column of this name."""
+    """The first column of this name."""
     return table.iloc[:, list(map(str, table.columns)).index(name)]
 
 
 def _date_column(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
-    """Return the first column that holds a date in every row, without a time; one of numbers is called a clock."""
     for name in sorted(filter(None, map(str, table.columns)), key=lambda name: name in columns):
         if name in columns and not (is_clock(name) and len(np.unique(columns[name])) <= max(1, len(table) // ROWS)):
             continue
@@ -385,7 +373,7 @@ def _date_column(table: pd.DataFrame, columns: dict[str, Array]) -> str | None:
 
 
 def _with_date(table: pd.DataFrame, columns: dict[str, Array], name: str) -> tuple[dict[str, Any], Array] | None:
-    """Return the clock of a column of times of day beside dates; None where there are none, or it does not rise."""
+    """The clock of a column of times of day beside dates; None where there are none, or it does not rise."""
     day = _date_column(table, columns) or _day_columns(_date_fields(columns))
     if not day:
         return None
@@ -413,7 +401,7 @@ def _looks_dated(column: pd.Series[Any]) -> bool:
 
 
 def _read_clock(table: pd.DataFrame, name: str, values: Array, file: Path) -> tuple[str, Array]:
-    """Return the unit of a clock of numbers, and its times [s]."""
+    """The unit of a clock of numbers, and its times [s]."""
     if in_one_number(values):
         return "date", parse_dates(column_called(table, name))
     if values.min() > 1e9 and _is_time_of_day(values % 1e6):
@@ -438,7 +426,7 @@ def _is_years(name: str, values: Array) -> bool:
 
 
 def _unit_of_clock(name: str, values: Array) -> str:
-    """Return the unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
+    """The unit of a clock: as its name says; else dates, times of day, or ms, us or ns if it counts so."""
     again = _wrapping_clock_unit(values)
     if again is not None and not _is_time_of_day(values):
         return again
@@ -474,10 +462,7 @@ def _calendar_units(parts: tuple[str, ...]) -> list[str]:
 
 
 def _wrapping_clock_unit(values: Array) -> str | None:
-    """Return the unit of a clock that begins again after a day or a week; None where none does.
-
-    A row may be missing there, so that a clock goes back by a little less than that, but not by an hour.
-    """
+    """The unit of a clock that begins again after a day or a week; None where none does."""
     steps = np.diff(values)
     back = steps[steps < 0]
     for unit, seconds_of in AGAIN.items():
@@ -488,10 +473,7 @@ def _wrapping_clock_unit(values: Array) -> str | None:
 
 
 def _is_time_of_day(values: Array) -> bool:
-    """Whether numbers (N,) are hours, minutes and seconds: only so do they go on evenly where a minute is full.
-
-    As seconds they would leave out 41 s in every minute: 123059, 123100.
-    """
+    """Whether numbers (N,) are hours, minutes and seconds: only so do they go on evenly where a minute is full."""
     since, steps = since_midnight(values), np.diff(values)
     full = np.flatnonzero(steps - np.diff(since) > 1.0)
     if not np.isfinite(since).all() or not len(full):
@@ -501,7 +483,6 @@ def _is_time_of_day(values: Array) -> bool:
 
 
 def _is_coarse(t: Array) -> bool:
-    """Whether the steps of a rising clock differ as if it were rounded: they take few values, a quantum apart."""
     steps = np.diff(t)
     usual = float(np.median(steps))
     spread = float(np.percentile(np.abs(steps - usual), 90))
@@ -511,7 +492,7 @@ def _is_coarse(t: Array) -> bool:
 
 
 def _even_rate(t: Array) -> tuple[float, Array] | None:
-    """Return the step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
+    """The step [s] of even rows and their instants (N,) that explain a rounded clock; None if none does."""
     if len(t) < 20 or np.any(np.diff(t) < 0) or len(np.unique(t)) < 10:
         return None
     _values, first = np.unique(t, return_index=True)
@@ -539,7 +520,7 @@ def _even_rate(t: Array) -> tuple[float, Array] | None:
 
 
 def _roundest_number(value: float, slack: float) -> float:
-    """Return the number with the fewest digits within `slack` of a value, or one over such a number."""
+    """The number with the fewest digits within `slack` of a value, or one over such a number."""
     for digits in range(1, 7):
         near = float(f"{value:.{digits}g}")
         if abs(near - value) <= slack:
@@ -551,7 +532,6 @@ def _roundest_number(value: float, slack: float) -> float:
 
 
 def _is_row_counter(values: Array) -> bool:
-    """Whether a column only counts rows."""
     return bool(np.all(np.diff(values) == 1.0) and values[0] in (0.0, 1.0))
 
 
@@ -617,5 +597,5 @@ def _clock_fault(values: Array) -> str:
 
 
 def name_without_unit(name: str) -> str:
-    """Return a name in lower case without its unit in brackets."""
+    """A name in lower case without its unit in brackets."""
     return re.sub(r"[\[(].*", "", name).strip().lower().replace(" ", "_").replace("-", "_")

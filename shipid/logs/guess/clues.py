@@ -45,8 +45,7 @@ class Suggestion:
     """A guessed column of the dataset.
 
     name : column of the dataset. source, unit : column of the log, and its unit.
-    confidence : 0 to 1. evidence : the reason, in words.
-    extra : further keys of the mapping, such as `sign`.
+    confidence : 0 to 1. extra : further keys of the mapping, such as `sign`.
     """
 
     name: str
@@ -61,8 +60,7 @@ class Suggestion:
 class Clue:
     """A defect of the log, or a sign or unit that is easily mistaken.
 
-    kind : a few words, the same for all findings of this kind. columns : columns of the log that have it.
-    confidence : 0 to 1. sentence : what was seen, with numbers.
+    kind : a few words. columns : of the log. confidence : 0 to 1. sentence : what was seen, with numbers.
     repair : keys of a [[repair]] that would correct it; None if there is none.
     """
 
@@ -82,23 +80,17 @@ class Question:
 
 
 def unit_in_name(name: str, si: str) -> str | None:
-    """Return the unit in the name of a column; None if there is none, or none that converts to the SI unit `si`.
-
-    A unit is in brackets, or it is the last part or the last two parts of a name. It has no prefix: `factor_in_name`.
-    """
+    """The unit in a name, in brackets or at its end; None if there is none that converts to the SI unit `si`."""
     return _unit_and_factor(name, si)[0]
 
 
 def factor_in_name(name: str) -> float:
-    """Return what the prefix of a unit in a name multiplies it by, 1000 of `Engine [krpm]`; 1 where there is none."""
+    """What the prefix of a unit in a name multiplies it by, 1000 of `Engine [krpm]`; 1 where there is none."""
     return next((factor for si in ("rad", "rad/s", "rev/s") if (factor := _unit_and_factor(name, si)[1]) != 1.0), 1.0)
 
 
 def unknown_unit(name: str) -> str:
-    """Return what a name has in brackets where it looks like a unit and is none known here; empty where it does not.
-
-    A single letter is the name of a channel, but for volts, and a known or a longer word is a note.
-    """
+    """What a name has in brackets where it looks like a unit and is none known here; empty where it does not."""
     for text in map(str.strip, units_in_name(name)):
         known = is_known(without_prefix(text)[0]) or north_reference(text) or is_note(text)
         short = len(text) <= LONGEST_UNIT and (text == "V" or len(re.findall(r"[^\W\d_]", text)) > 1)
@@ -128,11 +120,7 @@ def _unit_and_factor(name: str, si: str) -> tuple[str | None, float]:
 
 
 def unit_of_another(name: str, meaning: str) -> str | None:
-    """Return the unit in a name where a column of this meaning cannot have it; None if it can, or no unit is there.
-
-    Only what is set off as a unit counts: in brackets, after a slash or a comma, or a unit of a shaft at the end. An
-    angle that steers may be in per cent of its largest one.
-    """
+    """The unit set off in a name where a column of this meaning cannot have it; None if it can, or none is there."""
     si = si_unit(meaning)
     if si not in UNITS or unit_in_name(name, si) is not None:
         return None
@@ -161,7 +149,7 @@ def names_another(name: str, meaning: str) -> bool:
 
 
 def si_unit(meaning: str) -> str:
-    """Return the SI unit of a meaning; empty for a quantity of no use."""
+    """The SI unit of a meaning; empty for a quantity of no use."""
     if meaning in SIGNALS:
         return SIGNALS[meaning].unit
     return INPUTS.get(meaning, {"x": "m", "y": "m", "": ""}.get(meaning, "m/s"))
@@ -176,18 +164,15 @@ def _may_be(scores: dict[str, float], meanings: tuple[str, ...]) -> bool:
 class State:
     """What the guess knows so far; each step of `guess` adds to it.
 
-    t : time [s], (N,). clock_unit : unit of the log's clock. columns : name -> values as logged, (N,).
-    chosen : windows over which changes are compared. taken : columns of the log that already have a meaning.
-    joined : whether t runs over several files, so that it is the clock of none of them.
-    spikes : column -> rows that leave it and come back at once, and the least by how much; `columns` have none of them.
-    scaled : column -> factor by which `columns` has it already, and why. units : column -> unit of the log, where
-    `columns` has it in another. sides : letters, N, S, E or W, that columns beside positions hold. negated : columns
-    whose sign `columns` has turned. words : columns that hold words, with their first.
-    other : columns that cannot be read, and why.
-    commands : names of those of the vessel that the log is of, where it is known.
-    turning : column that steers -> sign with which a positive value turns the ship to starboard, where that is seen.
-    astern : whether the ship goes astern nearly always. changed : columns of the dataset that seem to have another
-    unit or sign in a part of the log.
+    t : time [s], (N,). clock_unit : of the log. columns : name -> values as logged, (N,), without `spikes`.
+    chosen : windows over which changes are compared. taken : columns of the log that have a meaning.
+    joined : whether t runs over several files. spikes : column -> rows, and the least by how much they leave it.
+    scaled : column -> factor that `columns` has already, and why. units : column -> unit of the log where `columns` has
+    another. sides : letters that columns beside positions hold. negated : columns whose sign is turned.
+    words : columns of words, with their first. other : columns that cannot be read, and why.
+    commands : of the vessel, where it is known. turning : column that steers -> sign that turns the ship to starboard.
+    astern : whether the ship goes astern nearly always. changed : columns of the dataset with another unit or sign in a
+    part of the log.
     position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
@@ -219,7 +204,7 @@ class State:
     body: Complex | None = None
 
     def effect(self, r: Array, order: Array) -> float:
-        """Return the t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
+        """The t value of the effect of an order (N,) on the yaw rate r (N,) [rad/s], in parts of usual turns."""
         return order_effect(self.t, r, order, self.part)
 
     @property
@@ -228,10 +213,7 @@ class State:
         return PART * float(np.median(self.t[self.chosen.last] - self.t[self.chosen.first]))
 
     def command_of(self, name: str) -> str:
-        """Return the command of the vessel whose component and signal the name of a column says; empty if none does.
-
-        Nor where the vessel has one command of this signal alone: then it is that, whatever the name.
-        """
+        """The command of the vessel whose component and signal the name of a column says; empty if none does."""
         several = Counter(map(signal_of, self.commands))
         found = {
             command: how_much_says(name, command)
@@ -243,7 +225,7 @@ class State:
         return best[0] if most and len(best) == 1 else ""
 
     def side_of(self, name: str) -> str | None:
-        """Return the side or place in the name of a column; L and R are sides where the log has both."""
+        """The side or place in the name of a column; L and R are sides where the log has both."""
         parts = name_parts(name)
         for letter, other, side in (("l", "r", "port"), ("r", "l", "starboard")):
             twin = tuple(other if part == letter else part for part in parts)
@@ -252,15 +234,15 @@ class State:
         return side_in_name(name)
 
     def free(self) -> list[str]:
-        """Return the columns that have no meaning yet."""
+        """The columns that have no meaning yet."""
         return [name for name in self.columns if name not in self.taken]
 
     def called(self, meaning: str) -> list[str]:
-        """Return the free columns whose name fits this meaning, the best first."""
+        """The free columns whose name fits this meaning, the best first."""
         return self._fitting(meaning, self.free())
 
     def all_called(self, meaning: str) -> list[str]:
-        """Return all columns whose name fits this meaning, taken or free, the best first."""
+        """All columns whose name fits this meaning, taken or free, the best first."""
         return self._fitting(meaning, list(self.columns))
 
     def _fitting(self, meaning: str, names: list[str]) -> list[str]:
@@ -274,10 +256,7 @@ class State:
         return sorted(chosen, key=lambda name: -scores[name])
 
     def eligible(self, *meanings: str) -> list[str]:
-        """Return the free columns that may have one of these meanings, or any: they vary, and no name says otherwise.
-
-        A name that fits nothing, or a number, says nothing.
-        """
+        """The free columns that may have one of these meanings, or any: they vary, and no name says otherwise."""
         free = [name for name in self.free() if np.ptp(self.columns[name]) > 0 and not is_order(name)]
         if not meanings:
             return [name for name in free if meaning_scores(name).get("", 0.0) < STRONG]

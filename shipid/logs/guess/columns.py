@@ -1,7 +1,6 @@
 """Guess what the columns of an unknown log are, how sure that is, and what is wrong with them.
 
-The names of columns give candidates; kinematic tests decide between them, and override a name that misleads. What the
-log cannot decide is asked. A guess is a draft for a person to read. It corrects nothing.
+Names give candidates; kinematic tests decide between them. What the log cannot decide is asked.
 """
 
 from __future__ import annotations
@@ -74,7 +73,7 @@ class Guess:
         return self.source.sniffed
 
     def column(self, name: str) -> Suggestion | None:
-        """Return the suggestion for a column of the dataset; None if there is none."""
+        """The suggestion for a column of the dataset; None if there is none."""
         return next((column for column in self.columns if column.name == name), None)
 
     @property
@@ -88,16 +87,11 @@ def guess(
 ) -> Guess:
     """Guess the mapping of a log.
 
-    Parameters
-    ----------
     path : text, a workbook, Parquet, MATLAB or NMEA 0183; a folder or a glob of such files, one run each.
-    names : of the columns of a text log that has no header.
+    names : of the columns of a text log without a header. frame : of x, y and the heading, where a person knows it.
     vessel : whose names the commands take, and whose length says which speeds are possible.
-    frame : of x, y and the heading, where a person knows it.
 
-    Raises
-    ------
-    DataError : if the log cannot be read, has no clock, no heading or no position, or does not move as in that frame.
+    Raises DataError if the log cannot be read, has no clock, heading or position, or does not move as in that frame.
     """
     names = as_names("names", names, DataError)
     if vessel is not None:
@@ -167,7 +161,6 @@ def _ask_for_clock(state: State, name: str) -> None:
 
 
 def _report_run_parts(state: State, source: GuessFiles) -> None:
-    """Report how files of several runs are parted."""
     column, pause = source.parts.get("from"), source.parts.get("pause")
     said = [f"column {column!r} says them"] if column else []
     said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []

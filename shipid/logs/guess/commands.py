@@ -127,7 +127,6 @@ def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> boo
 
 
 def _ask_if_opposite(state: State) -> None:
-    """Ask where the angles of port and of starboard are seen to turn the ship to opposite sides."""
     angles = [one for one in state.suggestions if is_command(one.name) and one.source in state.turning]
     for port, starboard in product(angles, angles):
         sides = state.side_of(port.source), state.side_of(starboard.source)
@@ -138,10 +137,7 @@ def _ask_if_opposite(state: State) -> None:
 
 
 def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
-    """Ask where an angle that steers may be a share of its largest one, or has a unit that is not known.
-
-    unit : a guess. Returned is what its name says of that, in words; empty where it says nothing.
-    """
+    """Ask where an angle may be a share of its largest one, or has an unknown unit; what its name says of that."""
     top = float(np.abs(state.columns[name]).max())
     said = {text.strip().lower() for text in units_in_name(name)} | {*name_parts(name)[-1:], *re.findall("[%‰]", name)}
     for words, full in SHARES.items():
@@ -214,7 +210,7 @@ def _centre_angle(state: State, name: str, signal: str) -> bool:
 
 
 def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]]:
-    """Return the columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
+    """The columns whose names fit one of the signals best, and the signal: measured ones rather than orders."""
     orders: dict[str, tuple[float, str]] = {}
     for signal in signals:
         said = [name for name in state.free() if signal_of(state.command_of(name)) == signal]
@@ -260,7 +256,7 @@ def _is_small_angle(values: Array) -> bool:
 
 
 def _repeated_share(values: Array) -> float:
-    """Return the share of rows that repeat the value before (to 1/100 of the range), floored: orders are held."""
+    """The share of rows that repeat the value before (to 1/100 of the range), floored: orders are held."""
     return 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values)))
 
 
@@ -288,7 +284,6 @@ def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
 
 
 def _runs_astern(state: State, name: str) -> bool:
-    """Whether a shaft speed is negative nearly always when the ship goes ahead: one that counts the other way."""
     if state.psi is None or state.position is None:
         return False
     middle = (state.chosen.first + state.chosen.last) // 2
@@ -298,7 +293,7 @@ def _runs_astern(state: State, name: str) -> bool:
 
 
 def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
-    """Return the same as `_shaft_unit` of a screw that does not drive the ship: her way says nothing of its unit."""
+    """The same as `_shaft_unit` of a screw that does not drive the ship: her way says nothing of its unit."""
     top = float(np.abs(state.columns[name]).max())
     why = f"by its name; up to {top:.4g}"
     written = unit_in_name(name, "rev/s")
@@ -315,11 +310,7 @@ def _tunnel_unit(state: State, name: str) -> tuple[str, float, str, dict[str, An
 
 
 def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any]]:
-    """Return unit, confidence, reason and further keys of a shaft speed.
-
-    The distance of the ship in one turn of the shaft, relative to the radius of her turns, separates revolutions per
-    second from revolutions per minute, where both are possible. Nothing separates per cent from either.
-    """
+    """Unit, confidence, reason and further keys of a shaft speed, by the distance of the ship in one turn."""
     values = state.columns[name]
     top = float(np.abs(values).max())
     written = unit_in_name(name, "rev/s")
@@ -361,10 +352,7 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
 
 
 def _off_advance(state: State, values: Array, unit: str) -> float:
-    """Return how many times the way in a turn of the shaft, in turning radii, is off that of a usual ship.
-
-    Of the windows in which the shaft runs: a ship that drifts, coasts or lies at anchor says nothing of its unit.
-    """
+    """How many times the way in a turn of the shaft, in turning radii, is off that of a usual ship."""
     if state.psi is None or np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
         return np.inf
     shaft = np.abs(values[(state.chosen.first + state.chosen.last) // 2]) * to_si(unit, "propeller.n")
@@ -378,7 +366,7 @@ def _off_advance(state: State, values: Array, unit: str) -> float:
 
 
 def _hard_over(state: State) -> float:
-    """Return the larger rudder angles over that of a usual turn, at most 1: small ones turn the ship less."""
+    """The larger rudder angles over that of a usual turn, at most 1: small ones turn the ship less."""
     for column in state.suggestions:
         if column.name.endswith(".delta"):
             angle = np.abs(state.columns[column.source]) * to_si(column.unit, "rudder.delta")
@@ -387,7 +375,7 @@ def _hard_over(state: State) -> float:
 
 
 def likely_unit(state: State, name: str, signal: str) -> str:
-    """Return the unit of a column taken as this signal: the unit in its name, else the likely one by its magnitude."""
+    """The unit of a column taken as this signal: the unit in its name, else the likely one by its magnitude."""
     row = SIGNALS[signal]
     large = row.read_as_SI is not None and float(np.abs(state.columns[name]).max()) > row.read_as_SI
     written = unit_in_name(name, row.unit)
@@ -400,7 +388,7 @@ def likely_unit(state: State, name: str, signal: str) -> str:
 
 
 def _command_of_column(state: State, column: str, usual: str, used: dict[str, int]) -> str:
-    """Return the command that a column orders: that of the vessel which its name says, else the usual one."""
+    """The command that a column orders: that of the vessel which its name says, else the usual one."""
     said = state.command_of(column)
     if said:
         return said
@@ -410,7 +398,7 @@ def _command_of_column(state: State, column: str, usual: str, used: dict[str, in
 
 
 def unique_name(name: str, used: dict[str, int]) -> str:
-    """Return the name of a column, with a number after its component where it is used already."""
+    """The name of a column, with a number after its component where it is used already."""
     used[name] = used.get(name, 0) + 1
     component, _, signal = name.partition(".")
     new = name if used[name] == 1 else f"{component}_{used[name]}.{signal}"

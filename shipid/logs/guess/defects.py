@@ -119,10 +119,6 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
 
 
 def _piles_up(values: Array, limit: float) -> bool:
-    """Whether a signal (N,) stops at a limit: there are far more rows than near it, in several visits.
-
-    A rounded speed that is held has many rows at its largest value, but about as many next to it.
-    """
     near = np.abs(values - limit)
     levels = np.unique(near)
     if limit == 0 or len(levels) < LEVELS:
@@ -158,10 +154,7 @@ def defects_of_motion(state: State) -> None:
 
 
 def _ask_if_course(state: State) -> bool:
-    """Ask where the heading is a course over ground: the column of one has its values, or the track; whether it is so.
-
-    Sway and drift are 0 then. A course turns later than the ship, so that the yaw rate seems to lead.
-    """
+    """Ask where the heading is a course: the column of one has its values, or the track; whether it is so."""
     assert state.psi is not None
     place, heading = next((i, one) for i, one in enumerate(state.suggestions) if one.name == "psi")
     same = _same_as(state, heading.source)
@@ -200,17 +193,12 @@ def _same_as(state: State, heading: str) -> tuple[str, float] | None:
 
 
 def _value_step(values: Array) -> float:
-    """The least step between two values of a column."""
     steps = np.diff(np.unique(values))
     return float(steps.min()) if len(steps) else 0.0
 
 
 def _turns_with_track(state: State) -> bool:
-    """Whether the heading turns later than the yaw rate, and the track turns with it as with no heading in a turn.
-
-    A ship drifts by an angle that grows with her yaw rate: the track then leaves her heading by a time times that rate,
-    and so does the integral of the rate leave a course.
-    """
+    """Whether the heading turns later than the yaw rate, and the track turns with it as with no heading in a turn."""
     if state.r is None or state.position is None or state.psi is None:
         return False
     change = state.chosen.change
@@ -293,9 +281,9 @@ def _is_earth_fixed(state: State) -> bool:
 
 
 def _arm_or_delay(state: State, path: Complex) -> Complex:
-    """Report a position of another point of the ship than its velocities, or of another time: what explains more.
+    """Report a position of another point of the ship, or of another time: what explains more.
 
-    Returns the integrated velocities with this corrected, (N,), so that later tests do not report it again.
+    Returns the integrated velocities with this corrected, (N,).
     """
     assert state.position is not None
     assert state.psi is not None
@@ -341,8 +329,7 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
 def _steady_current(seen: Complex, ran: Complex) -> tuple[complex, float]:
     """The steady current [m/s], north + i east, that velocities lack, and its share of the misfit.
 
-    seen, ran : changes (W,) [m] of position and of integrated velocities over each window. Velocities lack it whole, or
-    a speed along the course over ground lacks what of it is along the course.
+    seen, ran : changes (W,) [m] of position and of integrated velocities over each window.
     """
     course = ran / np.maximum(np.abs(ran), 1e-9)
     before = float(np.sum(np.abs(seen - evidence.fit_scale(seen, ran).scale * ran) ** 2))
@@ -358,7 +345,6 @@ def _steady_current(seen: Complex, ran: Complex) -> tuple[complex, float]:
 
 
 def _signal_delay(state: State, seen: Array | Complex, integrated: Complex) -> Delay | None:
-    """Delay of a signal (N,) behind the integral of its rate; None where none is sure."""
     holes = np.flatnonzero(np.diff(state.t) > evidence.GAP * np.median(np.diff(state.t))) + 1
     parts = [np.split(values, holes) for values in (state.t, np.asarray(seen, dtype=complex), integrated)]
     delay = measure_delay(zip(*parts, strict=True))
@@ -407,7 +393,6 @@ def clock_text(state: State, t: float) -> str:
 
 
 def _report_heading_offset(state: State) -> None:
-    """Report a heading offset: by all courses, beside a steady current, or by the straightest runs."""
     assert state.psi is not None
     angle, error, current = _off_on_all_courses(state)
     if error < CLEAR:
@@ -434,8 +419,7 @@ def _report_heading_offset(state: State) -> None:
 def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
     """How far the heading is off [rad], its standard error, and a steady current, north + i east [m/s].
 
-    Over each window the way across the heading is tan(off) * (way along it) + arm * (turn) + (current across): a sway
-    in turns, an antenna and a late heading are an arm.
+    Over each window: way across the heading = tan(off) * (way along it) + arm * (turn) + (current across).
     """
     assert state.psi is not None
     assert state.position is not None
@@ -465,7 +449,6 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
 
 
 def _row_times(state: State, rows: NDArray[np.intp]) -> str:
-    """Where some rows are, in words: the first times, or how many in the files."""
     count = f"{len(rows)} row{'s' * (len(rows) > 1)}"
     if state.joined:
         return f"in {count} of the files"
@@ -502,10 +485,7 @@ def take_lost_fixes(state: State) -> None:
 
 
 def lost_fixes(values: Array) -> NDArray[np.bool_]:
-    """Rows (N,) of a latitude or longitude [deg] of exactly 0, 90 or 180 that is far from the rows before and after.
-
-    Where a ship crosses it, these are near it, or on both sides of it.
-    """
+    """Rows (N,) of a latitude or longitude [deg] of exactly 0, 90 or 180 that is far from the rows before and after."""
     lost = np.zeros(len(values), dtype=bool)
     for value in FILLS:
         hit = values == value
@@ -520,10 +500,7 @@ def lost_fixes(values: Array) -> NDArray[np.bool_]:
 
 
 def take_zeros(state: State) -> None:
-    """Interpolate, in place, a speed or heading of 0 between rows far from it: no ship stops or turns in one row.
-
-    Short ones count as spikes, of a speed up to `OFTEN` seconds; the others break the log.
-    """
+    """Interpolate, in place, a speed or heading of 0 between rows far from it: no ship stops or turns in one row."""
     t, unit = state.t, to_si(state.clock_unit, "t")
     step = float(np.median(np.diff(t)))
     speeds = [*state.called("speed"), *state.called("u")]

@@ -35,7 +35,7 @@ OF_WIND = "Is the wind true or apparent (relative = true), 'from' or 'towards'?"
 
 
 def draft_mapping(guess: Guess) -> str:
-    """Return the text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported."""
+    """The text of a mapping: columns with their confidence, repairs, and manoeuvres if it can be imported."""
     text = draft_text(guess)
     if guess.source.pattern is None and guess.file.stat().st_size > LARGE:
         return text + "\n# A large log: find its manoeuvres with `shipid data segment`.\n"
@@ -51,7 +51,7 @@ def draft_mapping(guess: Guess) -> str:
 
 
 def draft_text(guess: Guess) -> str:
-    """Return the text of a mapping that is neither tried nor cut into runs."""
+    """The text of a mapping that is neither tried nor cut into runs."""
     parts = [
         *_draft_head(guess),
         *_origin_lines(guess),
@@ -69,13 +69,13 @@ def draft_text(guess: Guess) -> str:
 
 
 def segment_log(mapping: Mapping, log: Path) -> list[Segment]:
-    """Return the manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
+    """The manoeuvres in the whole log of a mapping; segments of the mapping are ignored."""
     whole = mapping.model_copy(update={"segment": (), "resample": None})
     return cutting.find_manoeuvres(import_log(whole, log), to_si(mapping.clock.unit, "t"))
 
 
 def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
-    """Return segments as TOML, to be corrected by hand; `unit` is the unit of the log's clock."""
+    """Segments as TOML, to be corrected by hand; `unit` is the unit of the log's clock."""
     blocks = ["\n# Segmented by helm and heading: correct names, starts and ends, and remove what is no run."]
     segments = list(segments)
     dated = all(is_date(segment.start, unit) for segment in segments)  # whose times are seconds then
@@ -93,7 +93,7 @@ def segments_text(segments: Iterable[Segment], unit: str = "s") -> str:
 
 
 def clock_moment(value: float, unit: str) -> str:
-    """Return a moment on the log's clock as text: a date in UTC, or the number."""
+    """A moment on the log's clock as text: a date in UTC, or the number."""
     return format_date(value) if is_date(value, unit) else f"{value:.10g}"
 
 

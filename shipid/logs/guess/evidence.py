@@ -1,7 +1,7 @@
 """Kinematic tests on columns of unknown meaning: which columns fit together, in which unit, frame and sign.
 
-All tests compare changes over windows of a few seconds with integrals over the same windows, so that noise and
-resampling matter little. The plane is complex: north + i east, and a body vector turns by exp(i psi).
+Changes over windows of a few seconds are compared with integrals. The plane is north + i east; a body vector turns by
+exp(i psi).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class RowWindows:
     last: NDArray[np.intp]
 
     def change(self, values: NDArray[np.generic]) -> Complex:
-        """Return the change of a signal (N,) over each window, end minus start, (W,)."""
+        """The change of a signal (N,) over each window, end minus start, (W,)."""
         plane = np.asarray(values, dtype=np.complex128)
         return np.asarray(plane[self.last] - plane[self.first])
 
@@ -50,7 +50,7 @@ class Fit:
 
 
 def row_windows(t: Array, duration: float = WINDOW) -> RowWindows:
-    """Return windows of about `duration` [s] without a hole: at least `STEPS` rows, at most a fifth of the log."""
+    """Windows of about `duration` [s] without a hole: at least `STEPS` rows, at most a fifth of the log."""
     usual = float(np.median(np.diff(t)))
     duration = max(STEPS * usual, min(duration, (t[-1] - t[0]) / 5))
     first = np.arange(len(t))
@@ -65,7 +65,7 @@ def row_windows(t: Array, duration: float = WINDOW) -> RowWindows:
 
 
 def integrate_rate(t: Array, rate: NDArray[np.generic]) -> Complex:
-    """Return the integral of a real or complex rate (N,) from t[0] to each t [s], (N,)."""
+    """The integral of a real or complex rate (N,) from t[0] to each t [s], (N,)."""
     return cumulative_integral(t, np.real(rate)) + 1j * cumulative_integral(t, np.imag(rate))
 
 
@@ -90,10 +90,7 @@ def fit_scale(seen: Complex, integrated: Complex) -> Fit:
 
 
 def windows_without_outliers(seen: Complex, integrated: Complex) -> NDArray[np.bool_]:
-    """Return which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out.
-
-    What is usual say those in which something changes: a rounded heading of a straight course fits anything.
-    """
+    """Which windows have no outlier in their unexplained change, (W,): spikes and jumps are left out."""
     scale = fit_scale(seen, integrated).scale
     miss, size = np.abs(seen - scale * integrated), np.abs(integrated)
     moving = size >= LIVELY * np.percentile(size, 90)
@@ -101,7 +98,7 @@ def windows_without_outliers(seen: Complex, integrated: Complex) -> NDArray[np.b
 
 
 def course_agreement(track: Complex, psi: Array) -> complex:
-    """Return the mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
+    """The mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
     turned = track * np.exp(-1j * psi)
     size = float(np.sum(np.abs(turned)))
     return complex(np.sum(turned)) / size if size > 0 else 0j
@@ -110,8 +107,8 @@ def course_agreement(track: Complex, psi: Array) -> complex:
 def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Unwrap an angle that jumps at a whole turn; replace false samples within a jump.
 
-    Returns the angle in the unit of the log, (N,), and a mask of the steps of more than 20 deg that are no jump of a
-    whole turn. Steps over a hole in time t (N,) [s] are not in the mask.
+    Returns the angle in the unit of the log, (N,), and a mask of other steps of more than 20 deg, without those over a
+    hole in time t (N,) [s].
     """
     signed = np.diff(values) / turn
     steps = np.abs(signed)
@@ -131,9 +128,7 @@ def heal_angle(values: Array, turn: float, t: Array) -> tuple[Array, NDArray[np.
 
 
 def lever_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[complex, float, float]:
-    """Return the arm x + i y [m] from the point of the velocities to that of the positions.
-
-    Also its standard error [m], and the share of the misfit that it explains.
+    """The arm x + i y [m] from the point of velocities to that of positions, its standard error, its share of misfit.
 
     Least squares of seen - integrated = (x + i y) (exp(i psi) at the end - at the start).
     """
@@ -153,9 +148,9 @@ def lever_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[comp
 
 
 def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> float:
-    """Return the t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
+    """The t value of a in r' = a order + b r + c: > 0 if the order turns the ship to starboard.
 
-    t, r, order : (N,), r [rad/s]. duration : of the windows over which changes are compared [s].
+    t, r, order : (N,), r [rad/s]. duration : of the windows [s].
     """
     rows, design, change = yaw_regression(t, r, order, duration)
     if len(rows) < 12 or np.ptp(order) == 0.0:
@@ -165,10 +160,7 @@ def order_effect(t: Array, r: Array, order: Array, duration: float = 4.0) -> flo
 
 
 def yaw_regression(t: Array, r: Array, order: Array, duration: float) -> tuple[NDArray[np.intp], Array, Array]:
-    """Return first rows (W,), columns (W, 3) and left side (W,) of r' = a order + b r + c over windows.
-
-    Without those in which the rate is far from all else: a heading that stood still jumps when it goes on.
-    """
+    """First rows (W,), columns (W, 3), left side (W,) of r' = a order + b r + c over windows without jumps of r."""
     chosen = row_windows(t, duration)
     thin = max(1, len(chosen.first) // 400)
     chosen = RowWindows(chosen.first[::thin], chosen.last[::thin])
@@ -185,7 +177,7 @@ def yaw_regression(t: Array, r: Array, order: Array, duration: float) -> tuple[N
 
 
 def solve_least_squares(design: Array, change: Array) -> tuple[Array, Array, float]:
-    """Return the solution (K,) by least squares, its standard errors, and the sum of squares left, inf if none is."""
+    """The solution (K,) by least squares, its standard errors, and the sum of squares left, inf if none is."""
     sizes = np.linalg.norm(design, axis=0)
     none = np.zeros(len(sizes)), np.full(len(sizes), np.inf), np.inf
     if not np.all(sizes > 0):
@@ -200,10 +192,7 @@ def solve_least_squares(design: Array, change: Array) -> tuple[Array, Array, flo
 
 
 def order_correlation(t: Array, r: Array, order: Array, duration: float) -> float:
-    """Return the correlation of the yaw rate with an order some time before, at the delay where it is largest.
-
-    The delay is at most `duration` [s]; the correlation is not centred, for helm amidships gives no yaw rate.
-    """
+    """The uncentred correlation of the yaw rate with an order at most `duration` [s] before, where it is largest."""
     usual = float(np.median(np.diff(t)))
     width = max(1, round(duration / 4 / usual))
     smooth_r, smooth_order = (_moving_mean(values - np.median(values), width) for values in (r, order))
@@ -217,22 +206,19 @@ def order_correlation(t: Array, r: Array, order: Array, duration: float) -> floa
 
 
 def _moving_mean(values: Array, width: int, stretch: NDArray[np.int_] | None = None) -> Array:
-    """Return the centred mean over `width` rows, of fewer at the ends of the log, or of each stretch (N,), (N,)."""
+    """The centred mean over `width` rows, of fewer at the ends of the log, or of each stretch (N,), (N,)."""
     series = pd.Series(values)
     rows = series if stretch is None else series.groupby(stretch)
     return np.asarray(rows.rolling(width, center=True, min_periods=1).mean())
 
 
 def _stretch_numbers(t: Array) -> NDArray[np.int_]:
-    """Return the number of the stretch without a hole that each row at t (N,) [s] is in."""
+    """The number of the stretch without a hole that each row at t (N,) [s] is in."""
     return np.append(0, np.cumsum(np.diff(t) > GAP * np.median(np.diff(t))))
 
 
 def position_jumps(t: Array, position: Complex, integrated: Complex) -> list[tuple[float, float, float]]:
-    """Return where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m]).
-
-    Each lies between two holes of the clock: what a ship did in a hole, or between two files, is no jump.
-    """
+    """Where a position leaves its integrated velocity in one step: (start [s], end [s], lasting error [m])."""
     usual = float(np.median(np.diff(t)))
     reach = max(1, round(2.0 / usual))
     if len(t) < 20 * reach:
@@ -262,7 +248,7 @@ def _complex_median(points: Complex) -> complex:
 
 
 def straight_rows(r: Array, t: Array) -> NDArray[np.bool_]:
-    """Return the rows of the straightest parts, where the ship hardly turns for half a minute."""
+    """The rows of the straightest parts, where the ship hardly turns for half a minute."""
     usual = float(np.median(np.diff(t)))
     width = max(3, round(30.0 / usual))
     calm = pd.Series(np.abs(r)).rolling(width, center=True, min_periods=width // 2).max().to_numpy()
@@ -270,13 +256,13 @@ def straight_rows(r: Array, t: Array) -> NDArray[np.bool_]:
 
 
 def maximum_visits(values: Array) -> int:
-    """Return how often a signal reaches its largest value."""
+    """How often a signal reaches its largest value."""
     top = values == values.max()
     return int(np.sum(np.diff(top.astype(int)) == 1))
 
 
 def interpolated_share(values: Array) -> float:
-    """Return the share of rows exactly on the line between their neighbours, among rows where a value changes."""
+    """The share of rows exactly on the line between their neighbours, among rows where a value changes."""
     first, second = np.diff(values), np.diff(values, 2)
     moving = (first[1:] != 0.0) & (first[:-1] != 0.0)
     quantum = np.min(np.abs(first[first != 0.0])) if np.any(first != 0.0) else 0.0
@@ -287,11 +273,10 @@ def interpolated_share(values: Array) -> float:
 
 
 def value_lattice(values: Array, low: float, high: float) -> tuple[float, float, int]:
-    """Return the multiplier in [low, high] that makes values round, how well (0 to 1), and the number of values used.
+    """The multiplier in [low, high] that makes values round, how well (0 to 1), and the number of values used.
 
-    Instruments round, and the rounding survives a conversion: R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x
-    are whole multiples of the quantum, and about N^-1/2 else. Only values that are equal in two rows are used,
-    because interpolation has not changed them; if they are few, all values are used.
+    R(k) = |mean exp(2 pi i k x / quantum)| is 1 if all k x are whole multiples of the quantum, about N^-1/2 else.
+    Values equal in two rows are used, for these are not interpolated; if they are few, all.
     """
     still = np.unique(values[1:][np.diff(values) == 0.0])[:400]
     asked = still if len(still) >= FEW else np.unique(values)[:400]
@@ -317,12 +302,11 @@ def _roundness_of(values: Array, multipliers: Array, quantum: float) -> Array:
 
 
 def spike_rows(values: Array) -> NDArray[np.bool_]:
-    """Return the rows (N,) of a signal that leave it and come back within two rows, as no ship and no order does.
+    """The rows (N,) of a signal that leave it and come back within two rows, as no ship and no order does.
 
-    They leave the median of five rows by more than all else the signal ever does, or, of a signal that moves in most
-    rows, by more than 0.02 of its range. In both cases that is far more than nine in ten of the rows around do, and
-    than the signal steps there from row to row; the rows before and after agree. An angle that counts from 0 again, and
-    a signal with more than one such row in fifty, has none, but where all have one value, as where it stands for none.
+    They leave the median of five rows by more than all else ever does, or by 0.02 of the range of a signal that moves
+    in most rows, and by far more than nine in ten of the rows around. An angle that counts from 0 again, and a signal
+    with more than one such row in fifty, has none, but where all have one value.
     """
     result = _plain_spike_rows(values, values)
     for turn in TURNS:
@@ -376,7 +360,7 @@ def row_spans(rows: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def fill_columns(t: Array, columns: Iterable[tuple[str, Array]]) -> dict[str, Array]:
-    """Return the columns with missing values interpolated in time; good enough for these tests, not for a dataset."""
+    """The columns with missing values interpolated in time; good enough for these tests, not for a dataset."""
     result = {}
     for name, values in columns:
         known = np.isfinite(values)
@@ -397,7 +381,7 @@ def _fill_column(t: Array, values: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
-    """Return the length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
+    """The length of windows [s] for this ship: about a radian of her usual turning, `WINDOW` at most.
 
     t (N,) [s], psi (N,) [rad].
     """
@@ -410,8 +394,7 @@ def window_length(t: Array, psi: Array, chosen: RowWindows) -> float:
 def fit_with_arm(seen: Complex, integrated: Complex, turned: Complex) -> tuple[Fit, complex]:
     """Fit seen = scale * integrated + arm * turned by least squares: the fit, and the arm x + i y [m].
 
-    turned : change of exp(i psi) over each window. An arm between the points of position and velocity is a free
-    unknown, so that it does not pass for a velocity.
+    turned : change of exp(i psi) over each window.
     """
     total = float(np.sum(np.abs(seen) ** 2))
     columns = np.stack([integrated, turned, 1j * turned], axis=1)

@@ -88,7 +88,6 @@ def _report_unsure(
 
 
 def _fault_places(state: State, some: list[CommandFault], t: Array) -> str:
-    """Where lapses are, in words: how many rows, how many places, and the first times."""
     count = sum(lapse.end - lapse.first for lapse in some)
     words = f"in {count} row{'s' * (count > 1)} at {len(some)} place{'s' * (len(some) > 1)}"
     if state.joined:

@@ -45,11 +45,9 @@ _UNIT = re.compile(
 
 
 def guess_format(head: bytes, file: Path, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return the keys of [format] of a log by its first bytes; `names` are its columns if it is text without a header.
+    """Keys of [format] of a log by its first bytes; `names` are its columns if it is text without a header.
 
-    Raises
-    ------
-    DataError : it is of a kind that no reader reads, or no table.
+    Raises DataError where no reader reads it, or it is no table.
     """
     other = foreign_format(head)
     if other is not None:
@@ -83,7 +81,6 @@ def format_of_sheet(file: Path, names: tuple[str, ...]) -> tuple[dict[str, Any],
 
 
 def _has_clock(lines: str) -> bool:
-    """Whether one of the first lines of a sheet has the name of a clock in a cell."""
     first = lines.split("\n", LOOKED_AT)[:LOOKED_AT]
     return any(
         is_clock(cell) for line in first for cell in split_cells(line, SEPARATOR) if cell and not _is_number(cell)
@@ -117,7 +114,7 @@ def _guess_encoding(head: bytes, file: Path) -> str:
 def _text_format(
     lines: list[str], encoding: str, file: Path, names: tuple[str, ...], separators: tuple[str, ...] = SEPARATORS
 ) -> dict[str, Any]:
-    """Return the keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
+    """The keys of [format] of a text, or of a sheet, by its first lines; the header is above the data."""
     for line, sign in itertools.product(lines, separators):
         check_width(len(line.split()) if sign == "whitespace" else line.count(sign) + 1, file)
     score, separator, decimal, mark = _guess_marks(lines, separators)
@@ -179,10 +176,7 @@ def _text_format(
 
 
 def _guess_marks(lines: list[str], separators: tuple[str, ...]) -> tuple[float, str, str, str | None]:
-    """Return the separator, decimal sign and mark of thousands that give most numbers in lines of equal length.
-
-    Before them stands their share of numbers, less for lines of another length; 0 where there are none.
-    """
+    """Share of numbers, separator, decimal sign, mark of thousands that give most numbers in lines of equal length."""
     best: tuple[float, str, str, str | None] = (0.0, "", "", None)
     alike = 0  # lines of one length with the best
     quoted = any('"' in line for line in lines)  # between quotes a decimal comma separates nothing
@@ -220,11 +214,7 @@ def _refuse_long(rows: list[list[str]], file: Path) -> None:
 
 
 def _header_above(heads: list[list[str]]) -> list[str]:
-    """Return the names that lines above the data give the columns, the nearest line first; none where that one has all.
-
-    A line of units goes behind the names. Of two others the line is taken that names most quantities, or both: the
-    upper one has groups, such as GPS, over the first of their columns.
-    """
+    """The names that lines above the data give the columns, the nearest first; none where that one has all."""
     units = next((row for row in heads if _is_units(row)), None) if len(heads) > 1 else None
     lines = [row for row in heads if row is not units][:2]
     if not lines:
@@ -248,7 +238,6 @@ def _header_above(heads: list[list[str]]) -> list[str]:
 
 
 def _header_meaning(names: list[str]) -> float:
-    """How much the names of columns say: the sum of how well they fit a quantity, or a clock."""
     known = {name for name in names if name}
     return sum(
         1.0 if is_clock(name) else max([0.0, *(meaning_scores(name)[one] for one in meaning_scores(name) if one)])
@@ -257,12 +246,10 @@ def _header_meaning(names: list[str]) -> float:
 
 
 def _with_unit(name: str, unit: str) -> str:
-    """Return a name with its unit in brackets."""
     return f"{name} [{unit.strip('[]()')}]" if unit else name
 
 
 def _date_and_time(row: list[str]) -> int | None:
-    """Return the index of a cell that is a date before a time of day; None where there is none."""
     pairs = enumerate(itertools.pairwise(row))
     return next(
         (k for k, (one, other) in pairs if re.fullmatch(DAY_OF, one) and re.fullmatch(TIME_OF_DAY, other)), None
@@ -270,7 +257,7 @@ def _date_and_time(row: list[str]) -> int | None:
 
 
 def _distinct_columns(names: list[str]) -> list[str]:
-    """Return the names with a number added to those that are there already or empty."""
+    """The names with a number added to those that are there already or empty."""
     result: list[str] = []
     for index, name in enumerate(names):
         known = name or f"column {index + 1}"
@@ -281,7 +268,6 @@ def _distinct_columns(names: list[str]) -> list[str]:
 
 
 def _is_units(row: list[str]) -> bool:
-    """Whether the cells of a line are units."""
     words = [cell.lower() for cell in row if cell]
     fitting = sum(bool(_UNIT.match(cell)) for cell in words)
     return len(words) >= 2 and fitting >= 0.7 * len(words)
@@ -299,10 +285,7 @@ def split_cells(line: str, separator: str) -> list[str]:
 
 
 def _thousands_mark(rows: list[list[str]], decimal: str) -> str | None:
-    """Return the mark of thousands in the cells of lines, where all cells with that mark are numbers in groups.
-
-    1,800 alone may be 1.8: it is 1800 where another number has a decimal point.
-    """
+    """The mark of thousands in the cells of lines, where all cells with that mark are numbers in groups."""
     held = {cell for row in rows for cell in row if re.fullmatch(r"[+-]?\d[\d.,'’ \u00a0\u202f]*", cell)}
     held = {cell for cell in held if not re.fullmatch(DAY_OF, cell)}
     whole = any(re.fullmatch(rf"[+-]?\d+{re.escape(decimal)}(\d{{1,2}}|\d{{4,}})", cell) for cell in held)
@@ -316,10 +299,7 @@ def _thousands_mark(rows: list[list[str]], decimal: str) -> str | None:
 
 
 def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | None) -> list[int]:
-    """Places of a line's cells that hold numbers in most lines where they hold anything; all where none do.
-
-    Words beside the first lines, such as the weather, are in other cells.
-    """
+    """Places of a line's cells that hold numbers in most lines where they hold anything; all where none do."""
     found = []
     for place in range(len(rows[0])):
         column = [row[place] for row in rows]
@@ -329,7 +309,6 @@ def _places_of_numbers(rows: list[list[str]], decimal: str, thousands: str | Non
 
 
 def _number_share(row: list[str], decimal: str, thousands: str | None = None) -> float:
-    """Return the share of cells that are numbers, with a unit or without, or positions; empty ones are not counted."""
     cells = [cell for cell in row if not NO_VALUE.fullmatch(cell.lower())]
     grouped = re.compile(grouped_number(decimal, thousands)) if thousands is not None else None
     cells = [cell.replace(str(thousands), "") if grouped and grouped.fullmatch(cell) else cell for cell in cells]
@@ -347,11 +326,7 @@ def _is_number(cell: str) -> bool:
 
 
 def table_below(lines: str, form: TextFormat, missing: Iterable[str]) -> tuple[int, str] | None:
-    """Number, from 1, and first text of the line that begins another table; None where none does.
-
-    It has words and no number, and lines above it, below the header, have some. An empty line is before it, or it is
-    another header: it has as many cells as the line with numbers below it.
-    """
+    """Number, from 1, and first text of the line that begins another table; None where none does."""
     empty, rows, header = False, 0, [""]
     last: tuple[int, list[str]] = 0, []
     for number, line in enumerate(lines.splitlines(), 1):

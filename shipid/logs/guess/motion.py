@@ -108,11 +108,7 @@ def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
 
 
 def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
-    """Return the hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn.
-
-    The position may be of another point than the velocities, which looks like a sway speed. Where the track is
-    no evidence, v r < 0 decides: a ship drifts out of her turn. If the two contradict, the draft asks.
-    """
+    """The hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn, v r < 0."""
     assert state.psi is not None
     if best.frame == "earth":
         return best
@@ -153,7 +149,7 @@ def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen
 
 
 def _window_means(state: State, values: Array) -> Array:
-    """Return a signal as means over the windows, less its mean, (W,)."""
+    """A signal as means over the windows, less its mean, (W,)."""
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     means = state.chosen.change(evidence.integrate_rate(state.t, values)).real / span
     return np.asarray(means - np.mean(means))
@@ -216,7 +212,7 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
 
 
 def _fitted_speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: bool = False) -> tuple[str, bool]:
-    """Return the unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
+    """The unit nearest to the fitted scale, and whether a factor remains; report another unit in the name."""
     units = UNITS["m/s"]
     unit = min(PLAIN, key=lambda name: abs(np.log(max(fit.scale, 1e-9) / units[name])))
     written = unit_in_name(sources[0], "m/s")
@@ -250,13 +246,12 @@ def _fitted_speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: 
 
 
 def _is_speed_unit(scale: float) -> bool:
-    """Whether a scale is nearly that of a unit of speed."""
     away = {unit: abs(scale / factor - 1) for unit, factor in UNITS["m/s"].items()}
     return any(distance < (OFF_UNIT if unit in PLAIN else OFF_RARE) for unit, distance in away.items())
 
 
 def _clock_unit(state: State, ratio: float) -> str | None:
-    """Return the unit of the clock with which the track would be the integral, if it is `ratio` times the integral."""
+    """The unit of the clock with which the track would be the integral, if it is `ratio` times the integral."""
     if state.clock_unit == "date":
         return None
     now = DAY if is_dated(state.clock_unit) else to_si(state.clock_unit, "t")
@@ -267,7 +262,6 @@ def _clock_unit(state: State, ratio: float) -> str | None:
 def _report_factor(
     state: State, remains: bool, fit: Fit, sources: tuple[str, ...], unit: str, columns: tuple[str, ...] = ("u", "v")
 ) -> None:
-    """Report a factor that remains after the unit: shown by the rounding of the values, or larger than its error."""
     pair = " and ".join(repr(source) for source in sources)
     begins = f"the track is {fit.scale:.4g} times the integral of {pair} in {unit}"
     if (other := _clock_unit(state, fit.scale)) is not None:
@@ -355,11 +349,7 @@ def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
 
 
 def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
-    """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course.
-
-    fit : of the track (W,) `seen` with the course. A ship drifts out of her turn, and so a course that is late does not
-    look so.
-    """
+    """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course."""
     assert state.psi is not None
     assert state.body is not None
     change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * state.psi)))
@@ -379,12 +369,7 @@ def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str
 def _as_track(
     state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg", along: str = ""
 ) -> tuple[Fit, Complex]:
-    """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it.
-
-    The north of a map, or of a compass, is another one; velocities `along` a heading are turned where it is off. Where
-    the ship turns, a position that is late, or of another point, is turned, too, by as much as she turns. On a straight
-    way a current may turn the track.
-    """
+    """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it."""
     assert state.position is not None
     assert state.psi is not None
     seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, velocity)))
@@ -416,7 +401,7 @@ def _as_track(
 
 
 def ship_pace(state: State) -> tuple[float, float]:
-    """Return how fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
+    """How fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
     assert state.position is not None
     assert state.psi is not None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
@@ -432,10 +417,7 @@ def is_possible(state: State, length: float = np.inf) -> bool:
 
 
 def check_clock(state: State, length: float = np.inf) -> None:
-    """Ask for the unit of the clock where no ship goes so fast, or so slowly, and no velocity has said so already.
-
-    length : of the ship [m], where it is known. A slow model whose clock is in minutes goes as a fast ship does.
-    """
+    """Ask for the unit of the clock where no ship goes so fast, or so slowly. length : of the ship [m], if known."""
     if any("t" in question.about for question in state.questions) or _ask_clock_by_speed(state):
         return
     if is_possible(state, length):
@@ -518,10 +500,6 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
 
 
 def _take_ais(state: State, change: Complex, name: str) -> None:
-    """Decode, in place, a rate of turn that is in numbers of AIS: so its integral is the heading, and not as it is.
-
-    change : of the heading over the windows [rad], (W,).
-    """
     coded = state.columns[name]
     if unit_in_name(name, "rad/s") is not None or np.abs(coded).max() > 128 or np.mean(coded % 1 == 0) < WHOLE:
         return
@@ -546,9 +524,9 @@ def _take_ais(state: State, change: Complex, name: str) -> None:
 
 
 def _rate_candidates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:
-    """Return the columns whose integral resembles the heading, the best first: fit, name, unit, how far off the unit.
+    """The columns whose integral resembles the heading, the best first: fit, name, unit, relative distance from it.
 
-    change : of the heading over the windows [rad], (W,). The distance from the unit is relative.
+    change : of the heading over the windows [rad], (W,).
     """
     rates = []
     for name in names:

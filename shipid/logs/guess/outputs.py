@@ -40,7 +40,6 @@ def suggest_outputs(state: State, chosen: dict[str, str]) -> None:
 
 
 def _output_component(state: State, signal: str) -> str:
-    """Component of the only shaft, or of the only angle, in the draft; else that of the signal."""
     usual = SIGNALS[signal].component
     commands = [
         one.name for one in state.suggestions if (row := signal_row(one.name)) is not None and row.role == "command"

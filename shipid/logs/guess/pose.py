@@ -50,8 +50,8 @@ class Pose:
     """A hypothesis: columns of position and heading, and how course and heading agree.
 
     same, mirrored : mean of exp(i (course - psi)) and of exp(i (course + psi)). cost : misfit, less for fitting names.
-    settled : what shows the frame: a column of a course or of a velocity, or a person; empty where nothing does.
-    east_sign : -1 where the second axis is to the west. counts : sign of the heading that a person gave, else 0.
+    settled : what shows the frame; empty where nothing does. east_sign : -1 where the second axis is to the west.
+    counts : sign of the heading that a person gave, else 0.
     """
 
     north: str
@@ -73,10 +73,9 @@ class Pose:
 
 
 def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
-    """Choose position and heading, in the frame of the log where it is known.
+    """Choose position and heading, in the frame of the log where it is known; names that fit are tried first.
 
-    Names that fit are tried first; where they fit badly or are not there, all columns are. Raises DataError if no
-    column can be a position or a heading, or if the ship does not move as in that frame.
+    Raises DataError if no column can be one of them, or if the ship does not move as in that frame.
     """
     _refuse_ecef(state, file)
     pairs = list(_position_pairs(state))
@@ -186,11 +185,11 @@ def _ask_for_second(state: State, best: Pose, headings: list[str]) -> None:
 
 
 def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
-    """Return a hypothesis in the frame that a person gives.
+    """A hypothesis in the frame that a person gives.
 
     ned : x north, y east, heading clockwise from north. enu : x east, y north, heading clockwise from north.
     zup : z upwards: y and the heading count to port of x. ros : x east, y north, heading counter-clockwise from east.
-    Raises DataError where positions are on the globe, or where the ship does not move as in that frame.
+    Raises DataError where positions are on the globe, or where the ship does not move so.
     """
     if best.on_globe:
         raise DataError("latitude and longitude have no other frame: leave it out", file=file, path="--frame")
@@ -210,10 +209,6 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
 
 
 def _by_course(state: State, best: Pose) -> Pose:
-    """Return the hypothesis in the frame of a course over ground, which counts clockwise from north by its nature.
-
-    A track in x and y and a yaw angle have a mirror image of the same motion; a logged course has none.
-    """
     track = state.chosen.change(local_plane(state, best.north, best.east, on_globe=False))
     size = float(np.sum(np.abs(track)))
     middle = (state.chosen.first + state.chosen.last) // 2
@@ -240,11 +235,6 @@ def _by_course(state: State, best: Pose) -> Pose:
 
 
 def _by_velocities(state: State, best: Pose) -> Pose:
-    """Return the hypothesis in the frame of velocities named north and east, whose integral is the track.
-
-    Letters say less than these words: many teams write x0 for east. Where the integral is the track as it is, or fits
-    no frame, nothing is settled.
-    """
     pairs = [
         (north, east)
         for north in state.called("velocity_north")
@@ -311,10 +301,9 @@ def _best_pose(
     limit: int = 400,
     rated: dict[str, float] | None = None,
 ) -> Pose | None:
-    """Return the hypothesis of least cost among pairs of position and columns of heading, in degrees or radians.
+    """The hypothesis of least cost among pairs of position and columns of heading, in degrees or radians.
 
-    A misfit counts against the spread of the heading: a track that hardly turns agrees with any constant. `rated` is
-    what another column, integrated, leaves unexplained of a heading.
+    A misfit counts against the spread of the heading. rated : what another column, integrated, leaves of it.
     """
     middle = (state.chosen.first + state.chosen.last) // 2
     thin = max(1, len(middle) // limit)
@@ -350,14 +339,12 @@ def _best_pose(
 
 
 def _is_in_deg(name: str, values: Array) -> bool:
-    """Whether a column of a compass takes all angles of a turn in degrees, and its name says no other unit."""
     low, high = float(values.min()), float(values.max())
     whole = (0.0 <= low < FIRST and LAST < high <= 360.0) or (-180.0 <= low < FIRST - 180 and LAST - 180 < high <= 180)
     return whole and _is_compass(name) and unit_in_name(name, "rad") is None
 
 
 def _search_pose(state: State, pairs: list[tuple[str, str, bool, float]], headings: list[str]) -> Pose | None:
-    """Return the best hypothesis among all columns, names apart; a heading is rather one whose rate is a column."""
     meanings = ("north", "east", "x", "y", "latitude", "longitude", "psi")
     free = [name for name in state.eligible(*meanings) if len(np.unique(state.columns[name][:2000])) > 10][:SEARCHED]
     rated = _columns_with_rate(state, free)
@@ -389,7 +376,6 @@ def _search_pose(state: State, pairs: list[tuple[str, str, bool, float]], headin
 
 
 def _may_be_globe(state: State, north: str, east: str) -> bool:
-    """Whether two columns without names may be latitude and longitude: small changes about a place on the Earth."""
     a, b = state.columns[north], state.columns[east]
     if (
         not _named_as_latitude(state, north, east)
@@ -402,7 +388,7 @@ def _may_be_globe(state: State, north: str, east: str) -> bool:
 
 
 def _columns_with_rate(state: State, names: list[str]) -> dict[str, float]:
-    """Return the columns whose rate is another column, with the share of their change that it leaves unexplained."""
+    """The columns whose rate is another column, with the share of their change that it leaves unexplained."""
     integrated = {}
     others = state.eligible()
     integrals = {name: state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])) for name in others}
@@ -417,7 +403,7 @@ def _columns_with_rate(state: State, names: list[str]) -> dict[str, float]:
 
 
 def _unwrap_column(values: Array, t: Array) -> Array:
-    """Return a column that jumps at a whole turn, in degrees or radians, without its jumps; others as they are."""
+    """A column that jumps at a whole turn, in degrees or radians, without its jumps; others as they are."""
     steps = np.abs(np.diff(values))
     for turn in (360.0, 2 * np.pi):
         if np.ptp(values) <= 1.01 * turn and np.any(steps > 0.8 * turn) and np.median(steps) < 0.1 * turn:
@@ -426,10 +412,7 @@ def _unwrap_column(values: Array, t: Array) -> Array:
 
 
 def local_plane(state: State, north: str, east: str, on_globe: bool) -> Complex:
-    """Return a position as north + i east [m], in the plane that touches the Earth at the first one.
-
-    Where the meridians are not parallel to its own, the way from row to row is along them.
-    """
+    """A position as north + i east [m], in the plane that touches the Earth at the first one."""
     a, b = state.columns[north], state.columns[east]
     if not on_globe:
         return np.asarray(a + 1j * b)
@@ -547,7 +530,7 @@ def _read_heading(state: State, best: Pose, psi: Array, mirrored: bool, clear: b
 
 
 def _pose_by_names(state: State, best: Pose) -> Pose:
-    """Return a hypothesis whose track says nothing of the heading, as of a moored ship, as the names have it."""
+    """A hypothesis whose track says nothing of the heading, as of a moored ship, as the names have it."""
     if state.numbered or best.settled:
         return best
     large = float(np.abs(state.columns[best.heading]).max()) > 2.2 * np.pi
@@ -571,10 +554,7 @@ def _of_astern(state: State, best: Pose, psi: Array, quarter: int) -> int:
 
 
 def _astern_reason(state: State, best: Pose, psi: Array) -> str:
-    """Why a ship whose heading psi (N,) [rad] points against her track goes astern; empty where nothing says so.
-
-    The speed along the heading gives the track as it is; or the shaft turns astern when she moves.
-    """
+    """Why a ship whose heading psi (N,) [rad] points against her track goes astern; empty where nothing says so."""
     track = state.chosen.change(local_plane(state, best.north, best.east, best.on_globe))
     for name in state.called("u"):
         change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[name] * np.exp(1j * psi)))
@@ -610,10 +590,7 @@ def _follows_course(state: State, best: Pose) -> bool:
 
 
 def _sign_by_compass(state: State, best: Pose) -> Pose:
-    """Return the hypothesis with the sign of latitude and longitude with which a compass agrees with the track.
-
-    A ship in the west whose longitude has no sign seems to turn the other way, and one in the south goes astern, too.
-    """
+    """The hypothesis with the signs of latitude and longitude with which a compass agrees with the track."""
     mirrored = abs(best.mirrored) > abs(best.same)
     phase = abs(float(np.angle(best.mirrored if mirrored else best.same)))
     if not best.on_globe or not _is_compass(best.heading) or best.misfit > POOR:
@@ -647,7 +624,7 @@ def _sign_by_compass(state: State, best: Pose) -> Pose:
 
 
 def _other_way(state: State, best: Pose) -> Pose:
-    """Return the hypothesis with latitude and longitude changed round where only so a compass agrees with the track."""
+    """The hypothesis with latitude and longitude changed round where only so a compass agrees with the track."""
     if not best.on_globe or not _is_compass(best.heading) or abs(best.mirrored) <= abs(best.same):
         return best
     if not _named_as_latitude(state, best.east, best.north):
@@ -667,7 +644,7 @@ def _other_way(state: State, best: Pose) -> Pose:
 
 
 def _length_unit(north: str, east: str) -> str:
-    """Return the unit of length that both names say, else metres."""
+    """The unit of length that both names say, else metres."""
     units = {unit_in_name(name, "m") for name in (north, east)}
     unit = units.pop() if len(units) == 1 else None
     return "m" if unit is None else unit

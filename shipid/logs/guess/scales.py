@@ -1,7 +1,4 @@
-"""Angles and positions in numbers that are no degrees: gon, hundredths of a degree, 1e-7 degrees, degrees and minutes.
-
-Their columns are turned into degrees before anything else is judged. The draft then has a factor, or the unit `ddmm`.
-"""
+"""Angles and positions in numbers that are no degrees (gon, 1e-7 degrees, degrees and minutes), turned into degrees."""
 
 from __future__ import annotations
 
@@ -141,10 +138,7 @@ def _angle_fraction(state: State, north: str, east: str) -> float:
 def _position_unit_by_speed(
     state: State, north: str, east: str, parts: list[float]
 ) -> tuple[str, float, float, float] | None:
-    """Of the sizes [deg] that the unit of a position may have, those nearest to a speed; None where there is no speed.
-
-    Returned are the column of the speed, the best and the next one, and how far off the best is, in parts of the next.
-    """
+    """Column of a speed, the sizes [deg] of the unit of a position best and next to it, and their relative distance."""
     way = {fine: _distance_run(state, *(fine * state.columns[name] for name in (north, east))) for fine in parts}
     for name in [*state.called("speed"), *state.called("u")]:
         ran = state.chosen.change(np.cumsum(np.abs(state.columns[name]) * np.gradient(state.t)))
@@ -193,10 +187,7 @@ def _distance_run(state: State, latitude: Array, longitude: Array) -> float:
 
 
 def _by_track(state: State) -> None:
-    """Find a heading or course that never jumps and has no unit, in parts of a turn with which it keeps to the track.
-
-    What a compass in degrees cannot show is decided so; below that it is asked.
-    """
+    """Find a heading or course without jump and unit, in parts of a turn with which it keeps to the track."""
     track = _track_changes(state)
     for name, values in state.columns.items():
         scores = meaning_scores(name)
@@ -244,10 +235,7 @@ def _track_changes(state: State) -> Complex | None:
 
 
 def _heading_misfits(state: State, track: Complex, values: Array, turn: float) -> tuple[float, float]:
-    """1 - cos of the angle between a track and a heading in parts of a whole turn: as it is, and with any other zero.
-
-    It may count from any side of the world and to both sides.
-    """
+    """1 - cos of the angle between a track and a heading in parts of a turn: as it is, and with any other zero."""
     middle = (state.chosen.first + state.chosen.last) // 2
     angle = np.exp(2j * np.pi * values[middle] / turn)
     size = max(float(np.sum(np.abs(track))), 1e-12)

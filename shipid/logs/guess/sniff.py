@@ -88,12 +88,10 @@ ROWS_EACH, MOST_NUMBERS = 5, 20  # rows of each ship, on average, at least; ship
 class LogTable:
     """An unknown log as numbers: how it is written, its clock and all other columns, NaN where a value is missing.
 
-    `form` holds the keys of [format] and `clock` those of [clock]; `t` [s] rises; `notes` are sentences on columns
-    that were left out. `seams` counts the places where rows of a large log were not read, or runs begin. `runs` has the
-    column that says the run, and the number of runs, where the clock begins again with each; `t` goes on then. `sides`
-    are the letters, N, S, E or W, that columns beside positions hold. `words` are columns of words, with their first.
-    `other` are columns that cannot be read, and why. `doubts` are questions on what the dates of the clock mean.
-    `in_parts` are columns made of several, with those.
+    form, clock : keys of [format] and [clock]. t : [s], rising. notes : sentences on columns left out.
+    seams : places where rows were not read, or runs begin. runs : column that says the run, and their number, where the
+    clock begins again with each. sides : letters that columns beside positions hold. words : columns of words, with
+    their first. other : columns that cannot be read, and why. doubts : questions on dates. in_parts : of several.
     """
 
     form: dict[str, Any]
@@ -118,9 +116,7 @@ class LogTable:
 def recognise_log(file: Path, names: tuple[str, ...] = ()) -> LogTable:
     """Recognise the format of a log and read it; `names` are the columns of a text log without a header.
 
-    Raises
-    ------
-    DataError : the file cannot be read as a log, or no column can be its clock.
+    Raises DataError where it cannot be read as a log, or no column can be its clock.
     """
     size = require_file(file)
     try:
@@ -247,7 +243,7 @@ def _as_number(name: str, text: str) -> str:
 
 
 def _text_sample(file: Path, encoding: str, size: int) -> str:
-    """Return the text of a log; of a large one its head, and whole lines from places spread over it."""
+    """The text of a log; of a large one its head, and whole lines from places spread over it."""
     with file.open("rb") as stream:
         if size <= SAMPLE:
             return stream.read().decode(encoding, "replace")
@@ -295,9 +291,9 @@ def _are_measured(texts: list[str]) -> bool:
 
 
 def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[str, ...]], dict[str, str]]:
-    """The table with numbers alone where a column has its unit behind each, such as 12.3 kn; it is in the name then.
+    """The table without the unit behind each number, such as 12.3 kn; it is in the name then.
 
-    Also new name -> name in the log, and column -> its units in words where it has several, which is not read.
+    Also new name -> name in the log, and column -> its units in words where it has several.
     """
     names, result = [*map(str, table.columns)], table.copy(deep=False)
     renamed: dict[str, tuple[str, ...]] = {}
@@ -325,7 +321,7 @@ def _without_units(table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, tuple[s
 
 
 def _number_columns(table: pd.DataFrame, decimal: str, thousands: str | None) -> tuple[dict[str, Array], list[str]]:
-    """Return the columns that are mostly numbers, and the names of the columns of words."""
+    """The columns that are mostly numbers, and the names of the columns of words."""
     columns: dict[str, Array] = {}
     words = []
     for index, name in enumerate(map(str, table.columns)):
@@ -424,10 +420,7 @@ def _to_sides(table: pd.DataFrame, names: list[str], decimal: str) -> dict[str, 
 
 
 def _side_columns(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
-    """Return the letters of the columns that hold a side of the Earth alone: N or S, E or W.
-
-    Such a column is beside that of a position, or is called so: the letters of another say a status.
-    """
+    """The letters of the columns that hold a side of the Earth alone: N or S, E or W."""
     letters: set[str] = set()
     names = list(map(str, table.columns))
     for index, name in enumerate(names):
@@ -444,7 +437,7 @@ def _side_columns(table: pd.DataFrame, words: list[str]) -> frozenset[str]:
 
 
 def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: TableFormat) -> list[str]:
-    """Return the texts in columns of numbers that say that there is no value, such as `---` or `N/A`."""
+    """The texts in columns of numbers that say that there is no value, such as `---` or `N/A`."""
     texts: dict[str, None] = {}
     for name, values in columns.items():
         lost = np.isnan(values)
@@ -454,11 +447,7 @@ def _words_for_nothing(table: pd.DataFrame, columns: dict[str, Array], form: Tab
 
 
 def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list[str]:
-    """Return the texts that stand for a missing value, and set them to NaN: far beyond all other values of a column.
-
-    A shaft that makes 98 and 99 rpm, or stands and then makes 99, has no missing value: such a number must be twice as
-    large as all others of its sign, and one of three digits says nothing beside zeros alone.
-    """
+    """The texts that stand for a missing value, set to NaN: far beyond all other values of a column."""
     texts: dict[str, None] = {}
     for name, values in columns.items():
         never = {value: most for one in meaning_scores(name) for value, most in NOT_AVAILABLE.get(one, {}).items()}
@@ -489,10 +478,7 @@ def _missing_value_texts(table: pd.DataFrame, columns: dict[str, Array]) -> list
 
 
 def _is_filler(values: Array, value: float) -> bool:
-    """Whether a column (N,) takes a value again and again that is far beyond all others.
-
-    A few others are not mostly near 0: a thruster that is switched on has no value but 0 else.
-    """
+    """Whether a column (N,) takes a value again and again that is far beyond all others."""
     hit, others = values == value, values[(values != value) & np.isfinite(values)]
     visits = int(np.sum(hit[1:] & ~hit[:-1]))
     if visits < VISITS or hit.mean() > SELDOM:
@@ -510,10 +496,7 @@ def _other_column_has(table: pd.DataFrame, name: str, hit: Rows) -> bool:
 
 
 def _minus_ones(columns: dict[str, Array]) -> Iterator[str]:
-    """Yield a question for each speed, direction or shaft that is -1 and otherwise never negative, nor near it.
-
-    It is no missing value of the whole log: a rudder may be at -1 deg.
-    """
+    """Yield a question for each speed, direction or shaft that is -1 and otherwise never negative, nor near it."""
     for name, values in columns.items():
         hit = values == -1.0
         others = values[~hit & np.isfinite(values)]

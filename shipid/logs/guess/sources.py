@@ -1,7 +1,4 @@
-"""What a guess reads: one file, a folder with its sub-folders, or a glob; several files are one source of several runs.
-
-Their rows are put one after another with a pause between, so that what one run cannot show another may.
-"""
+"""What a guess reads: one file, a folder, or a glob; several files are one source of several runs."""
 
 from __future__ import annotations
 
@@ -28,9 +25,8 @@ class GuessFiles:
     """The files of a guess.
 
     path : the file, or the folder. pattern : key `runs` of [source]; None for a single file. files : run -> file.
-    skipped : files that may be logs and are left out, with the reason. manoeuvres : run -> kind, as its name says.
-    parts : keys of [parts] where a file holds several runs; empty else. held : runs that this gives.
-    sniffed : all rows, as of one log.
+    skipped : files left out, with the reason. manoeuvres : run -> kind. parts : keys of [parts]; else empty.
+    held : runs that this gives. sniffed : all rows, as of one log.
     """
 
     path: Path
@@ -46,9 +42,7 @@ class GuessFiles:
 def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
     """Read a file, a folder or a glob (`trials/*/ZZ*.csv`); `names` are the columns of files without a header.
 
-    Raises
-    ------
-    DataError : the file, or every file of a folder, cannot be read as a log; each is named with its reason.
+    Raises DataError where no file can be read as a log; each is named with its reason.
     """
     folder, patterns = _file_patterns(path)
     if not patterns:
@@ -82,11 +76,7 @@ def read_source(path: Path, names: tuple[str, ...] = ()) -> GuessFiles:
 
 
 def _parts_of_runs(logs: dict[Path, LogTable], *, by_pause: bool) -> tuple[dict[str, Any], int]:
-    """Return the keys of [parts] for files of several runs, and the number of runs; nothing, 0 where each holds one.
-
-    A column that says the run is taken if its values are held; pauses of the clock that are long beside all other
-    steps part the runs, too.
-    """
+    """Keys of [parts] for files of several runs, and the number of runs; nothing, 0 where each holds one."""
     first = next(iter(logs.values()))
     begun = [log.runs for log in logs.values() if log.runs]
     if begun:
@@ -122,7 +112,7 @@ def _count_runs(log: LogTable, column: str | None, pause: float) -> int:
 
 
 def _file_patterns(path: Path) -> tuple[Path, list[str]]:
-    """Return folder and patterns of a folder or glob, that of most files first; a file has no pattern."""
+    """Folder and patterns of a folder or glob, that of most files first; a file has no pattern."""
     text = path.as_posix()
     if "*" in text and not path.exists():
         before = text[: text.index("*")]
@@ -142,7 +132,7 @@ def _file_patterns(path: Path) -> tuple[Path, list[str]]:
 
 
 def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str, str]) -> dict[Path, LogTable]:
-    """Return the files of the commonest columns and format; the others are skipped with a reason."""
+    """The files of the commonest columns and format; the others are skipped with a reason."""
 
     def written(log: LogTable) -> tuple[object, ...]:
         form = {key: value for key, value in log.form.items() if key not in ("ragged", "missing", "thousands")}
@@ -169,7 +159,7 @@ def _files_alike(sniffed: dict[Path, LogTable], folder: Path, skipped: dict[str,
 
 
 def _join_files(logs: list[LogTable]) -> LogTable:
-    """Return the rows of several files one after another, `PAUSE` s apart; those of one file by its clock."""
+    """The rows of several files one after another, `PAUSE` s apart; those of one file by its clock."""
     first = logs[0]
     if len(logs) == 1:
         return first

@@ -1,7 +1,6 @@
 """Screws of two sides whose columns name no shaft speed: throttles, shares of full speed, pulses of a servo.
 
-Two columns with one name but for the side, whose difference turns the ship, order the screws of a craft that steers by
-their difference. Neither full speed nor, where the ship was never at rest, the value of a stopped screw is in the log.
+Two columns with one name but for the side, whose difference turns the ship, order them.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ def _say_sides(state: State, pair: tuple[str, str], effect: float) -> None:
 
 
 def twin_columns(state: State) -> list[tuple[str, str]]:
-    """Return the pairs of free columns, port and starboard, whose names are equal but for the side."""
+    """The pairs of free columns, port and starboard, whose names are equal but for the side."""
     sides: dict[tuple[str, ...], dict[str, str]] = {}
     for name in state.free():
         side = side_in_name(name)
@@ -85,7 +84,7 @@ def _may_be_a_throttle(name: str) -> bool:
 
 
 def _at_rest(state: State, pair: tuple[str, str]) -> dict[str, float] | None:
-    """Return side -> value of its column at rest; None if the ship always moves, or values differ."""
+    """Side -> value of its column at rest; None if the ship always moves, or values differ."""
     if state.position is None:
         return None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]

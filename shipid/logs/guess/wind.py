@@ -1,8 +1,4 @@
-"""Choose the wind: true or apparent, by the names and by what stands still over ground while the ship turns.
-
-A true wind does not turn with the ship. Of the ways to read two columns, the one in which it changes least is right.
-Whether a true wind is `from` or `towards` does not show in this, nor does its unit; both show of an apparent wind.
-"""
+"""Choose the wind: true or apparent, by the names and by what stands still over ground while the ship turns."""
 
 from __future__ import annotations
 

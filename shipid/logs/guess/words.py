@@ -1,8 +1,7 @@
 """The words that names of columns are made of, in a few languages, and how well a name fits each meaning.
 
-A name is cut into parts: `GPS_Lat` is gps, lat; `ShaftRPM_port` is shaft, rpm, port; `Ruderwinkel` is ruder, winkel.
-Parts that say a unit, a side, a sensor or a number are set aside. A name fits a meaning by the share of its other parts
-that a phrase of the meaning explains.
+`GPS_Lat` is gps, lat; `ShaftRPM_port` is shaft, rpm, port. Units, sides, sensors and numbers are set aside; a name fits
+by the share of its other parts that a phrase of the meaning explains.
 """
 
 from __future__ import annotations
@@ -366,7 +365,7 @@ LEAST = 0.45  # share of a name that a phrase explains, before the name counts a
 
 
 def name_parts(name: str) -> tuple[str, ...]:
-    """Return the parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
+    """The parts of a name in lower case, without text in brackets; accents and Greek are spelt out."""
     name = name.translate(WIDE)
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name))
     if not bare.isascii():
@@ -403,7 +402,7 @@ def known_words(text: str) -> int:
 
 
 def _spell_letter(text: str, place: int) -> str:
-    """Return a letter of a text without accent, as capitals within capitals: Ü is Ue in Über, UE in FÜG."""
+    """A letter of a text without accent, as capitals within capitals: Ü is Ue in Über, UE in FÜG."""
     letter = text[place]
     spelt = _LETTERS.get(letter, letter)
     around = text[max(0, place - 1) : place] + text[place + 1 : place + 2]
@@ -411,14 +410,14 @@ def _spell_letter(text: str, place: int) -> str:
 
 
 def units_in_name(name: str) -> list[str]:
-    """Return what a name has in brackets, after a blank and a slash as in `Schub / kN`, or after a comma."""
+    """What a name has in brackets, after a blank and a slash as in `Schub / kN`, or after a comma."""
     name = name.translate(WIDE)
     after = _AFTER.search(name)
     return [*re.findall(r"[\[(]([^\])]*)[\])]", name), *([after.group(1).strip()] if after else [])]
 
 
 def shaft_unit(name: str) -> str:
-    """Return the unit of a shaft speed that a name has, set off or as its last word; empty where it has none."""
+    """The unit of a shaft speed that a name has, set off or as its last word; empty where it has none."""
     said = units_in_name(name) or re.split(r"[_ ]", name.translate(WIDE).strip())[-1:]
     return next((unit for unit in said if _OF_SHAFT.fullmatch(unit.strip().lower())), "")
 
@@ -489,10 +488,7 @@ def is_order(name: str) -> bool:
 
 
 def may_be_measured(name: str) -> str:
-    """Return the name without the words ref and reference where only they say that it is a set point, else nothing.
-
-    They may say a reference system of a dynamic positioning, which measures.
-    """
+    """The name without the words ref and reference where only they say that it is a set point, else nothing."""
     parts = name_parts(name)
     left = [part for part in parts if part not in ("ref", "reference")]
     if not left or not is_order(name):
@@ -516,7 +512,7 @@ def is_magnetic(name: str) -> bool:
 
 
 def side_in_name(name: str) -> str | None:
-    """Return the side or place in a name, such as `port`; None if there is none."""
+    """The side or place in a name, such as `port`; None if there is none."""
     bare = re.sub(r"[\[(][^\])]*[\])]?", " ", _AFTER.sub("", name.translate(WIDE)))  # 1/s is no starboard
     parts = set(name_parts(name)) | set(re.split(r"[^a-z]+", bare.lower()))
     for side, words in SIDE_WORDS.items():
@@ -527,15 +523,12 @@ def side_in_name(name: str) -> str | None:
 
 @cache
 def words_of_side(side: str) -> frozenset[str]:
-    """Return the words that say a side, such as `port`."""
+    """The words that say a side, such as `port`."""
     return frozenset(SIDE_WORDS[side].split("|"))
 
 
 def how_much_says(name: str, command: str) -> int:
-    """Return how many parts of the component of a command a name has that says its signal, too; 0 where it does not.
-
-    `rpm_bow_aft` says `bow_aft.n` with two parts, and `bow.n` with one.
-    """
+    """How many parts of a command's component a name has that says its signal: `rpm_bow_aft` two of `bow_aft.n`."""
     component, _, signal = command.rpartition(".")
     said, parts = set(name_parts(component)), [part for part in name_parts(name) if part not in UNIT_PARTS - {signal}]
     if not said or not said <= set(parts):
@@ -549,16 +542,13 @@ def how_much_says(name: str, command: str) -> int:
 
 
 def number_in_name(name: str) -> int | None:
-    """Return the last number among the parts of a name; None if there is none."""
+    """The last number among the parts of a name; None if there is none."""
     return next((int(part) for part in reversed(name_parts(name)) if part.isdigit()), None)
 
 
 @cache
 def meaning_scores(name: str) -> dict[str, float]:
-    """Return how well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use.
-
-    Orders and set points fit commands only.
-    """
+    """How well a name fits each meaning, 0 to 1: `{"psi": 1.0}`; the empty meaning is a column of no use."""
     parts = list(name_parts(name))
     order = is_order(name)
     aside = (
@@ -589,7 +579,7 @@ def meaning_scores(name: str) -> dict[str, float]:
 
 
 def _phrase_share(phrase: tuple[str, ...], parts: list[str], content: list[str], aside: set[str]) -> float:
-    """Return the share of the letters of a name that a phrase explains; 0 if the name lacks a word of it."""
+    """The share of the letters of a name that a phrase explains; 0 if the name lacks a word of it."""
     if not set(phrase) <= set(parts):
         return 0.0
     left = [part for part in content if part not in phrase]

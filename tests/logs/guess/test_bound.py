@@ -157,8 +157,7 @@ def test_sides_letters_and_numbers_take_a_column_each(
     )
 
 
-@pytest.mark.parametrize("turns", [1.0, -1.0])
-@pytest.mark.parametrize("x", [-10.0, 9.0])
+@pytest.mark.parametrize(("x", "turns"), [(-10.0, 1.0), (9.0, -1.0)])
 def test_the_sign_of_an_azimuth_unit_is_that_of_its_place(x: float, turns: float) -> None:
     """A unit forward of the origin turns the ship the other way; only a log against the vessel has its sign changed."""
     document = vessel(propulsor="azimuth").document

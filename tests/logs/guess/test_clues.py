@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from shipid.logs.guess import evidence
 from shipid.logs.guess.clues import (
-    State,
     factor_in_name,
     names_another,
-    si_unit,
     unit_in_name,
     unit_of_another,
     unknown_unit,
@@ -73,37 +69,6 @@ def test_a_unit_that_is_not_known_is_told_from_a_note(name: str, unit: str) -> N
     assert unknown_unit(name) == unit
 
 
-@pytest.fixture
-def state() -> State:
-    t = np.arange(100.0)
-    names = ("heading [deg]", "hdg_2", "sog", "SOG [kn]", "lat", "fuel")
-    return State(t, "s", dict.fromkeys(names, t), evidence.row_windows(t))
-
-
-def test_a_name_fits_a_meaning(state: State) -> None:
-    assert "heading [deg]" in state.called("psi")
-    assert state.called("speed") == ["sog", "SOG [kn]"]
-    assert state.called("latitude") == ["lat"]
-    assert state.called("longitude") == []
-
-
-def test_what_a_name_excludes_is_not_eligible(state: State) -> None:
-    columns = {name: np.sin(state.t) for name in ("rudder", "Kanal7", "depth", "psi_ref")}
-    named = State(state.t, "s", columns, state.chosen)
-    assert named.eligible("u", "v") == ["Kanal7"]
-    assert named.eligible("delta") == ["rudder", "Kanal7"]
-    assert named.eligible() == ["rudder", "Kanal7"]
-
-
-def test_a_suggestion_takes_its_column(state: State) -> None:
-    state.suggest("u", "sog", "m/s", 0.87654, "a reason", sign=-1)
-    assert "sog" not in state.free()
-    assert state.called("speed") == ["SOG [kn]"]
-    assert state.all_called("speed") == ["sog", "SOG [kn]"]
-    (suggestion,) = state.suggestions
-    assert (suggestion.confidence, suggestion.extra) == (0.88, {"sign": -1})
-
-
 @pytest.mark.parametrize(
     ("name", "meaning", "unit"),
     [
@@ -126,13 +91,3 @@ def test_a_unit_excludes_what_it_does_not_fit(name: str, meaning: str, unit: str
 @pytest.mark.parametrize(("name", "said"), [("RULL deg", True), ("Torque", True), ("p", False), ("wz", False)])
 def test_a_word_for_another_quantity_is_no_yaw_rate(name: str, said: bool) -> None:
     assert names_another(name, "r") == said
-
-
-def test_meanings_have_units() -> None:
-    assert [si_unit(meaning) for meaning in ("psi", "x", "speed", "velocity_north", "")] == [
-        "rad",
-        "m",
-        "m/s",
-        "m/s",
-        "",
-    ]

@@ -1,6 +1,5 @@
 """A draft is a mapping that imports, says why, and lists the manoeuvres of the log."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,8 @@ from shipid.data.checks import check_dataset
 from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.guess.columns import guess
-from shipid.logs.guess.draft import clock_moment, draft_mapping, draft_text, segment_log, segments_text
+from shipid.logs.guess.draft import draft_mapping, draft_text, segment_log
 from shipid.logs.importing import import_log, read_mapping
-from shipid.logs.mapping import UNITS, Segment
-from tests.logs.conftest import DATES, stamps
 from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, si_log
 from tests.logs.test_nmea import bridge_log
 
@@ -96,49 +93,6 @@ def test_segments_of_gunnerus_are_its_zigzags_and_circles(gunnerus_log: Path) ->
             assert sum(inside) > 0.35 * (end - start)
         elsewhere = [s for s in mine if not any(a < (s.start + s.end) / 2 < b for a, b in spans)]
         assert [6005.0 <= s.start <= 6200.0 for s in elsewhere] == [True] * (kind == "turning")
-
-
-def test_segments_of_a_dated_log_say_when() -> None:
-    """1715673605 s after 1970 is 14 May 2024, 08:00:05 UTC."""
-    text = segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)], "date")
-    assert "[[segment]]    # 2024-05-14 08:00:05 to 2024-05-14 08:03:00" in text
-    assert "2024-05-14" not in segments_text([Segment(run="zigzag 1", start=1715673605.0, end=1715673780.0)])
-
-
-def test_segments_on_times_of_day_have_no_date() -> None:
-    """A clock of times without dates is read as seconds since a midnight: not one of 1970."""
-    text = segments_text([Segment(run="zigzag 1", start=28805.0, end=28980.0)], "date")
-    assert "1970" not in text
-    assert "# Starts and ends are seconds since the midnight before the log" in text
-    assert clock_moment(28805.0, "date") == "28805"
-
-
-@pytest.mark.parametrize("unit", ["s", "ns", "d"])
-def test_segments_keep_a_millisecond_in_every_unit(unit: str) -> None:
-    size = UNITS["s"][unit]
-    written = segments_text([Segment(run="a", start=100.001 / size, end=200.002 / size)], unit)
-    (segment,) = tomllib.loads(written)["segment"]
-    assert segment["start"] * size == pytest.approx(100.001, abs=1e-3)
-    assert segment["end"] * size == pytest.approx(200.002, abs=1e-3)
-
-
-@pytest.mark.parametrize("unit", ["h", "datenum"])
-def test_the_draft_of_a_clock_in_any_unit_imports_to_the_motion(unit: str, tmp_path: Path) -> None:
-    """Segments, breaks and times in words are those of the log's clock."""
-    log = as_bridge(si_log()).assign(N=lambda frame: frame["N"] + 150.0 * (frame["time"] > 700))
-    begin = 1715673605.0 if unit in DATES else 0.0
-    name = "time" if unit in DATES else f"time [{unit}]"
-    log = log.assign(time=stamps(begin + log["time"].to_numpy(), unit)).rename(columns={"time": name})
-    log.to_csv(tmp_path / "log.csv", index=False)
-    proposal = guess(tmp_path / "log.csv")
-    assert proposal.kinds == {"position jumps"}
-    assert proposal.questions == ()
-    (mapping := tmp_path / "draft.toml").write_text(draft_mapping(proposal))
-    dataset = import_log(read_mapping(mapping), tmp_path / "log.csv")
-    assert check_dataset(dataset)["ok"].all()
-    spans = dataset.frame.groupby("run", sort=False)["t"].agg(["min", "max"]) - begin
-    ends = np.cumsum([seconds for seconds, _, _ in SCHEDULE])
-    assert spans.loc["turning 1"].tolist() == pytest.approx([ends[7] - 6, ends[8] + 6], abs=6.5)
 
 
 @pytest.mark.parametrize("name", ["u\n[[segment]]\nrun = 1", "x]"])

@@ -12,7 +12,7 @@ from shipid.logs.guess.motion import (
     choose_yaw_rate,
     is_possible,
 )
-from tests.logs.conftest import CLOCKS, SPEEDS
+from tests.logs.conftest import SPEEDS
 from tests.logs.simulated import KNOT, si_log, state_with_pose
 
 LOG = si_log()
@@ -102,38 +102,6 @@ def test_every_unit_of_speed_is_drafted(unit: str, kind: str, named: bool) -> No
     np.testing.assert_allclose(state.velocity, GROUND, atol=1e-9)
 
 
-@pytest.mark.parametrize(("unit", "kind", "factor"), [("kn", "body", 1.149), ("mph", "speed and course", 0.94)])
-def test_a_factor_does_not_pass_for_another_unit_than_the_name_says(unit: str, kind: str, factor: float) -> None:
-    """A knot is 1.15 miles per hour: the name decides, and the factor is found."""
-    state = state_with_pose(spoken(unit, kind, True, factor))
-    choose_velocities(state)
-    assert {one.unit for one in state.suggestions if one.name != "course"} == {unit}
-    (finding,) = state.findings
-    assert finding.repair is not None
-    assert finding.repair["columns"] == (["u", "v"] if kind == "body" else ["speed"])
-    assert finding.repair["factor"] == pytest.approx(1 / factor, rel=0.005)
-
-
-@pytest.mark.parametrize("said", ["s", "ms", "datenum"])
-@pytest.mark.parametrize("true", ["s", "min", "ns"])
-@pytest.mark.parametrize(("kind", "seed"), [("body", 0), ("speed and course", 1)])
-def test_a_clock_in_another_unit_than_drafted_is_asked(said: str, true: str, kind: str, seed: int) -> None:
-    random = np.random.default_rng([3, seed])
-    unit, named = str(random.choice(list(SPEEDS))), bool(random.random() < 0.5)
-    wrong = CLOCKS.get(said, 86400.0) / CLOCKS[true]
-    state = state_with_pose(spoken(unit, kind, named), wrong, said)
-    choose_velocities(state)
-    check_clock(state)
-    asked = [question for question in state.questions if "t" in question.about]
-    if wrong == 1.0:
-        assert len(asked) == (unit == "mm/s" and not named)
-    else:
-        assert len(asked) == 1
-        assert state.velocity is None or "factor" in kinds(state) or "clock unit" in kinds(state)
-        if named or unit == "m/s":
-            assert f"is the clock in {true}?" in asked[0].sentence
-
-
 @pytest.mark.parametrize(("wrong", "asked"), [(3.0, 0), (60.0, 1), (1e-3, 1)])
 def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> None:
     """Without velocities in the log the pace of the track says that the clock has another unit."""
@@ -142,15 +110,6 @@ def test_a_ship_that_goes_as_none_does_is_asked(wrong: float, asked: int) -> Non
     check_clock(state)
     check_clock(state)  # once is enough
     assert len(state.questions) == asked
-
-
-def test_a_factor_that_no_sensor_has_is_asked_and_not_repaired() -> None:
-    state = state_with_pose({"u [m/s]": U / 7.0, "v [m/s]": V / 7.0})
-    choose_velocities(state)
-    (finding,) = state.findings
-    assert (finding.kind, finding.repair) == ("factor", None)
-    assert "the track is 7 times" in finding.sentence
-    assert len(state.questions) == 1
 
 
 @pytest.mark.parametrize(
@@ -194,15 +153,3 @@ def test_a_track_turned_against_velocities_over_ground_is_asked(degrees: float, 
         assert question.sentence.startswith(f"the track is turned by {-degrees:+.1f} +- 0.")
         said = float(question.sentence.partition("offset = ")[2].partition(" ")[0] or np.nan)
         assert np.isnan(said) if earth else said == pytest.approx(-degrees, abs=0.02)
-
-
-@pytest.mark.parametrize("exchanged", [True, False])
-def test_heading_and_course_that_are_exchanged_are_asked(exchanged: bool) -> None:
-    columns, state = over_ground(), state_with_pose({})
-    if exchanged:
-        columns["cog"], state.psi = np.degrees(PSI) % 360.0, np.unwrap(np.angle(GROUND))
-    state.columns |= columns
-    choose_velocities(state)
-    assert [question.sentence.partition("?")[0] for question in state.questions] == (
-        ["are 'psi' and 'cog' exchanged"] if exchanged else []
-    )

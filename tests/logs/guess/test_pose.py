@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pymap3d import geodetic2ecef, ned2geodetic
+from pymap3d import ned2geodetic
 
 from shipid.errors import DataError
 from shipid.logs.guess.clues import State
@@ -207,51 +207,3 @@ def test_a_ship_that_goes_astern_all_the_time_keeps_her_heading(
     assert not state.negated
     assert [one.sentence for one in state.findings if one.kind == "astern" and why in one.sentence]
     assert not state.questions
-
-
-def test_a_heading_against_the_track_is_asked_where_nothing_decides() -> None:
-    state = chosen({"N": NORTH, "E": EAST, "heading": ASTERN})
-    assert any("does the ship go astern" in one.sentence for one in state.questions)
-    state = chosen({**_on_earth(), "heading": ASTERN, "cog": COURSE})
-    assert not state.negated
-    assert any("does the ship go astern" in one.sentence for one in state.questions)
-
-
-def test_a_heading_of_a_magnetic_compass_alone_is_asked() -> None:
-    columns = {"north": NORTH, "east": EAST, "magnetic heading": DEG}
-    assert any("is of a magnetic compass" in question.sentence for question in chosen(columns).questions)
-    assert not any("magnetic" in one.sentence for one in chosen({**columns, "heading": DEG}).questions)
-
-
-def test_a_position_of_one_column_has_its_remedy() -> None:
-    state = state_of({"heading": DEG, "x": DEG}, T)
-    state.words = {"mode": "AUTO 1", "Position": "63°26.400'N 010°24.000'E"}
-    with pytest.raises(DataError, match=r"'Position' holds .*: write latitude and longitude in two columns"):
-        choose_pose(state, FILE)
-
-
-@pytest.mark.parametrize("names", [("X ECEF", "Y ECEF", "Z ECEF"), ("pos.x", "pos.y", "pos.z")])
-def test_positions_from_the_centre_of_the_Earth_are_refused(names: tuple[str, str, str]) -> None:
-    """Two of them are no level plane: the track was 20 times too far off, and z was called east."""
-    place = ned2geodetic(NORTH, EAST, 0.0, -33.9, 18.4, 0.0)
-    columns = dict(zip(names, geodetic2ecef(*place), strict=True))
-    with pytest.raises(DataError, match=f"'{names[0]}', .* count from the centre of the Earth: write latitude"):
-        chosen(columns | {"heading": DEG})
-    assert_motion(chosen({"pos.x": NORTH, "pos.y": EAST, "pos.z": 0.0 * EAST, "heading": DEG}))
-
-
-def test_positions_in_ship_lengths_are_asked_for_the_length() -> None:
-    state = chosen({"X/Lpp": NORTH / 30.0, "Y/Lpp": EAST / 30.0, "heading": DEG})
-    assert any("write factor = the length in m" in question.sentence for question in state.questions)
-
-
-def test_a_longitude_that_by_its_name_counts_to_the_west_does_so() -> None:
-    """Before, the heading, the yaw rate and the rudder of the log were said to count to port."""
-    place = _on_earth()
-    state = chosen({"Lat": place["lat"], "Lon W": -place["lon"], "heading": DEG})
-    assert {one.name: one.extra.get("sign", 1) for one in state.suggestions} == {
-        "latitude": 1,
-        "longitude": -1,
-        "psi": 1,
-    }
-    assert any("does the log count 'Lon W' to west?" in question.sentence for question in state.questions)

@@ -10,12 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from shipid.data.dataset import Dataset
-from shipid.errors import DataError, DocumentError
-from shipid.files import write_new
 from shipid.logs.guess.columns import Guess, guess
-from shipid.logs.guess.draft import draft_text
 from shipid.logs.guess.pose import Frame
-from shipid.logs.importing import import_log, read_mapping
 from tests.logs.simulated import as_bridge, drafted, guess_of, import_draft, si_log
 
 LOG = si_log()
@@ -31,15 +27,6 @@ LON = LONGITUDE + np.degrees(LOG["east"] / (SIZE / WIDE**0.5 * np.cos(np.radians
 def on_globe(lat: pd.Series, lon: pd.Series, **more: object) -> pd.DataFrame:
     frame = BRIDGE.drop(columns=["N", "E"]).rename(columns={"psi": "Heading"})
     return frame.assign(lat=lat, lon=lon, **more)
-
-
-def turned_round(first: float) -> pd.DataFrame:
-    """The zigzag of the log [rows], turned so that it begins with this heading [deg]."""
-    frame = BRIDGE.iloc[:600]
-    angle = np.radians(first - frame["psi"].iloc[0])
-    north, east = (frame[name] * np.cos(angle) for name in ("N", "E"))
-    turned = {"N": north - frame["E"] * np.sin(angle), "E": east + frame["N"] * np.sin(angle)}
-    return frame.assign(**turned, psi=(frame["psi"] + np.degrees(angle)) % 360.0)
 
 
 def asked(proposal: Guess) -> str:
@@ -68,22 +55,6 @@ def test_a_heading_in_other_parts_of_a_turn_is_the_heading(
     assert f"a whole turn is {turn:g}" in column.evidence
     assert turned(dataset).max() < np.radians(0.3)
     assert dataset.frame["v"].to_numpy() == pytest.approx(LOG["v"].to_numpy(), abs=1e-6)
-
-
-@pytest.mark.parametrize(("turn", "first"), [(6400.0, 250.0)])
-def test_a_heading_that_never_jumps_is_read_as_it_keeps_to_the_track(turn: float, first: float, tmp_path: Path) -> None:
-    frame = turned_round(first).drop(columns="psi")
-    frame["Heading"] = (turned_round(first)["psi"] * turn / 360.0).round(2)
-    column = drafted(frame, tmp_path)[0].column("psi")
-    assert column is not None
-    assert column.extra["factor"] == pytest.approx(360.0 / turn)
-    assert "keeps to the track" in column.evidence
-
-
-def test_whole_numbers_of_parts_of_a_degree_are_told_by_the_speed(tmp_path: Path) -> None:
-    proposal, _ = drafted(on_globe(*((1e7 * one).round().astype(int) for one in (LAT, LON))), tmp_path)
-    columns = [proposal.column(name) for name in ("latitude", "longitude")]
-    assert [one.extra["factor"] for one in columns if one is not None] == [1e-7] * 2
 
 
 def as_ais(names: tuple[str, ...]) -> pd.DataFrame:
@@ -128,32 +99,6 @@ def test_messages_of_AIS_are_decoded(names: tuple[str, ...], silent: bool, tmp_p
     assert np.all(np.abs(np.degrees(rows["r"]) * 60 - rate) < step)
 
 
-@pytest.mark.parametrize(("turn", "asks"), [(400.0, True), (360.0, False)])
-def test_gon_that_a_compass_in_degrees_may_show_are_asked(turn: float, asks: bool, tmp_path: Path) -> None:
-    frame = turned_round(200.0).drop(columns="psi")
-    frame["Heading"] = (turned_round(200.0)["psi"] * turn / 360.0).round(2)
-    assert ("'Heading', " in asked(drafted(frame, tmp_path)[0])) == asks
-
-
-@pytest.mark.parametrize(("unit", "parts"), [("arcmin", 60.0)])
-def test_positions_in_minutes_of_arc_are_read_as_their_names_say(unit: str, parts: float, tmp_path: Path) -> None:
-    """3806 minutes were taken for 38 degrees and 6 minutes."""
-    frame = on_globe(parts * LAT, parts * LON).rename(columns={one: f"{one} [{unit}]" for one in ("lat", "lon")})
-    proposal, dataset = drafted(frame, tmp_path)
-    for name in ("latitude", "longitude"):
-        column = proposal.column(name)
-        assert column is not None
-        assert column.extra["factor"] == pytest.approx(1 / parts)
-    north = dataset.frame["north"].to_numpy()
-    assert north - north[0] == pytest.approx(LOG["north"] - LOG["north"].iloc[0], abs=2.0)
-
-
-def test_a_position_of_words_is_named_with_its_text(tmp_path: Path) -> None:
-    frame = on_globe(LAT, LON).assign(lat="63°66.4'N", lon="63°66.4'E")
-    with pytest.raises(DataError, match=r"no column can be the position.*: 'lat' holds .*63.*N.*, no number"):
-        drafted(frame, tmp_path)
-
-
 @pytest.mark.parametrize("how", ["1e-7", "ddmm"])
 def test_positions_of_receivers_are_degrees(how: str, tmp_path: Path) -> None:
     if how == "1e-7":
@@ -196,17 +141,6 @@ def test_latitude_and_longitude_changed_round_are_found(tmp_path: Path) -> None:
     assert "latitude and longitude swapped" not in right.kinds
 
 
-def test_only_positions_are_in_degrees_and_minutes(tmp_path: Path) -> None:
-    mapping = draft_text(guess_of(tmp_path, BRIDGE)).replace('unit = "deg"', 'unit = "ddmm"', 1)
-    with pytest.raises(DocumentError, match="only latitude and longitude"):
-        read_mapping(write_new(mapping, tmp_path / "draft.toml"))
-
-
-def as_file(frame: pd.DataFrame, folder: Path) -> Path:
-    frame.to_csv(folder / "log.csv", index=False)
-    return folder / "log.csv"
-
-
 FULL = 35.0  # deg: the largest angle
 RUDDER = BRIDGE["rudder"]
 
@@ -216,10 +150,8 @@ RUDDER = BRIDGE["rudder"]
     [
         ("rudder [%]", RUDDER / FULL * 100, "is in per cent: of which angle"),
         ("rudder", RUDDER / FULL * 1000, "per cent or per mille of the largest angle"),
-        ("rudder", RUDDER / FULL, "a share (-1 to 1) of the largest angle"),
         ("rudder", RUDDER.abs(), "is never negative, but the ship turns to both sides"),
         ("motor_erpm", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
-        ("bow thruster erpm", BRIDGE["rpm"] * 7, "is the electrical speed of a motor: of how many poles"),
     ],
 )
 def test_what_the_log_does_not_say_is_asked(name: str, values: pd.Series, words: str, tmp_path: Path) -> None:
@@ -256,30 +188,8 @@ def test_a_quaternion_is_the_heading(names: str, frame: Frame, tmp_path: Path) -
     assert dataset.frame["v"].to_numpy() == pytest.approx(LOG["v"].to_numpy(), abs=1e-3)
 
 
-@pytest.mark.parametrize(("frame", "ahead"), [("enu", 0.5), ("zup", 0.3)])
-def test_a_given_frame_is_taken_where_a_ship_that_goes_astern_does_not_show_it(
-    ahead: float, frame: Frame, tmp_path: Path
-) -> None:
-    """Ahead and astern by turns, the course says little of the heading; another frame was said to fit."""
-    way = np.where(np.arange(len(LOG)) < ahead * len(LOG), 1.0, -1.0)
-    place = np.append(0, np.cumsum(way[1:] * np.diff(LOG["north"] + 1j * LOG["east"])))
-    psi, east_first = LOG["psi"].to_numpy(), frame in ("enu", "ros")
-    log = BRIDGE.drop(columns=["psi", "N", "E"]).assign(u=way * LOG["u"], v=way * LOG["v"])
-    log["x"], log["y"] = (place.imag, place.real) if east_first else (place.real, place.imag)
-    log["y"] *= -1.0 if frame == "zup" else 1.0
-    log["psi"] = {"ros": np.pi / 2 - psi, "zup": -psi}.get(frame, psi)
-    log.to_csv(tmp_path / "log.csv", index=False)
-    result = guess(tmp_path / "log.csv", frame=frame)
-    assert [one.source for one in result.columns if one.name in ("north", "east")] == list("yx" if east_first else "xy")
-    assert "agree badly" in asked(result)
-    dataset = import_draft(tmp_path, result)
-    assert turned(dataset).max() < 1e-5
-    assert dataset.frame["u"].to_numpy() == pytest.approx(way * LOG["u"].to_numpy(), abs=1e-3)
-
-
 TEXTS = {
     "P12.5": lambda x: f"{'P' if x < 0 else 'S'}{abs(x):.1f}",
-    "12.5 P": lambda x: f"{abs(x):.1f} {'P' if x < 0 else 'S'}" if round(x, 1) else "0.0",
     "Bb 12,5": lambda x: f"{'Bb' if x < 0 else 'Stb'} {abs(x):.1f}".replace(".", ","),
 }
 
@@ -292,15 +202,6 @@ def test_a_rudder_with_its_side_in_letters_is_read(style: str, tmp_path: Path) -
     assert column is not None
     assert (column.unit, column.extra) == ("deg", {})
     np.testing.assert_allclose(np.degrees(dataset.frame["rudder.delta"]), RUDDER, atol=0.051)
-
-
-@pytest.mark.parametrize("text", ["12.5", "Q12.5"])
-def test_a_rudder_without_its_side_among_others_is_refused(text: str, tmp_path: Path) -> None:
-    frame = BRIDGE.assign(rudder=RUDDER.map(TEXTS["P12.5"]))
-    draft = draft_text(guess_of(tmp_path, frame)).replace("sha256", "# sha256")
-    wrong = as_file(frame.assign(rudder=frame["rudder"].where(frame.index != 5, text)), tmp_path)
-    with pytest.raises(DataError, match=r"row 6: .* is no number( and no angle with S or P)? \(column 'rudder'"):
-        import_log(read_mapping(write_new(draft, tmp_path / "draft.toml")), wrong)
 
 
 @pytest.mark.parametrize("speed", ["kn", ""])

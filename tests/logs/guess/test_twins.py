@@ -13,7 +13,7 @@ from shipid.logs.guess.clues import State
 from shipid.logs.guess.commands import choose_commands
 from shipid.logs.guess.evidence import row_windows
 from shipid.vessel.load import load_vessel
-from tests.draws import seeds
+from tests.drawn import seeds
 
 STEP = 0.2
 NAMES = (
@@ -65,7 +65,7 @@ def drawn(seed: int) -> tuple[pd.DataFrame, tuple[str, str], float, dict[str, np
     return log, names, still, {name: columns[name] for name in order}
 
 
-@pytest.mark.parametrize("seed", seeds(3))
+@pytest.mark.parametrize("seed", seeds(2, 3))
 def test_each_side_has_its_screw_with_the_value_of_a_stopped_one(seed: int) -> None:
     log, names, still, columns = drawn(seed)
     state = guessed(log, columns)

@@ -38,10 +38,7 @@ def logged(kind: str, way: str, unit: float, names: tuple[str, str], rows: slice
     ("kind", "way", "unit", "names", "said"),
     [
         ("true", "from", 1.0, ("Wind speed", "Wind dir"), False),
-        ("true", "towards", 1.0, ("Wind speed", "Wind direction towards"), False),
         ("angle", "from", 1.0, ("TWS", "TWA"), False),
-        ("angle", "from", 1.0, ("Wind speed", "Wind angle"), True),
-        ("apparent", "from", 1.0, ("AWS", "AWA"), False),
         ("apparent", "from", KNOT, ("AWS", "AWA"), True),
         ("apparent", "towards", 1.0, ("Wind speed", "Wind angle"), True),
     ],

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from shipid.report.section import Section, declared_anchors, draw_sections
+from shipid.report.page import Section, draw_sections
 from shipid.report.tables import PageTable
 
 EMPTY = pd.DataFrame()
@@ -17,36 +17,24 @@ def table(name: str) -> PageTable:
 @pytest.mark.parametrize(("need", "shown"), [("full", True), ("empty", False), ("absent", False), ("number", True)])
 def test_a_section_needs_its_parts(need, shown):
     content = SimpleNamespace(full=FULL, empty=EMPTY, number=0.0)
-    section = Section("A", lambda _: [table("a")], needs=("full", need))
+    section = Section("A", {"a": (lambda _: table("a"), need)})
     assert [one.id for one in draw_sections({"a": section}, content)] == ["a"] * shown
 
 
 def test_it_says_which_section_is_drawn():
     said = []
-    sections = {"a": Section("First", lambda _: [table("a")]), "b": Section("Second", lambda _: [], needs=("absent",))}
+    sections = {"a": Section("First", {"a": (table, "")}), "b": Section("Second", {"b": (table, "absent")})}
     draw_sections(sections, SimpleNamespace(), said.append)
     assert said == ["drawing: First"]
 
 
-def test_nothing_is_drawn_of_a_section_that_is_left_out():
-    def fails(_):
-        raise AssertionError
-
-    assert draw_sections({"a": Section("A", fails, needs=("absent",))}, SimpleNamespace()) == []
-
-
 def test_order_and_gaps():
     sections = {
-        "b": Section("B", lambda _: [None, table("b")]),
-        "none": Section("Nothing", lambda _: [None]),
-        "a": Section("A", lambda _: (table("a"),)),
+        "b": Section("B", {"none": (lambda _: None, ""), "b": (lambda _: table("b"), "")}),
+        "none": Section("Nothing", {"nothing": (lambda _: None, "")}),
+        "a": Section("A", {"a": (lambda _: table("a"), "")}),
     }
     assert [(one.id, one.title, [i.id for i in one.items]) for one in draw_sections(sections, None)] == [
         ("b", "B", ["b"]),
         ("a", "A", ["a"]),
     ]
-
-
-def test_declared_anchors():
-    sections = {"a": Section("A", lambda _: [], anchors=("x", "y")), "b": Section("B", lambda _: [], anchors=("z",))}
-    assert declared_anchors(sections) == {"x", "y", "z", "findings", "provenance"}
