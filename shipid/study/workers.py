@@ -68,7 +68,9 @@ def on_workers(work: Callable[[Task], Result], tasks: Iterable[Task], count: int
         if isinstance(error, BrokenPipeError) or NO_GUARD in {worker.exitcode for worker in workers.values()}:
             words = 'each worker imports your script: put what it does below a line `if __name__ == "__main__":`'
             raise ShipidError(words, file=sys.modules["__main__"].__file__) from None
-        words = "a worker was killed, perhaps because memory ran out; finished cells are kept: resume with fewer --workers"
+        words = (
+            "a worker was killed, perhaps because memory ran out; finished cells are kept: resume with fewer --workers"
+        )
         raise ShipidError(words) from None
     finally:
         for worker in list(workers.values()):

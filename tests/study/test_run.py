@@ -200,7 +200,7 @@ def test_a_worker_of_a_cluster_without_the_term_says_so(tmp_path: Path, monkeypa
     _, plan = skeg_plan(tmp_path, monkeypatch)
     monkeypatch.delitem(TERMS, "hull.skeg")
     with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': start them with --preload"):
-        run._on_cluster((plan, None, "cpu", {}), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
+        run._on_cluster((plan, None, "cpu", {}), (plan.units[0], b""), Silent())  # type: ignore[arg-type]
 
 
 def test_more_cells_change_none_that_exist(tmp_path: Path, tiny_run: Path) -> None:
@@ -548,6 +548,6 @@ def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(
     monkeypatch.setattr(run, "run_unit", lambda *_: [])
     plan = tiny_plan(tmp_path, {"method": [{"name": "mine", "kind": "mine"}, {"name": "bare", "kind": "alone"}]})
     written = {"code of the method": {"mine": "01234567"}}
-    (session, after), _ = run._on_cluster((plan, None, "cpu", written), (plan.units[0], {}), Silent())  # type: ignore[arg-type]
+    (session, after), _ = run._on_cluster((plan, None, "cpu", written), (plan.units[0], b""), Silent())  # type: ignore[arg-type]
     assert session["code of the method"] == {"mine": "01234567"}
     assert after == session

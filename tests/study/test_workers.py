@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from shipid.errors import ShipidError
-from shipid.study.workers import LONGEST, METHOD, ONE_THREAD, PRELOADED, import_for_workers, on_workers
+from shipid.study.workers import LONGEST, METHOD, ONE_THREAD, PRELOADED, on_workers
 
 forked = pytest.mark.skipif(METHOD != "forkserver", reason="workers are forked on Linux only")
 
