@@ -123,7 +123,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     if shard is not None:
         check_prepared(folder, plan, (DATA, COMMON))
     with store.open_folder(place, plan):
-        for words in (*seals.remove_damaged(place), *(take_in(folder, plan) if shard is None else ())):
+        for words in (*seals.unseal_missing(place), *(take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
         sessions = Sessions(place, session_on(means.device, own_code(plan)))
         if changed := sessions.note(sessions.now):
