@@ -99,9 +99,7 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     if provenance(folder)["digest"] != plan.digest:
-        words = (
-            f"holds another study, or this one before a vessel, the data or a default of shipid {__version__} changed"
-        )
+        words = "holds another study, or this one from before a vessel, the data or a default of shipid changed"
         resume = f"`{program_of(plan)} study resume {quote_argument(folder)}`"
         raise ResultError(f"{words}: choose another --out, or go on with it as it was: {resume}", file=folder)
     with in_place(folder, plan), sole_writer(folder):
