@@ -87,7 +87,6 @@ def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     """
     folder = as_path("folder", folder)
     plan = store.stored_plan(folder)
-    store.check_writable(folder)
     # Products are small: on a busy machine threads cost half of the time.
     with sole_writer(folder, PAGES, wait=True), threadpool_limits(1, user_api="blas"):
         return _write_pages_of_parts(plan, folder, say) if plan.parts else _write_pages_of_run(folder, say)

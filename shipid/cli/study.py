@@ -290,14 +290,13 @@ def _run_to_report(
     from shipid.files import quote_argument
     from shipid.study import run, store
     from shipid.study.plan import program_of
-    from shipid.study.progress import Watch
+    from shipid.study.progress import search_words
 
     resume = f"{program_of(plan)} study resume {quote_argument(folder)}"
     with end_on_interrupt(f"interrupted; what is finished is kept. Continue with: {resume}"):
         events = run.run_study(plan, folder, workers=workers, scheduler=scheduler, device=device, shard=shard)
-        watch = Watch(plan, folder)
         # closing: where a line cannot be printed, the lock is given back before the process ends
-        with closing(events), show_steps(look=lambda: next((one.words for one in watch.look()), "")):
+        with closing(events), show_steps(look=lambda: search_words(plan, folder)):
             for event in events:
                 if line := event_line(event):
                     typer.echo(escape_unprintable(line))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +17,15 @@ from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import check_columns, missing_columns
-from shipid.logs.dates import format_span
 from shipid.predictor import Predictor
 from shipid.report.content import SummaryLine
 from shipid.study.apply import BandSettings, Forecast, instants_along, predict_instants, read_or_import, tables_along
 from shipid.study.store import read_predictor
-from shipid.units import join_names, length_text, level_text, percent_text, plural_word
+from shipid.units import length_text, level_text, percent_text, plural_word
 
 Array = np.ndarray
 TRACK_COLUMNS = ["run", "t", "north", "east"]
-MOMENTS_IN_SUMMARY = 5  # moments of the horizon that the summary shows
+MOMENTS_OF_SUMMARY = np.linspace(0.0, 1.0, 5)  # of the horizon
 SHIP_CHANGED = "the ship, its loading or the weather is not that of the training, and bands do not hold"
 ORDERS_UNKNOWN = "later orders were not known as they were in calibration"
 
@@ -40,25 +39,19 @@ class Replay:
         the whole path over the band as calibrated; not a number where the log ends before.
     points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m] where
         the log goes on. With a band also band_along, band_across [m], band_course [rad, clockwise from north].
-    assumed : what the vessel feels and the log does not hold; it is 0.
+    track : run, t [s], north, east [m] as measured.
     skipped : instants at which a prediction was due before there was a past.
     plan : whether orders were taken as held where the predictor knows a plan.
-    band : what was asked of the band; None: none was asked.
-    track : run, t [s], north, east [m] as measured, for a page. gaps : times without rows, in words. coarse : that rows
-        are farther apart than the step, in words.
+    limits : what limits the comparison, in words. band : what was asked of the band; None: none was asked.
     """
 
     instants: pd.DataFrame
     points: pd.DataFrame
-    step: float
-    horizon: int
+    track: pd.DataFrame
     skipped: int
-    assumed: tuple[str, ...]
     plan: bool
+    limits: tuple[str, ...] = ()
     band: BandSettings | None = None
-    track: pd.DataFrame = field(default_factory=lambda: pd.DataFrame(columns=TRACK_COLUMNS))
-    gaps: str = ""
-    coarse: str = ""
 
 
 def play_aboard(
@@ -104,18 +97,22 @@ def play_aboard(
     if not instants:
         past = f"the past of {predictor.past * step:g} s that the predictor needs"
         raise DataError(f"no instant has {past}: runs are shorter, or --every is longer", file=log)
+    assumed = () if vessel is None else missing_columns(vessel, names)
+    gaps, plan = gaps_in_words(dataset, step), predictor.commands == "known"
+    limits = (
+        f"not in the log, taken as 0: {', '.join(assumed)}" if assumed else "",
+        coarse_in_words(dataset, step),
+        f"{gaps}: no errors there, and a past over one of them is interpolated" if gaps else "",
+        "the plan was: orders stay as they are, since at sea later orders are not known" if plan else "",
+    )
     return Replay(
         pd.concat(instants, ignore_index=True),
         pd.concat(points, ignore_index=True),
-        step,
-        predictor.physics.horizon,
-        skipped,
-        () if vessel is None else tuple(missing_columns(vessel, names)),
-        predictor.commands == "known",
-        band,
         dataset.frame[TRACK_COLUMNS],
-        gaps_in_words(dataset, step),
-        coarse_in_words(dataset, step),
+        skipped,
+        plan,
+        tuple(filter(None, limits)),
+        band,
     )
 
 
@@ -165,96 +162,63 @@ def replay_summary(played: Replay) -> list[SummaryLine]:
     runs, outside = instants["run"].nunique(), instants["outside"].to_numpy(dtype=bool)
     early = f"{played.skipped} {plural_word(played.skipped, 'instant')} before there was a past"
     many = f"{len(instants)} {plural_word(len(instants), 'prediction')} in {runs} {plural_word(runs, 'run')}"
-    lines = [SummaryLine("predictions", f"{many}, {played.horizon * played.step:g} s ahead; {early}")]
-    limits = (
-        f"not in the log, taken as 0: {', '.join(played.assumed)}" if played.assumed else "",
-        played.coarse,
-        f"{played.gaps}: no errors there, and a past over one of them is interpolated" if played.gaps else "",
-        "the plan was: orders stay as they are, since at sea later orders are not known" if played.plan else "",
-    )
-    lines += [SummaryLine("limit", text) for text in limits if text]
-    latency = 1e3 * instants["latency"].to_numpy()
-    words = f"latency: median {np.median(latency):.1f} ms, 99 % below {np.quantile(latency, 0.99):.1f} ms"
-    lines.append(SummaryLine("detail", words))
-    share = f"{outside.sum()} of {len(outside)} instants ({percent_text(outside.mean())})"
-    lines.append(SummaryLine("alarm", f"alarm: at {share} outside of the training"))
-    lines += [SummaryLine("detail", text) for text in _longest_alarms(instants)]
-    for place, text in enumerate(_band_lines(played)):
-        lines.append(SummaryLine("detail" if place else "band", text))
-    table = ["error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"]
-    merged = points.merge(instants[["run", "t", "outside"]], on=["run", "t"])
-    for moment in _moments_of_summary(points):
-        here = merged[(merged["ahead"] == moment) & merged["error"].notna()]
-        if len(here):
-            error, alarm = here["error"].to_numpy(), here["outside"].to_numpy(dtype=bool)
-            median, most, worst = map(length_text, (np.median(error), np.quantile(error, 0.9), error.max()))
-            inside = length_text(np.median(error[alarm])) if alarm.any() else "-"
-            table.append(f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}")
-    return [*lines, *(SummaryLine("detail", text) for text in table)]
+    latency = 1e3 * instants["latency"]
+    return [
+        SummaryLine("predictions", f"{many}, {points['ahead'].max():g} s ahead; {early}"),
+        *(SummaryLine("limit", text) for text in played.limits),
+        SummaryLine("detail", f"latency: median {latency.median():.1f} ms, 99 % below {latency.quantile(0.99):.1f} ms"),
+        SummaryLine(
+            "alarm",
+            f"alarm: at {outside.sum()} of {len(outside)} instants ({percent_text(outside.mean())}) outside of the "
+            "training",
+        ),
+        *([] if played.band is None else [SummaryLine("band", _band_in_words(played, played.band))]),
+        *(SummaryLine("detail", text) for text in _errors_ahead(played)),
+    ]
 
 
-def _band_lines(played: Replay) -> list[str]:
-    """How often the band held whole paths, then by how much it adapted and its size ahead; none without a band."""
-    if played.band is None:
-        return []
-    why = f"{ORDERS_UNKNOWN}, or {SHIP_CHANGED}" if played.plan else SHIP_CHANGED
-    lines = [_band_in_words(played.instants, played.band, why)]
-    if played.band.rate is not None:
-        factors = played.instants["factor"]
-        ends = factors.groupby(played.instants["run"], sort=False).last()[:5]
-        last = ", ".join(f"{run} {value:.2f}" for run, value in ends.items())
-        lines.append(f"  times the calibrated one: {factors.min():.2f} to {factors.max():.2f}; at the end: {last}")
-    points, none = played.points, []
-    for moment in _moments_of_summary(points):
-        here = points[points["ahead"] == moment]
-        along, across = (float(np.median(here[name])) for name in ("band_along", "band_across"))
-        if max(along, across) > SPEED_LIMIT * moment:
-            none.append(f"{moment:g}")
-            continue
-        words = f"{length_text(along)} m along the track, {length_text(across)} m across (median)"
-        lines.append(f"  {moment:g} s ahead: {words}")
-    if none:
-        why = "it is wider than a ship can go in that time, as where an input that did not vary in training now does"
-        lines.append(f"  {join_names(none)} s ahead: no useful band: {why}")
+def _errors_ahead(played: Replay) -> list[str]:
+    """Lines of a table: errors [m] at some moments ahead, and with a band its median half axes there."""
+    points = played.points.merge(played.instants[["run", "t", "outside"]], on=["run", "t"])
+    head = "error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"
+    lines = [head if played.band is None else f"{head}   band along   across"]
+    for moment in points["ahead"].quantile(MOMENTS_OF_SUMMARY, interpolation="nearest").unique():
+        here = points[points["ahead"].eq(moment)]
+        error, alarmed = here["error"], here["error"][here["outside"]]
+        if error.notna().any():
+            median, most, worst, inside = map(
+                _metres, (error.median(), error.quantile(0.9), error.max(), alarmed.median())
+            )
+            line = f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}"
+            if played.band is not None:
+                axes = here[["band_along", "band_across"]].median()
+                axes[axes > SPEED_LIMIT * moment] = np.nan
+                line += " {:>19} {:>8}".format(*map(_metres, axes))
+            lines.append(line)
     return lines
 
 
-def _band_in_words(instants: pd.DataFrame, band: BandSettings, why: str) -> str:
+def _metres(value: float) -> str:
+    """A length [m]; "-" for none, as for a band that is wider than a ship can go in that time."""
+    return "-" if np.isnan(value) else length_text(value)
+
+
+def _band_in_words(played: Replay, band: BandSettings) -> str:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
-    reach, outside = instants["reach"].to_numpy(), instants["outside"].to_numpy(dtype=bool)
-    judged = np.isfinite(reach)
-    promised = judged & ~outside
-    if not judged.any():
+    instants = played.instants[played.instants["reach"].notna()]
+    held, promised = (instants["reach"] <= instants["factor"]).to_numpy(), ~instants["outside"].to_numpy(dtype=bool)
+    if not len(held):
         return f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"
-    held = reach <= instants["factor"].to_numpy()
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
-    adapts = "" if band.rate is None else f", adapting at {band.rate:g}"
+    adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {instants['factor'].max():.2f} times"
     inside = "all in alarm, where nothing is promised"
     if promised.any():
         inside = f"{percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
     line = (
-        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held[judged].mean())} of the "
-        f"{judged.sum()} whole paths that can be judged, {inside}"
+        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held.mean())} of the {len(held)} whole "
+        f"paths that can be judged, {inside}"
     )
     if promised.any() and share_interval(held[promised], instants["run"].to_numpy()[promised])[1] < band.level:
+        why = f"{ORDERS_UNKNOWN}, or {SHIP_CHANGED}" if played.plan else SHIP_CHANGED
         line += f"; that is fewer than {level_text(band.level)} by more than chance: {why}"
     return line
-
-
-def _moments_of_summary(points: pd.DataFrame) -> Array:
-    """Some moments of the horizon, from the first to the last."""
-    ahead = np.unique(points["ahead"])
-    moments: Array = ahead[np.unique(np.linspace(0, len(ahead) - 1, MOMENTS_IN_SUMMARY).round().astype(int))]
-    return moments
-
-
-def _longest_alarms(instants: pd.DataFrame, most: int = 5) -> list[str]:
-    """The longest times of alarm."""
-    spans: list[tuple[float, str, float, float]] = []
-    for run, rows in instants.groupby("run", sort=False):
-        t, outside = rows["t"].to_numpy(), rows["outside"].to_numpy(dtype=bool)
-        edges = np.flatnonzero(np.diff(np.r_[False, outside, False].astype(int)))
-        spans += [(t[b - 1] - t[a], str(run), t[a], t[b - 1]) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    spans.sort(key=lambda span: -span[0])
-    lines = [f"  {run}: from {format_span(first, last)}" for _, run, first, last in spans[:most]]
-    return [*lines, f"  and {len(spans) - most} shorter ones"] if len(spans) > most else lines

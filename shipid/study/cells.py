@@ -102,11 +102,12 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
     adapted = {one.name for one in prepared.foundations if one.fitted}
     wanted: dict[str, tuple[str, ...]] = {}
     for way in work.ways.values():
-        results = fitted[way.name]
-        trained = [name for name in way.foundations if results[name].corrector is not None]
-        names = tuple(name for name in trained if name in adapted or results[name].left_out is None)
+        results = {name: fitted[way.name][name] for name in way.foundations}
+        names = [
+            n for n, one in results.items() if one.corrector is not None and (n in adapted or one.left_out is None)
+        ]
         if names:
-            wanted[way.name] = names
+            wanted[way.name] = tuple(names)
     refits = prepared.study.bands.refits
     if not refits or not wanted:
         return {}
@@ -165,12 +166,20 @@ def evaluate_cell(
     one, way, result = work.known[name], work.ways[method], fitted[method][name]
     foundation, prepared, batch = one.foundation, work.prepared, work.batch
     errors, seconds = left_out.get(pair, (None, 0.0))
-    row: dict[str, Any] = {"cell": batch.cell(name, method), "foundation": name, "family": foundation.family}
-    row |= {"member": foundation.member, "method": method}
-    row |= accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY
-    row |= {"N_D": batch.N_D, "seed": batch.seed, "runs": len(prepared.runs(batch))}
-    row |= {"minutes": covered_time(work.windows) / 60, "seconds": result.seconds + one.seconds + seconds}
-    row["trials"] = result.trials
+    row: dict[str, Any] = {
+        "cell": batch.cell(name, method),
+        "foundation": name,
+        "family": foundation.family,
+        "member": foundation.member,
+        "method": method,
+        **(accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY),
+        "N_D": batch.N_D,
+        "seed": batch.seed,
+        "runs": len(prepared.runs(batch)),
+        "minutes": covered_time(work.windows) / 60,
+        "seconds": result.seconds + one.seconds + seconds,
+        "trials": result.trials,
+    }
     if result.corrector is None:
         return Cell(
             row | _failed_columns("failed", shorten_line(result.sentence or one.sentence or "no training converged"))

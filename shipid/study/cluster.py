@@ -1,22 +1,22 @@
 """Units of work on the cluster of a Dask scheduler: what is left when it, or a worker, dies is reported in one line.
 
-Workers touch no folder: what a search writes as it goes is sent to the process that gave the task.
+Workers do not touch the folder of the run: what a search writes is also sent to the process that gave the task.
 """
 
 from __future__ import annotations
 
 import logging
 import pickle
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
+from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from shipid.errors import ShipidError
+from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Row, Space
 
 DASK = {  # a graph holds the windows once; a scheduler that is gone is noticed in seconds
@@ -29,13 +29,10 @@ KEPT = "what is finished is kept: go on with `shipid study resume`"
 REMEDY = "start scheduler and workers where shipid, and methods that you wrote, can be imported as here"
 LOOK = 2.0  # s between looks at the scheduler while nothing comes
 SILENT = 30.0  # s that a scheduler may take to answer
-PATIENCE = 20.0  # s without any worker until that is reported
-AHEAD = 3  # tasks for each thread of the workers: others are left to whoever comes
 
 Shared = TypeVar("Shared")
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-Known = tuple[list[Row], int | None]  # trials of a search so far, and how many there will be
 log = logging.getLogger(__name__)
 
 
@@ -58,45 +55,28 @@ class Line:
         return [pickle.loads(content) for _, content in get_client().get_events(self.topic)]
 
 
-class SentSearches:
-    """The searches of a unit on a worker of a cluster: each trial is sent as it ends, see `shipid.hybrid.journal`.
+class SentJournal(Journal):
+    """The journal of a unit on a worker of a cluster, in a file there; all that is added to it is sent, too.
 
-    known : what the journal holds, by cell; what a worker that died has sent since is added.
+    content : of the journal in the folder of the run; what a worker that died has sent since is added.
     """
 
-    def __init__(self, known: Mapping[str, Known], line: Line) -> None:
-        self._rows = {cell: list(rows) for cell, (rows, _) in known.items()}
-        self._counts = {cell: count for cell, (_, count) in known.items()}
-        self._line = line
+    def __init__(self, file: Path, content: bytes, digest: str, line: Line) -> None:
+        file.write_bytes(content)
+        super().__init__(file, study=digest)
         for name, *given in line.sent():
-            (self._keep if name == "add" else self._fix)(*given)
-
-    def rows(self, cell: str) -> list[Row]:
-        """Return the trials of a search that ended, in order."""
-        return list(self._rows[cell])
-
-    def count(self, cell: str) -> int | None:
-        """Return how many trials the budget of a search allowed; None before that is decided."""
-        return self._counts[cell]
+            getattr(super(), name)(*given)
+        self._line = line
 
     def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
-        """Append trials to searches: cell -> rows, each with the next number."""
-        self._keep(rows, space)
+        """Append trials to searches, and send them."""
+        super().add(rows, space)
         self._line.send("add", rows, space)
 
     def decide(self, cells: Sequence[str], count: int) -> None:
-        """Write how many trials some searches have."""
-        self._fix(cells, count)
+        """Write how many trials some searches have, and send it."""
+        super().decide(cells, count)
         self._line.send("decide", cells, count)
-
-    def _keep(self, rows: Mapping[str, Sequence[Row]], _: Space) -> None:
-        for cell, more in rows.items():
-            for row in more:
-                if row["number"] == len(self._rows[cell]):  # two workers may have sent it
-                    self._rows[cell].append(row)
-
-    def _fix(self, cells: Sequence[str], count: int) -> None:
-        self._counts |= dict.fromkeys(cells, count)
 
 
 def on_dask(
@@ -114,8 +94,8 @@ def on_dask(
     Parameters
     ----------
     scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
-    shared : sent once to each worker. tasks : with a key each, taken when workers are about to need them. name : of the
-        whole work; beside it the keys name this client, since a scheduler computes a key once for all its clients.
+    shared : sent once to each worker. tasks : with a key each. name : of the whole work; beside it the keys name this
+        client, since a scheduler computes a key once for all its clients.
     receive : called in this thread with the key of a task and each message that it sends by its line.
 
     Raises
@@ -130,14 +110,17 @@ def on_dask(
         message = "a Dask scheduler needs the package dask: pip install 'shipid[dask]'"
         raise ShipidError(message, path=f"--scheduler {scheduler}") from None
 
-    with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
+    for known in [*logging.root.manager.loggerDict]:
+        if known.split(".")[0] in ("distributed", "tornado", "asyncio"):  # their errors are reported in one line
+            logging.getLogger(known).setLevel(logging.CRITICAL + 1)
+    with warnings.catch_warnings(), dask.config.set(DASK):
         warnings.simplefilter("ignore")
         try:
             client = Client(scheduler, timeout="10s")
         except (OSError, ValueError) as error:
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
         try:
-            yield from _results(client, work, shared, tasks, f"shipid-{name}-{client.id}", _Watch(client), receive)
+            yield from _results(client, work, shared, tasks, f"shipid-{name}-{client.id}", receive)
         except ShipidError as error:
             raise ShipidError(error.message, file=error.file, path=error.path or f"--scheduler {scheduler}") from error
         finally:
@@ -151,7 +134,6 @@ def _results(
     shared: Shared,
     tasks: Iterable[tuple[str, Task]],
     name: str,
-    watch: _Watch,
     receive: Callable[..., object],
 ) -> Iterator[tuple[Task, Result]]:
     from dask.distributed import CancelledError, KilledWorker
@@ -160,28 +142,25 @@ def _results(
     left: dict[str, tuple[Task, Any]] = {}
     killed: list[str] = []
     mistake: Exception | None = None
-    waiting, given = iter(tasks), None
+    given, lonely = None, False
     try:
         given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
-        while mistake is None:
-            watch.look()
-            for key, task in islice(waiting, max(AHEAD * watch.threads - len(left), 0)):
-                topic = f"{name}-{key}"
-                client.subscribe_topic(topic, lambda event, key=key: came.put((key, event[1])))
-                future = client.submit(work, given, task, Line(topic), key=topic, pure=False)
-                left[key] = task, future
-                future.add_done_callback(lambda future, key=key: came.put((key, future)))
-            if not left:
-                break
+        for key, task in tasks:
+            topic = f"{name}-{key}"
+            client.subscribe_topic(topic, lambda event, key=key: came.put((key, event[1])))
+            future = client.submit(work, given, task, Line(topic), key=topic, pure=False)
+            left[key] = task, future
+            future.add_done_callback(lambda future, key=key: came.put((key, future)))
+        while left and mistake is None:
             try:
                 key, future = came.get(timeout=LOOK)
             except Empty:
+                lonely = _has_no_workers(client, lonely)
                 continue
             if isinstance(future, bytes):
                 receive(key, *pickle.loads(future))
                 continue
             task, _ = left.pop(key)
-            client.unsubscribe_topic(f"{name}-{key}")
             try:
                 results = future.result(timeout=SILENT)
             except KilledWorker:
@@ -200,10 +179,7 @@ def _results(
     if mistake is not None:
         raise mistake
     if killed:
-        more = f" and {len(killed) - 3} more" if len(killed) > 3 else ""
-        words = (
-            f"workers of the cluster die at {', '.join(killed[:3])}{more}: for want of memory, or of a module of yours"
-        )
+        words = f"workers of the cluster die at {', '.join(killed)}: for want of memory, or of a module of yours"
         raise ShipidError(f"{words}; {REMEDY}, or take larger workers; {KEPT}")
 
 
@@ -219,42 +195,11 @@ def _unread(given: Any) -> str:
     return f"the Dask scheduler cannot read the work ({str(error).splitlines()[0]}): {REMEDY}"
 
 
-class _Watch:
-    """Looks at a scheduler: OSError where it is gone, a warning where it has no worker for a while.
-
-    threads : of all workers at the last look; at least 1, so that there is something to wait for.
-    """
-
-    def __init__(self, client: Any) -> None:
-        self._client = client
-        self._looked, self._seen, self._warned = float("-inf"), time.monotonic(), False
-        self.threads = 1
-
-    def look(self) -> None:
-        """Look, if the last look is some time ago."""
-        if time.monotonic() - self._looked < LOOK:
-            return
-        if self._client.status not in ("running", "connecting"):
-            raise OSError("closed")
-        workers = self._client.sync(self._client.scheduler.identity, callback_timeout=SILENT)["workers"]
-        self._looked = time.monotonic()
-        self.threads = max(sum(worker["nthreads"] for worker in workers.values()), 1)
-        if workers:
-            self._seen, self._warned = time.monotonic(), False
-        elif not self._warned and time.monotonic() - self._seen > PATIENCE:
-            log.warning("the Dask scheduler has no workers: waiting for one")
-            self._warned = True
-
-
-@contextmanager
-def _without_logs(*names: str) -> Iterator[None]:
-    """Silence loggers and those below them, whose errors are reported in one line."""
-    every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
-    before = {logger: logger.level for logger in every}
-    try:
-        for logger in every:
-            logger.setLevel(logging.CRITICAL + 1)
-        yield
-    finally:
-        for logger, level in before.items():
-            logger.setLevel(level)
+def _has_no_workers(client: Any, before: bool) -> bool:
+    """Whether a scheduler has no workers, with a warning if it had some before; OSError where it is gone."""
+    if client.status not in ("running", "connecting"):
+        raise OSError("closed")
+    workers = client.sync(client.scheduler.identity, callback_timeout=SILENT)["workers"]
+    if not workers and not before:
+        log.warning("the Dask scheduler has no workers: waiting for one")
+    return not workers

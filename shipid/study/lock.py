@@ -36,9 +36,6 @@ def sole_writer(folder: Path, name: str = WRITER, *, wait: bool = False) -> Iter
     except Timeout:
         message = f"{_holder_words(holder)} works in it: wait until it has ended, or end it"
         raise ResultError(message, file=folder) from None
-    except PermissionError as error:
-        remedy = "let this user write it, or remove it"
-        raise ResultError(f"cannot be locked ({error.strerror}): {remedy}", file=lock.lock_file) from None
     except OSError as error:
         if error.errno not in NO_LOCKS:
             raise

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -25,26 +25,18 @@ from shipid.study.declared import NO_MODEL
 from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Plan, families_set_from, model_label, uncounted_families, verdict_method
 
-CELLS_BETWEEN_WORDS = 20  # cells read between words on how far it is
-MOST_KEPT = 2**30  # bytes of predicted paths in memory
+MOST_KEPT = 1000  # predicted paths in memory, of about 1 MB each
 
 
 class StoredPaths(Mapping[str, np.ndarray]):
-    """Predicted test paths (T, S, 2) [m] by cell, read from their files when they are asked for, and kept in memory.
-
-    files : cell -> its file. Where all that is kept has more than `MOST_KEPT` bytes, it is read anew.
-    """
+    """Predicted test paths (T, S, 2) [m] by cell, read from their files when asked for; the latest are kept."""
 
     def __init__(self, files: Mapping[str, Path]) -> None:
         self._files = files
-        self._kept: dict[str, np.ndarray] = {}
+        self._read = lru_cache(MOST_KEPT)(lambda cell: read_arrays(files[cell])["paths"])
 
     def __getitem__(self, cell: str) -> np.ndarray:
-        if cell not in self._kept:
-            if sum(paths.nbytes for paths in self._kept.values()) > MOST_KEPT:
-                self._kept.clear()
-            self._kept[cell] = read_arrays(self._files[cell])["paths"]
-        return self._kept[cell]
+        return self._read(cell)
 
     def __contains__(self, cell: object) -> bool:
         return cell in self._files
@@ -163,15 +155,11 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
 
 
 def _read_part_cells(folder: Path, plan: Plan) -> pd.DataFrame:
+    """The rows of one run, with the name that figures give their models."""
     seals.check_seals(folder, "batches/")
-    return _with_model_names(store.read_rows(folder, plan), plan)
-
-
-def _with_model_names(cells: pd.DataFrame, plan: Plan) -> pd.DataFrame:
-    """The cells with the name that figures give their models."""
-    return cells.assign(
-        model=[model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
-    )
+    cells = store.read_rows(folder, plan)
+    labels = [model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
+    return cells.assign(model=labels)
 
 
 def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:
@@ -185,13 +173,13 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         named = ", ".join(str(store.part_folder(Path(), name)) for name in plan.parts)
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check_seals(folder)
-    cells = _with_model_names(store.read_rows(folder, plan), plan)
+    cells = _read_part_cells(folder, plan)
     test, physics, naive = store.read_test(folder)
     bands: dict[str, Bands] = {}
     no_band: dict[str, str] = {}
     good = [str(cell) for cell in cells["cell"][cells["status"] == "ok"]]
     for count, cell in enumerate(good, start=1):
-        if say is not None and count % CELLS_BETWEEN_WORDS == 0:
+        if say is not None:
             say(f"reading cells: {count} of {len(good)}")
         band, reason = read_bands(store.cell_file(folder, cell))
         if band is not None:

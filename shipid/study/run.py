@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from shipid.arguments import as_path, check_class, check_whole_number
@@ -26,7 +27,7 @@ from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
 from shipid.study import seals, store
 from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
-from shipid.study.cluster import Known, Line, SentSearches, on_dask
+from shipid.study.cluster import Line, SentJournal, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
@@ -122,7 +123,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     if shard is not None:
         check_prepared(folder, plan, (DATA, COMMON))
     with store.open_folder(place, plan):
-        for words in (*seals.remove_damaged(place), *(take_in(folder, plan) if shard is None else ())):
+        for words in (*seals.unseal_missing(place), *(take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
         sessions = Sessions(place, session_on(means.device, own_code(plan)))
         if changed := sessions.note(sessions.now):
@@ -202,8 +203,8 @@ def _compute(
             sessions.note_engine(now)
             yield unit, results
         return
-    writer = cache(journals)  # of this process alone: workers send what it writes
-    tasks = ((unit.key, (unit, _searches(unit, writer(unit.key)))) for unit in units)
+    writer, kept = cache(journals), {file.stem: file.read_bytes() for file in (place / store.JOURNALS).glob("*.log")}
+    tasks = [(unit.key, (unit, kept.get(unit.key, b""))) for unit in units]
 
     def write(key: str, name: str, *given: Any) -> None:
         getattr(writer(key), name)(*given)
@@ -228,19 +229,15 @@ def _on_pool(
 
 
 def _on_cluster(
-    shared: tuple[Plan, PreparedStudy, str, Code], task: tuple[Unit, Mapping[str, Known]], line: Line
+    shared: tuple[Plan, PreparedStudy, str, Code], task: tuple[Unit, bytes], line: Line
 ) -> tuple[list[dict[str, Any]], list[store.Cell]]:
     """A unit on a worker of a cluster: what it was computed with, before and after, and the results."""
-    plan, prepared, device, code = shared
+    (plan, prepared, device, code), (unit, journal) = shared, task
     session = session_at_worker(plan, device, code)
-    results = run_unit(plan, prepared, task[0], device, SentSearches(task[1], line))
+    with TemporaryDirectory() as folder:
+        sent = SentJournal(Path(folder) / f"{unit.key}.log", journal, plan.digest, line)
+        results = run_unit(plan, prepared, unit, device, sent)
     return [session, {**session, "engine": engine_description()}], results
-
-
-def _searches(unit: Unit, journal: Journal) -> dict[str, Known]:
-    """The trials of the searches of a unit so far, and how many there will be, by cell."""
-    cells = [unit.batch.cell(*pair) for pair in unit.pairs]
-    return {cell: (journal.rows(cell), journal.count(cell)) for cell in cells}
 
 
 def _finish(plan: Plan, folder: Path, prepared: PreparedStudy, device: str, begun: float) -> None:

@@ -40,14 +40,10 @@ ROW_COLUMNS = ("family", "member", "A", "A_90", "diverged")
 def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     """The named family of a study, or all that draw factors from a range; DocumentError if nothing is drawn."""
     drawn = [family for family in plan.families if any(block.drawn for block in family.perturb)]
-    if name is None and not drawn:
-        raise DocumentError("no family draws a factor from a range", file=plan.file, path="family")
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
-        known = name in [family.name for family in plan.families]
-        fault = "draws no factor from a range" if known else "is no family"
-        hint = suggest_name(name, [family.name for family in drawn])
-        raise DocumentError(f"{name!r} {fault}: {hint}", file=plan.file, path="family")
+        hint = f" {name!r}: {suggest_name(name, [family.name for family in drawn])}" if name is not None else ""
+        raise DocumentError(f"no family draws a factor from a range{hint}", file=plan.file, path="family")
     return chosen
 
 
@@ -79,9 +75,7 @@ def screen(
     """
     check_class("plan", plan, Plan, "as of `read_plan`")
     check_class("dataset", dataset, Dataset, "as of `read_dataset`")
-    check_class("wanted", wanted, Sequence, "such as `plan.families`")
     for family in wanted:
-        check_class("family", family, Family, "as of `plan.families`")
         check_choice(f"base of the family {family.name!r}", family.base, plan.vessels)
     count = check_whole_number("count", count, 1)
     pool, test, _ = partition(plan, dataset) if cut is None else cut
@@ -169,24 +163,17 @@ def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
     once), factor, away. Chance is judged by Kendall's rank correlation, whose p-values are exact for few members,
     corrected for the number of pairs in a family.
     """
-    rows = []
+    rows: list[tuple[Any, ...]] = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
-        A, alike = part["A"].to_numpy(), dict[bytes, list[str]]()
+        A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), []
         for path in frame.columns.difference(list(ROW_COLUMNS), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
         pairs = {", ".join(paths): (part[paths[0]], (part[paths[0]] - 1).abs()) for paths in alike.values()}
         chances = [kendalltau(A, values).pvalue for pair in pairs.values() for values in pair]
-        chance = (
-            holm_correction(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2).min(axis=1)
-        )  # nan: all are as far from 1
-        for (named, pair), least in zip(pairs.items(), chance, strict=True):
+        corrected = holm_correction(np.nan_to_num(chances, nan=1.0)).reshape(-1, 2)  # nan: all are as far from 1
+        for (named, pair), least in zip(pairs.items(), corrected.min(axis=1), strict=True):
             if least <= 2 * SIGNIFICANT:  # of both sides
-                strength = [rank_correlation(A, values.to_numpy()) for values in pair]
-                rows.append((name, named, *strength, max(map(abs, strength))))
-    effects = pd.DataFrame(rows, columns=["family", "paths", "factor", "away", "strength"])
-    largest = (
-        effects.sort_values("strength", ascending=False, kind="stable").groupby("family", sort=False).head(MOST_DRIVERS)
-    )
-    order = largest["family"].map(list(dict.fromkeys(effects["family"])).index)
-    return largest.iloc[np.argsort(order.to_numpy(), kind="stable")].drop(columns="strength").reset_index(drop=True)
+                driving.append((name, named, *(rank_correlation(A, values.to_numpy()) for values in pair)))
+        rows += sorted(driving, key=lambda row: -max(map(abs, row[2:])))[:MOST_DRIVERS]
+    return pd.DataFrame(rows, columns=["family", "paths", "factor", "away"])

@@ -18,7 +18,7 @@ from shipid.engine.native import engine_description
 from shipid.errors import ShipidError, shorten_line
 from shipid.hybrid.device import vector_instructions
 from shipid.study import store
-from shipid.study.code import UNKNOWN, code_digest
+from shipid.study.code import code_digest
 from shipid.study.plan import USER_SCRIPT, Plan, own_code
 from shipid.study.workers import on_workers
 from shipid.units import join_names
@@ -119,19 +119,13 @@ def check_workers(plan: Plan) -> None:
         raise
     except Exception as error:  # of a module as it is imported, of a class or of a name in TERMS that is not there
         why = f" ({shorten_line(f'{type(error).__name__}: {error}')})"
-    lacking = {what: digest for what, digest in here.items() if there.get(what) != digest}
-    if not lacking:
-        return
-    named = join_names([*lacking])
-    if there.keys() >= lacking.keys() and UNKNOWN not in lacking.values():
-        words = f"the file of the {named}, or one beside it, has changed since it was imported"
-        raise ShipidError(f"{words}: start this process again")
-    words = f"workers are processes that import your files anew, and there the {named} is not to be had{why}"
-    remedy = (
-        f"write it into a file that can be imported; a line TERMS[...] = ... into a script, as {USER_SCRIPT} in "
-        'docs/extending.md, above its line `if __name__ == "__main__":`'
-    )
-    raise ShipidError(f"{words}: {remedy}", file=getattr(sys.modules[MAIN], "__file__", None))
+    if lacking := [what for what, digest in here.items() if there.get(what) != digest]:
+        words = f"workers import your files anew, and there the {join_names(lacking)} is none, or another"
+        remedy = (
+            "start this process again if a file has changed; else write it into a file to be imported, and a line "
+            f'TERMS[...] = ..., as {USER_SCRIPT} in docs/extending.md, above its line `if __name__ == "__main__":`'
+        )
+        raise ShipidError(f"{words}{why}: {remedy}", file=getattr(sys.modules[MAIN], "__file__", None))
 
 
 def _digests(plan: Plan, _: None = None) -> dict[str, str]:

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from shipid.errors import ResultError
-from shipid.files import read_json, replace_whole, temporary_folder
+from shipid.files import replace_whole, temporary_folder
 from shipid.study import seals, store
 from shipid.study.lock import sole_writer
-from shipid.study.plan import Plan, Unit
+from shipid.study.plan import Plan
 
 SHARDS = "shards"
 
@@ -32,24 +32,22 @@ def check_prepared(folder: Path, plan: Plan, names: Sequence[str]) -> None:
         raise ResultError("is not prepared for shards: `shipid study prepare` does that, once", file=folder)
     if store.provenance(folder)["digest"] != plan.digest:
         raise ResultError("is prepared for another study, or another version of it: choose another --out", file=folder)
-    for fault in seals.sealed_faults(folder, names=names):
-        raise seals.fault_error(folder, fault)
+    seals.check_seals(folder, names=names)
 
 
 def take_in(folder: Path, plan: Plan) -> Iterator[str]:
     """Take the units of all shards into the folder of their run and remove the shards; yield a sentence each.
 
-    Damaged files are left out, so that their units are computed again. Raises ResultError for a shard of another study
-    or of another code of shipid, for one at work, and for a unit whose results differ from those that are there.
+    Raises ResultError for a shard of another study or of another code of shipid, for one at work, for a file that was
+    changed, and for a unit whose results differ from those that are there.
     """
-    units = {unit.key: unit for unit in plan.units}
     for place in sorted((folder / SHARDS).glob("*-of-*")):
         with sole_writer(place):
             _check_shard(folder, place, plan)
-            yield from seals.remove_damaged(place)
+            yield from seals.unseal_missing(place)
             finished = store.finished_units(place, plan.units)
             for unit in finished:
-                _take_unit(folder, place, units[unit.key])
+                _take_unit(folder, place, unit.key)
         with temporary_folder(folder / SHARDS) as gone:  # what a kill leaves of it is no shard
             os.rename(place, gone / place.name)
         yield f"shard {place.name}: {len(finished)} units taken in"
@@ -66,27 +64,27 @@ def _check_shard(folder: Path, place: Path, plan: Plan) -> None:
         raise ResultError(f"{message}: delete one of them and run it again with one version", file=place)
 
 
-def _take_unit(folder: Path, place: Path, unit: Unit) -> None:
+def _take_unit(folder: Path, place: Path, key: str) -> None:
     """Copy the files of a unit; ResultError where the folder has other results of it."""
-    files = seals.named_files(place, unit.key)
-    if store.finished_units(folder, [unit]):
+    files = seals.named_files(place, key)
+    if seals.is_sealed(folder, key):
         for name in files:
             if _content(folder / name) != _content(place / name):
                 message = f"differs from {place / name}, of the same unit: delete one of the two with its seal"
                 raise ResultError(message, file=folder / name)
         return
-    for name in (*files, f"{store.JOURNALS}/{unit.key}.log"):
+    for name in (*files, f"{store.JOURNALS}/{key}.log"):
         if (place / name).is_file():
             with replace_whole(folder / name) as temporary:
                 shutil.copyfile(place / name, temporary)
-    seals.write_seal(folder, unit.key, [folder / name for name in files])
+    seals.write_seal(folder, key, [folder / name for name in files])
 
 
 def _content(file: Path) -> Any:
-    """What a file of results holds, without what a clock measured; of rows as text, in which NaN equals itself."""
+    """What a file of results holds, without what a clock measured."""
     if file.suffix != ".json":
-        return file.read_bytes() if file.is_file() else None
-    rows = [{key: value for key, value in row.items() if key != "seconds"} for row in read_json(file)]
-    for row in rows:
-        row["trials"] = [{key: value for key, value in one.items() if key != "seconds"} for one in row["trials"]]
-    return json.dumps(rows)
+        return file.read_bytes()
+    return json.loads(
+        file.read_text(encoding="utf-8"),
+        object_hook=lambda entry: {key: value for key, value in entry.items() if key != "seconds"},
+    )

@@ -44,6 +44,12 @@ JOURNALS, TRIALS = "trials", "trials.log"
 FOLDERS = ("cells", "predictions", "batches", seals.FOLDER, JOURNALS)
 RESULTS = "results"  # name of the seal of the tables
 PARTS = "parts"
+PREFIXES = {
+    "columns": "column ",
+    "planned": "planned ",
+    "past": "past ",
+    "states": "states ",
+}  # of the arrays of `TEST`
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
 
@@ -80,13 +86,9 @@ class Cell(NamedTuple):
 def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
     """Work alone in the folder of a run, which is made, or is that of the same study already.
 
-    It appears with all that says what it is. ResultError for the folder of another study, for one that this user may
-    not read or write, and where another process works in it.
+    It appears with all that says what it is. ResultError for the folder of another study, for one that cannot be made,
+    and where another process works in it.
     """
-    if folder.is_symlink() and not folder.exists():
-        raise ResultError("is a link that leads nowhere: choose another --out", file=folder)
-    if folder.exists() and not folder.is_dir():
-        raise ResultError("is a file: choose another --out", file=folder)
     try:
         make_folder(folder.parent)
         sweep_temporary(folder.parent)
@@ -97,42 +99,22 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     if provenance(folder)["digest"] != plan.digest:
-        raise ResultError(_other_study(folder, plan), file=folder)
-    check_writable(folder)
+        words = "holds another study, or this one from before a vessel, the data or a default of shipid changed"
+        resume = f"`{program_of(plan)} study resume {quote_argument(folder)}`"
+        raise ResultError(f"{words}: choose another --out, or go on with it as it was: {resume}", file=folder)
     with in_place(folder, plan), sole_writer(folder):
-        _check_described(folder, plan)
+        stored_plan(folder)  # raises where it was changed by hand
         sweep_run(folder)
         yield
 
 
-def _other_study(folder: Path, plan: Plan) -> str:
-    """What a folder holds that is of another digest."""
-    if documents.read_document(folder / STUDY) != plan.document:
-        return f"holds the results of another study than {plan.file}: choose another --out"
-    words = f"holds results from before a vessel, the data, or a default of shipid (this is {__version__}) changed"
-    resume = f"`{program_of(plan)} study resume {quote_argument(folder)}`"
-    return f"{words}: choose another --out, or go on with it as it was: {resume}"
-
-
-def check_writable(folder: Path) -> None:
-    """Raise ResultError for the folder of a run, or one in it, where this user may not write or replace files."""
-    for place in (folder, *(folder / name for name in (*FOLDERS, PARTS))):
-        if place != folder and os.path.lexists(place) and not place.is_dir():
-            raise ResultError("is no folder, where one belongs: move it away, and resume", file=place)
-        if place.is_dir() and not os.access(place, os.W_OK | os.X_OK):
-            remedy = "let this user, or copy the folder of the run, and name the copy"
-            raise ResultError(f"is a folder that this user may not write into: {remedy}", file=place)
-
-
 @contextmanager
 def in_place(folder: Path, plan: Plan) -> Iterator[None]:
-    """Raise ResultError in place of an error in the folder of a run that is gone, or that this user may not change."""
+    """Raise ResultError in place of an error in the folder of a run that is gone."""
     try:
         yield
-    except (OSError, ShipidError) as error:
+    except (OSError, ShipidError):
         check_place(folder, plan.digest)
-        if isinstance(error, PermissionError):
-            check_writable(folder)
         raise
 
 
@@ -143,13 +125,7 @@ def check_place(folder: Path, digest: str) -> None:
 
     digest : of the plan of the run.
     """
-    try:
-        same = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["digest"] == digest
-    except FileNotFoundError:
-        same = (folder / STUDY).exists()
-    except (OSError, ValueError, TypeError, KeyError):  # a file server that is slow, or a damage: it says nothing else
-        return
-    if not same:
+    if not (folder / STUDY).exists() or seals.study_digest(folder) not in (None, digest):
         message = "was moved, removed or replaced while this run worked in it: what was finished is where it is now"
         raise ResultError(f"{message}; `shipid study resume` goes on there", file=folder)
 
@@ -158,21 +134,6 @@ def sweep_run(folder: Path) -> None:
     """Remove what processes that are gone were writing into the folder of a run."""
     for place in (folder, *(folder / name for name in FOLDERS)):
         sweep_temporary(place)
-
-
-def _check_described(folder: Path, plan: Plan) -> None:
-    """Raise ResultError where study and vessels in the folder are not those of the plan."""
-    try:
-        stored = {name: entry["document"] for name, entry in read_json(folder / VESSELS).items()}
-        same = documents.digest_document(documents.read_document(folder / STUDY)) == documents.digest_document(
-            plan.document
-        ) and {name: documents.digest_document(document) for name, document in stored.items()} == {
-            name: vessel.digest for name, vessel in plan.vessels.items()
-        }
-    except (ShipidError, TypeError, KeyError, AttributeError):
-        same = False
-    if not same:
-        raise ResultError("its study or vessels are damaged or were changed by hand: choose another --out", file=folder)
 
 
 def _make(folder: Path, plan: Plan) -> None:
@@ -383,11 +344,8 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
 def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], naive: np.ndarray) -> None:
     """Store the test windows and the physics paths of every foundation on them, so that a report needs nothing else."""
     arrays: dict[str, np.ndarray] = {"run": test.run, "t": test.t, "future": test.future, "naive": naive}
-    arrays |= {f"column {name}": values for name, values in test.columns.items()}
-    arrays |= {f"planned {name}": values for name, values in test.planned.items()}
-    arrays |= {f"past {name}": values for name, values in test.past.items()}
-    arrays |= {f"states {name}": values for name, values in test.states.items()}
-    arrays |= {f"physics {name}": values for name, values in paths.items()}
+    for prefix, named in {**{one: getattr(test, field) for field, one in PREFIXES.items()}, "physics ": paths}.items():
+        arrays |= {f"{prefix}{name}": values for name, values in named.items()}
     arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
     write_arrays(folder / TEST, arrays, compressed=True)
 
@@ -400,16 +358,14 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]
     except (OSError, ValueError, KeyError):
         raise ResultError("missing or damaged: continue with `shipid study resume`", file=folder / TEST) from None
 
+    named: dict[str, Any] = {field: arrays_with_prefix(arrays, prefix) for field, prefix in PREFIXES.items()}
     windows = Windows(
         run=arrays["run"],
         t=arrays["t"],
-        columns=arrays_with_prefix(arrays, "column "),
         future=arrays["future"],
-        planned=arrays_with_prefix(arrays, "planned "),
-        past=arrays_with_prefix(arrays, "past "),
-        states=arrays_with_prefix(arrays, "states "),
         horizon=meta["horizon"],
         step=meta["step"],
         shared_clock=meta["shared"],
+        **named,
     )
     return windows, arrays_with_prefix(arrays, "physics "), arrays["naive"]

@@ -29,10 +29,11 @@ def test_every_fault_is_a_line(tiny_run: Path, tmp_path: Path) -> None:
     (folder / f"{TEMPORARY}x-1-abc").mkdir()
     store.note_session(folder, {"shipid": "9.9"})
     check = check_folder(folder)
-    assert sorted(fault.kind for fault in check.faults) == ["damaged", "missing"]
+    assert sorted(fault.kind for fault in check.faults) == ["changed", "missing"]
     text = "\n".join(check.lines)
     for words in (
-        "missing or damaged: continue",
+        "computes it again",
+        "is damaged",
         "2 faults",
         "1 temporary folder of killed runs: the next run removes it",
         "computed in parts: shipid was",
@@ -67,4 +68,4 @@ def test_files_of_a_study_whose_method_is_not_here_are_checked(tmp_path: Path, m
     (part / "test.npz").write_bytes(b"half")
     check = check_folder(folder)
     assert [fault.file for fault in check.faults] == ["test.npz"]
-    assert check.lines[0].startswith(f"{part / 'test.npz'}: missing or damaged")
+    assert check.lines[0].startswith(f"{part / 'test.npz'}: was changed")

@@ -70,17 +70,7 @@ def test_tasks_and_results_on_a_cluster_in_this_process() -> None:
     options = {"processes": False, "protocol": "tcp://", "dashboard_address": ":0", "silence_logs": 50}
     with LocalCluster(n_workers=1, threads_per_worker=1, **options) as local:
         address = local.scheduler_address
-        taken: list[int] = []
-
-        def tasks() -> Iterator[tuple[str, int]]:
-            for i in range(12):
-                taken.append(i)
-                yield f"t{i}", i
-
-        done = []
-        for number, result in enumerate(on_dask(address, napping(0.0), 10, tasks(), "x")):
-            assert len(taken) <= number + cluster.AHEAD, "others may take what no worker needs yet"
-            done.append(result)
+        done = on_dask(address, napping(0.0), 10, [(f"t{i}", i) for i in range(12)], "x")
         assert sorted(done) == [(i, 10 + i) for i in range(12)]
 
         def full(_: int, __: int, ___: object) -> int:
@@ -121,7 +111,6 @@ def test_a_scheduler_that_dies_or_falls_silent_is_one_line(
 @pytest.mark.slow
 def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any) -> None:
     """Between the two there is no worker, and what both need must be sent anew."""
-    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     monkeypatch.setattr(cluster, "LOOK", 0.2)
     tasks = [(f"t{i}", i) for i in range(6)]
     done: Done = []

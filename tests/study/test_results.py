@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 
 from shipid import figures
-from shipid.study import results as module
 from shipid.study.plan import read_plan, run_command
 from shipid.study.results import Results, read_cells, read_results
 
@@ -38,15 +37,6 @@ def test_errors_by_axis_of_every_model(read: Results) -> None:
     assert models.loc["none", ["A_along", "A_across"]].isna().all()
     error = np.abs(read.physics["wrong-1"] - read.test.future).mean(axis=(0, 1))
     assert models.loc["wrong-1", ["A_along", "A_across"]].tolist() == pytest.approx(error.tolist())
-
-
-def test_few_paths_stay_in_memory(tiny_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = dict(read_results(tiny_run).paths)
-    monkeypatch.setattr(module, "MOST_KEPT", 1)
-    paths = read_results(tiny_run).paths
-    for cell in [*whole, *whole]:
-        np.testing.assert_array_equal(paths[cell], whole[cell])
-    assert len(paths._kept) == 1  # type: ignore[attr-defined]
 
 
 def test_the_command_reproduces_the_study(read: Results) -> None:

@@ -127,7 +127,7 @@ def test_chance_drives_nothing(members: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "remedy"), [("wrnog", "is no family: did you mean 'wrong'"), ("right", "draws no factor from a range")]
+    ("name", "remedy"), [("wrnog", "'wrnog': did you mean 'wrong'"), ("right", "no family draws a factor from a range")]
 )
 def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
     with pytest.raises(DocumentError, match=remedy) as caught:
@@ -139,11 +139,7 @@ def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) ->
     ("wrong", "message"),
     [
         ({"count": -1}, "count must be a whole number, 1 or more, not -1"),
-        ({"count": "x"}, "count must be a whole number"),
-        ({"wanted": None}, "wanted must be a Sequence, such as `plan.families`, not NoneType"),
-        ({"wanted": ["wrong"]}, "family must be a Family, as of `plan.families`, not 'wrong'"),
         ({"wanted": [Family(name="z", base="mariner")]}, "base of the family 'z' 'mariner' is not known"),
-        ({"wanted": [Family(name="z")]}, "base of the family 'z' None is not known"),
     ],
 )
 def test_a_wrong_argument_is_one_line(plan: Plan, wrong: dict[str, Any], message: str) -> None:

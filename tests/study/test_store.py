@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import sys
@@ -13,7 +12,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.answer.pages import write_pages
 from shipid.errors import ResultError
 from shipid.files import read_json, write_json
 from shipid.physics import TERMS
@@ -32,36 +30,6 @@ def test_a_folder_opens_again_for_the_same_study_alone(tmp_path: Path) -> None:
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
     with pytest.raises(ResultError, match="another study"):
         make_run(tmp_path / "run", other)
-
-
-def test_a_folder_of_another_user_is_named_before_anything_is_computed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run that went on there said `claims: Permission denied`."""
-    plan = tiny_plan(tmp_path)
-    make_run(tmp_path / "run", plan)
-    monkeypatch.setattr("os.access", lambda *_: False)
-    with pytest.raises(
-        ResultError, match=r"run: is a folder that this user may not write into: let this user, or copy"
-    ):
-        make_run(tmp_path / "run", plan)
-
-
-@pytest.mark.parametrize("name", ["cells", "trials"])
-def test_a_folder_in_it_that_this_user_may_not_write_into_is_named_before_anything_is_computed(
-    name: str, tmp_path: Path, tiny_run: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As where only the top folder was opened to a group: it said `trials: Permission denied` when it came there."""
-    folder = shutil.copytree(tiny_run, tmp_path / "run")
-    (folder / name).mkdir(exist_ok=True)
-    access = os.access
-    monkeypatch.setattr(
-        os, "access", lambda place, mode: access(place, mode) and not (place == folder / name and mode & os.W_OK)
-    )
-    words = rf"{name}: is a folder that this user may not write into: let this user, or copy the folder of the run"
-    for look in (lambda: make_run(folder, store.stored_plan(folder)), lambda: write_pages(folder)):
-        with pytest.raises(ResultError, match=words):
-            look()
 
 
 def test_the_working_folder_holds_no_new_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -114,15 +82,6 @@ def test_an_entry_of_the_provenance_that_is_none_is_one_line(key: str, tiny_run:
     for look in (check_folder, read_results, lambda folder: store.note_session(folder, {"shipid": "0"})):
         with pytest.raises(ResultError, match=f"provenance.json: {key}: is not what shipid writes there"):
             look(folder)
-
-
-@pytest.mark.parametrize("name", store.FOLDERS)
-def test_a_file_where_a_folder_of_a_run_belongs_is_named(name: str, tiny_run: Path, tmp_path: Path) -> None:
-    folder = shutil.copytree(tiny_run, tmp_path / "run")
-    shutil.rmtree(folder / name, ignore_errors=True)
-    (folder / name).write_text("")
-    with pytest.raises(ResultError, match=f"{name}: is no folder, where one belongs: move it away, and resume"):
-        make_run(folder, store.stored_plan(folder))
 
 
 def test_a_folder_of_another_version_is_named_itself_not_the_study_it_came_from(tmp_path: Path) -> None:
@@ -212,10 +171,3 @@ def test_each_kind_of_session_is_noted_once(tmp_path: Path) -> None:
     changes = [f"processor was {before}, now {now}" for before, now in (("one", "other"), ("other", "one"))]
     assert notes == [[], [], changes[:1], changes[1:], changes[:1]]
     assert read_json(folder / store.PROVENANCE)["sessions"] == [one, other]
-
-
-@pytest.mark.parametrize("target", ["loop", "gone"])
-def test_a_link_that_leads_nowhere_is_no_folder_of_a_run(target: str, tmp_path: Path) -> None:
-    (tmp_path / "loop").symlink_to(target)
-    with pytest.raises(ResultError, match="loop: is a link that leads nowhere: choose another --out"):
-        make_run(tmp_path / "loop", tiny_plan(tmp_path))

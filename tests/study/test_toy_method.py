@@ -21,7 +21,6 @@ from shipid.study import store
 from shipid.study.apply import predict_log
 from shipid.study.plan import model_label, plain_rival, verdict_method
 from shipid.study.prepare import prepare
-from shipid.study.progress import Watch
 from shipid.study.results import read_results
 from tests.documented import module
 from tests.study.tiny import run_here, tiny_plan
@@ -94,7 +93,6 @@ def test_settings_of_a_users_method_mean_what_the_user_says(tmp_path: Path, monk
     mine = plan.methods[1]
     assert (mine.method.traits, mine.method.num_trials()) == (Traits(), None)
     assert plain_rival(plan) is None
-    Watch(plan, tmp_path)
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
     assert provenance_words(results)["methods"] == "drawn (path-drawn): 1 trials; mine (otherwise)"

@@ -74,12 +74,16 @@ GUARDED = TERM.replace("TERMS[", "if __name__ == '__main__':\n    TERMS[")
 @pytest.mark.parametrize(
     ("mine", "cells", "words"),
     [
-        ("", METHOD + LISTED + RUN, "the method 'own' is not to be had (AttributeError: "),
-        ("", TERM + RUN_TERM, "the term 'hull.skeg' is not to be had (KeyError: "),
-        ("", GUARDED + RUN_TERM, "the term 'hull.skeg' is not to be had (KeyError: "),
-        (METHOD + NOT_IN_A_WORKER, "from mine import Linear" + LISTED + RUN, "to be had (OSError: no camera): write"),
-        (METHOD, BY_PATH + LISTED + RUN, "to be had (ModuleNotFoundError: No module named 'by_path'): write it"),
-        (METHOD, LATER + LISTED + RUN, "the file of the method 'own', or one beside it, has changed since it was"),
+        ("", METHOD + LISTED + RUN, "the method 'own' is none, or another (AttributeError: "),
+        ("", TERM + RUN_TERM, "the term 'hull.skeg' is none, or another (KeyError: "),
+        ("", GUARDED + RUN_TERM, "the term 'hull.skeg' is none, or another (KeyError: "),
+        (METHOD + NOT_IN_A_WORKER, "from mine import Linear" + LISTED + RUN, "or another (OSError: no camera): start"),
+        (METHOD, BY_PATH + LISTED + RUN, "or another (ModuleNotFoundError: No module named 'by_path'): start"),
+        (
+            METHOD,
+            LATER + LISTED + RUN,
+            "the method 'own' is none, or another: start this process again",
+        ),
     ],
 )
 def test_code_that_workers_lack_is_one_line_before_anything_is_computed(
