@@ -17,7 +17,7 @@ def export_command(
     ],
     to: Annotated[str, typer.Option("--to", help="c, fmu, casadi or onnx")],
     out: Annotated[Path, typer.Option("--out", help="the folder for c, else the file to write")],
-    single: Annotated[bool, typer.Option("--single", help="single precision (c and onnx)")] = False,
+    single: Annotated[bool, typer.Option("--single", help="single precision (onnx)")] = False,
     integrator: Annotated[str | None, typer.Option(help="of a vessel's step: rk4 or euler", show_default="rk4")] = None,
     name: Annotated[str | None, typer.Option(help="name in the source; default from --out")] = None,
 ) -> None:
@@ -40,8 +40,9 @@ def export_command(
         integrator = integrator or "rk4"
         if integrator not in ("euler", "rk4"):
             raise DocumentError(f"no such rule: {suggest_name(integrator, ('euler', 'rk4'))}", path="--integrator")
-        vessel = load_vessel(what)
-        written = export_vessel(vessel, to, out, integrator=integrator, single=single, name=name)  # type: ignore[arg-type]
+        if single:
+            raise DocumentError("a vessel is always in double precision: leave it out", path="--single")
+        written = export_vessel(load_vessel(what), to, out, integrator=integrator, name=name)  # type: ignore[arg-type]
     for file in written:
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
     if to == "c" and out / EXAMPLE_FILE not in written:
