@@ -359,7 +359,7 @@ FUNCTION(fmi2GetBoolean, (fmi2Component c, const fmi2ValueReference vr[], size_t
     size_t i;
     if (follow(self) != fmi2OK) return fmi2Error;
     for (i = 0; i < n; ++i) {
-        if (!OUTSIDE || vr[i]) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
+        if (OUTSIDE == 0 || vr[i]) return refuse(self, fmi2Error, "there is no boolean variable %u", vr[i]);
         value[i] = (self->model.status & OUTSIDE) != 0;
     }
     return fmi2OK;
