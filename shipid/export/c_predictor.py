@@ -39,10 +39,9 @@ def predictor_files(model: ExportModel, name: str) -> SourceFiles:
         "CAPACITY": 2 * PARTS_OF_STEP * names.num_past + 4,
         "WIDTH": len(names.now) + len(KEPT_ENTRIES),
         "STATES": max(1, states),
-        "BUFFER": max(states, past + 2 * plan) + 1,
+        "BUFFER": max(states, past + plan) + 1,
         "CHOICES": 0 if bands is None else len(BAND_CHOICE),
         "HAS_PAST": int(past > 0),
-        "HAS_TURNS": int("plan" in functions),
         "HAS_OBSERVER": int(filters is not None),
         "RARE": f"{PAUSE_STEPS:g}",
         "FORGOTTEN": SHORTEST_STEP_GROWTH,
@@ -132,7 +131,7 @@ void @_init(@_recorder *self);
 int @_record(@_recorder *self, double t, const double *row);
 
 /* Path from the newest row: @_HORIZON pairs x, y. planned: @_HORIZON rows of commands in force, each the
- * mean over its step, or a null pointer: commands stay as they are.
+ * mean over its step, angles as they go on from the newest row; or a null pointer: commands stay as they are.
  * choice: a null pointer, or the band that is wanted: its level, the share of whole paths that it holds, above 0 to 0.99;
  * 1 for the share of positions at each step alone, else 0; the kind of the manoeuvre under way, an entry of
  * @_kind_names, 0 for any. band: then @_HORIZON rows of half axes along the predicted track and across it [m], and the
@@ -307,39 +306,16 @@ static int past_rows(@_recorder *self, double *past)
 }
 #endif
 
-#if $HAS_TURNS
-/* Planned angles by the turn that goes on from the newest row. */
-static const double *planned_turns(@_recorder *self, const double *planned, double *plan)
-{
-    double first = 1;
-    int k;
-    $ARRAYS
-    for (k = 0; k < @_HORIZON; ++k, first = 0) {
-        arg[0] = planned + k * @_NUM_PLANNED;
-        arg[1] = k ? plan + (k - 1) * @_NUM_PLANNED : arg[0];
-        arg[2] = self->rows[place_of(self, self->count - 1)];
-        arg[3] = self->parameters;
-        arg[4] = &first;
-        res[0] = plan + k * @_NUM_PLANNED;
-        @_casadi_plan(arg, res, iw, self->work, 0);
-    }
-    return plan;
-}
-#endif
-
 int @_predict(@_recorder *self, const double *planned, const double *choice, double *path, double *band)
 {
     const int newest = place_of(self, self->count - 1);
-    double *past = self->work + $WORK + 2 * @_HORIZON * @_NUM_PLANNED;
+    double *past = self->work + $WORK + @_HORIZON * @_NUM_PLANNED;
     int known = self->count > 0, status;
 #if $HAS_PAST
     known = known && past_rows(self, past);
 #endif
     clear_results(path, band);
     if (!known) return @_NO_PAST;
-#if $HAS_TURNS
-    if (planned) planned = planned_turns(self, planned, self->work + $WORK + @_HORIZON * @_NUM_PLANNED);
-#endif
     status = @_path(self->rows[newest], self->reached, past, planned, self->estimates, self->parameters, choice, path,
         band, self->work);
     return self->t[newest] - self->begun < $SETTLED ? status | @_OUTSIDE : status; /* no run-up of the observer */

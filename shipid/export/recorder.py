@@ -36,12 +36,10 @@ def filters_of(model: ExportModel) -> FilterBank | None:
 
 
 def recorder_functions(model: ExportModel) -> dict[str, ca.Function]:
-    """Functions by name: `keep`; where the model has them `past`, `plan`, `begin`, `between`, `observe`."""
+    """Functions by name: `keep`; where the model has them `past`, `begin`, `between`, `observe`."""
     functions = {"keep": keep_function(model)}
     if model.layout.num_past:
         functions["past"] = past_function(model)
-    if angles_of(model.layout.planned):
-        functions["plan"] = plan_function(model)
     filters = filters_of(model)
     if filters is not None:
         functions["begin"] = begin_function(model, filters)
@@ -112,23 +110,6 @@ def past_function(model: ExportModel) -> ca.Function:
     row |= {name: order[name] for name in every if "." in name}
     row |= split_by_name("xy", turn_vectors(place, -newest["psi"]))
     return function_by_names("past", symbols, {"past": column_of_entries(row, names.past)})
-
-
-def plan_function(model: ExportModel) -> ca.Function:
-    """(planned, before, newest, parameters, first) -> orders of a step, its angles going on from `before`.
-
-    newest : the newest kept row, from which the first step goes on.
-    """
-    names, every = model.layout, kept_names(model)
-    sizes_ = {"planned": len(names.planned), "before": len(names.planned), "newest": len(every)}
-    symbols = symbols_of(sizes_ | {"parameters": len(names.parameters), "first": 1})
-    orders, before = split_by_name(names.planned, symbols["planned"]), split_by_name(names.planned, symbols["before"])
-    newest, numbers = split_by_name(every, symbols["newest"]), split_by_name(names.parameters, symbols["parameters"])
-    for name in angles_of(names.planned):
-        last = ca.if_else(symbols["first"], newest[name], before[name])
-        goes, moved = angle_by_turn(model, name, orders[name], last, numbers)
-        orders[name] = goes - moved  # the past cannot be moved now
-    return function_by_names("plan", symbols, {"orders": column_of_entries(orders, names.planned)})
 
 
 def first_angle(angle: MX, limits: tuple[float, float] | None) -> MX:
