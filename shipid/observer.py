@@ -571,14 +571,6 @@ def _bounded_array(values: Array) -> Array:
     return np.asarray(np.fmin(np.fmax(values, -DIVERGED), DIVERGED))
 
 
-def fading_force(filters: FilterBank, columns: Mapping[str, Array], horizon: int, step: float) -> Array:
-    """Slow force (T, S, 3) [N, N m] over a horizon of T steps, fading from its estimate in `columns` (S,)."""
-    now = np.stack([columns[f"observer.{name}"] for name in "XYN"], axis=1) @ filters.mass.T
-    ages = (np.arange(horizon) + 0.5) * step
-    faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(horizon)
-    return np.asarray(faded[:, None, None] * now)
-
-
 @dataclass(frozen=True, eq=False)
 class ObservedStart:
     """What the physics starts from with an observer, for S instants and T steps.
@@ -628,7 +620,10 @@ def observed_start(
         ahead, across = V_w * np.cos(beta_w) - north, V_w * np.sin(beta_w) - east
         environment |= {"V_w": np.hypot(ahead, across), "beta_w": np.arctan2(across, ahead)}
     environment |= {name: zero for name in ("V_c", "beta_c") if name in environment}
-    return ObservedStart(begun, environment, fading_force(filters, columns, horizon, step), np.stack([north, east]))
+    now = np.stack([columns[f"observer.{name}"] for name in "XYN"], axis=1) @ filters.mass.T
+    ages = (np.arange(horizon) + 0.5) * step
+    faded = np.exp(-ages / filters.fade) if filters.fade > 0 else np.zeros(horizon)
+    return ObservedStart(begun, environment, np.asarray(faded[:, None, None] * now), np.stack([north, east]))
 
 
 def estimates_at_windows(dataset: Dataset, estimates: Estimates, windows: Windows) -> dict[str, Array]:

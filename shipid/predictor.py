@@ -185,12 +185,8 @@ class Predictor(DeployedMethod):
         return paths
 
     def _checked(self, instants: Instants) -> Instants:
-        """The instants with arrays of floats; DataError for another step, without the motion, and for other shapes."""
+        """The instants with arrays of floats that cannot be written to; DataError for another step or other shapes."""
         check_instants(instants)
-        parts = {name: getattr(instants, name) for name in ("past", "planned", "hidden", "estimates")}
-        for part, given in parts.items():
-            if part not in ("planned", "hidden") or given is not None:
-                check_mapping(f"{part} of the instants", given, "a name to an array", DataError)
         missing = next((name for name in ("u", "v", "r") if name not in instants.columns), None)
         if missing is not None:
             raise DataError("the instants lack this column", path=missing)
@@ -198,7 +194,18 @@ class Predictor(DeployedMethod):
         if instants.step is not None and abs(check_number("step", instants.step, DataError) - step) > 1e-9 * step:
             message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
             raise DataError(f"{message}: cut windows with its step")
-        return _as_numbers(instants)
+        count = np.shape(instants.columns["u"])
+        if len(count) != 1:
+            raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
+        motion = {name: values for name, values in instants.columns.items() if name != "run"}  # as of a table
+        parts = {"columns": _locked_floats("columns", motion, count)}
+        horizon = self.physics.horizon if self.commands == "known" else None
+        for part, leading in (("past", (None,)), ("planned", (horizon,)), ("hidden", ()), ("estimates", ())):
+            given = getattr(instants, part)
+            if given is not None or part in ("past", "estimates"):
+                check_mapping(f"{part} of the instants", given, "a name to an array", DataError)
+                parts[part] = _locked_floats(part, given, (*leading, *count))
+        return replace(instants, **parts)
 
     def _known(self, instants: Instants) -> Instants:
         """The instants with planned commands where the predictor takes them, and without them where it does not."""
@@ -207,10 +214,6 @@ class Predictor(DeployedMethod):
             return replace(instants, planned=None)
         if instants.planned is None:
             raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
-        wanted = (self.physics.horizon, len(instants))
-        for name, values in instants.planned.items():
-            if values.shape != wanted:
-                raise DataError(f"a planned command must be {wanted}, not {values.shape}", path=name)
         needed = () if self.vessel is None else vessel_dynamics(self.vessel).commands
         missing = next((name for name in needed if name not in instants.planned), None)
         if missing is not None:
@@ -282,19 +285,16 @@ class Predictor(DeployedMethod):
             header = plain_values(self.corrector.header())
         with locate_errors(f"{home.__name__}.arrays", home):
             given = self.corrector.arrays()
-        wrong = f"the header {what} must be a table of texts, numbers and lists of them"
-        if not isinstance(header, dict):
-            raise DataError(f"{wrong}, not {type(header).__name__}")
         try:
-            json.dumps(header)
+            json.dumps({**header})
         except (TypeError, ValueError) as error:
-            raise DataError(f"{wrong} ({error})") from None
-        if not isinstance(given, Mapping):
-            raise DataError(f"the arrays {what} must be a table, not {type(given).__name__}")
+            raise DataError(
+                f"the header {what} must be a table of texts, numbers and lists of them ({error})"
+            ) from None
         try:
-            arrays = {str(name): np.asarray(values) for name, values in given.items()}
+            arrays = {str(name): np.asarray(values) for name, values in {**given}.items()}
         except (TypeError, ValueError) as error:
-            raise DataError(f"arrays {what}: {error}") from None
+            raise DataError(f"the arrays {what} must be a table of arrays ({error})") from None
         taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
         fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
         if fault:
@@ -334,28 +334,25 @@ class Predictor(DeployedMethod):
     @classmethod
     def load(cls, file: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote; ResultError for anything else."""
-        foreign = ResultError("not a predictor of shipid: a run's folder has them in cells/", file=file)
         try:
             arrays = read_arrays(file)
-            header = json.loads(str(arrays.pop("header")))
-        except IsADirectoryError:
-            raise ResultError("a folder: name one of its cells, FOLDER/cells/NAME.npz", file=file) from None
+            header = {**json.loads(str(arrays.pop("header")))}
         except OSError as error:
-            raise ResultError(f"cannot be read ({error.strerror or 'not a predictor'})", file=file) from None
-        except (ValueError, KeyError, RecursionError):
-            raise foreign from None
-        if not isinstance(header, dict):
-            raise foreign
+            words = f"cannot be read ({error.strerror or 'not a predictor'})"
+            if isinstance(error, IsADirectoryError):
+                words = "a folder: name one of its cells, FOLDER/cells/NAME.npz"
+            raise ResultError(words, file=file) from None
+        except (ValueError, KeyError, TypeError, RecursionError):
+            raise ResultError("not a predictor of shipid: a run's folder has them in cells/", file=file) from None
         _check_format(header, file)
         kind: Any = header.get("method")
         if isinstance(kind, str) and kind not in METHODS:
             raise ResultError(f"made by the method {kind!r}, which is not known here: {method_names(kind)}", file=file)
-        fault = _fault_of(arrays)
-        if fault:
+        if fault := _fault_of(arrays):
             raise ResultError(f"damaged: {fault}: run the study again", file=file)
         try:
             known, vessel = _Header.model_validate(header), header["vessel"]
-            bands = _read_bands(header.get("bands"), arrays)
+            bands = _read_bands(header.get("bands"), arrays)  # the arrays that are left are the method's
             loaded = cls(
                 physics=Physics(
                     None if vessel is None else check_document(vessel["document"], vessel["file"]),
@@ -383,35 +380,14 @@ class Predictor(DeployedMethod):
             raise ResultError("damaged: run the study again", file=file) from None
 
 
-def _as_numbers(instants: Instants) -> Instants:
-    """The instants with arrays of floats that cannot be written to; DataError for a column that is not (S,)."""
-    count = np.shape(instants.columns["u"])
-    if len(count) != 1:
-        raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
-    columns = {}
-    for name in (str(name) for name in instants.columns if name != "run"):  # the name of the run, as of a table
-        columns[name] = locked_view(as_float_array(f"column {name!r}", instants.columns[name], DataError))
-        if columns[name].shape != count:
-            raise DataError(f"must be {count} as 'u', not {columns[name].shape}", path=name)
-
-    def floats(what: str, given: Mapping[str, Array], leading: int | None = None) -> dict[str, Array]:
-        arrays = {
-            name: locked_view(as_float_array(f"{what} {name!r}", values, DataError)) for name, values in given.items()
-        }
-        for name, array in arrays.items():
-            if leading is not None and (array.ndim != leading + 1 or array.shape[leading:] != count):
-                wanted = f"({'P, ' * leading}{count[0]}{'' if leading else ','})"
-                raise DataError(f"{what} must be {wanted}, not {array.shape}", path=name)
-        return arrays
-
-    return replace(
-        instants,
-        columns=columns,
-        past=floats("the past", instants.past, 1),
-        planned=None if instants.planned is None else floats("planned", instants.planned),
-        hidden=None if instants.hidden is None else floats("the hidden state", instants.hidden, 0),
-        estimates=floats("the estimate", instants.estimates, 0),
-    )
+def _locked_floats(part: str, given: Mapping[str, Array], shape: tuple[int | None, ...]) -> dict[str, Array]:
+    """Arrays of floats that cannot be written to; DataError for another shape, of which a None is any length."""
+    arrays = {str(name): locked_view(as_float_array(f"{part} {name!r}", given[name], DataError)) for name in given}
+    for name, array in arrays.items():
+        if len(shape) != array.ndim or any(size not in (None, n) for size, n in zip(shape, array.shape, strict=True)):
+            wanted = ", ".join("P" if size is None else str(size) for size in shape)
+            raise DataError(f"{part} must be ({wanted}), not {array.shape}", path=name)
+    return arrays
 
 
 class _Header(BaseModel):
@@ -596,13 +572,8 @@ def refit_folds(windows: Windows, refits: int, seed: int) -> list[tuple[Index, I
 
 def limits_of(windows: Windows, commands: Iterable[str]) -> dict[str, tuple[float, float]]:
     """Least and greatest value of u, v, r, the commands, wind speed and other environment over windows, by column."""
-    names = [
-        "u",
-        "v",
-        "r",
-        *commands,
-        *(name for name in measurable_signals(windows.columns) if not SIGNALS[name].angle),
-    ]
+    others = (name for name in measurable_signals(windows.columns) if not SIGNALS[name].angle)
+    names = ["u", "v", "r", *commands, *others]
     return {name: (float(windows.columns[name].min()), float(windows.columns[name].max())) for name in names}
 
 

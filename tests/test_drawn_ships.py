@@ -10,7 +10,6 @@ import pytest
 from shipid.engine.gradient import rollout_gradient, squared_distance_loss
 from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Trajectories, rollout
-from shipid.export.c import NumberPrecision
 from shipid.export.c_vessel import vessel_files
 from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
@@ -87,4 +86,4 @@ def test_gradients_agree_and_are_finite(seed: int, dof: int) -> None:
 @ALL
 def test_exported_equations_run_without_a_warning(seed: int, dof: int, tmp_path: Any) -> None:
     vessel = drawn_ship(seed, dof)
-    run_example(vessel_files(vessel, "ship", "rk4", NumberPrecision()), tmp_path, *SANITIZERS)
+    run_example(vessel_files(vessel, "ship", "rk4"), tmp_path, *SANITIZERS)

@@ -20,7 +20,6 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import Instants, cut_windows
 from shipid.engine.rollout import rollout
 from shipid.errors import DataError, DocumentError, ShipidError
-from shipid.export.correctors import inputs_of
 from shipid.export.model import build_model
 from shipid.export.write import export_predictor
 from shipid.hybrid.features import input_group
@@ -45,6 +44,7 @@ from shipid.units import DEGREE
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document, load_vessel
 from tests.documented import entries, module, new_module
+from tests.export.compiled import inputs_of_model
 from tests.logs.conftest import PLAIN, as_log, turning
 from tests.logs.simulated import as_bridge, si_log
 
@@ -213,10 +213,10 @@ def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Pat
     assert np.abs(stepped - step_alone(physics, deep)).max() > 1e-3
     assert input_group("depth") == "wind"
     predictor = fit(OneStep(trials=2, units=8), replace(physics, vessel=load_vessel("gunnerus-28.9")), windows)
-    assert "depth" in inputs_of(predictor.corrector).environment
+    assert "depth" in build_model(predictor).layout.now
     assert predictor.limits["depth"] == (log["depth"].min(), log["depth"].max())
     few = instants.select(slice(4))
-    expected, given = predictor.predict(few), build_model(predictor).inputs(few)
+    expected, given = predictor.predict(few), inputs_of_model(build_model(predictor), few)
     unknown = Instants({name: values for name, values in few.columns.items() if name != "depth"})
     with pytest.raises(DataError, match="depth: the method was trained with this input; the data must hold"):
         predictor.predict(unknown)

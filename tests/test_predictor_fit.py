@@ -181,9 +181,9 @@ def test_diverging_physics_is_refused() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"psi": np.zeros(1)}, "psi: must be .* as 'u', not"),
+        ({"psi": np.zeros(1)}, "psi: columns must be .150., not .1,."),
         ({"u": np.array(2.0)}, r"u: must be \(S,\), a value for each instant, not \(\)"),
-        ({"port.n": np.array(["2"] * len(WINDOWS))}, r"column 'port\.n' must be an array of numbers"),
+        ({"port.n": np.array(["2"] * len(WINDOWS))}, r"columns 'port\.n' must be an array of numbers"),
     ],
 )
 def test_a_column_of_another_shape_is_named(predictor: Predictor, change: dict[str, Any], message: str) -> None:
@@ -231,7 +231,7 @@ def test_a_part_of_another_shape_is_named(part: str) -> None:
     for name, values in given.items():
         for wrong in (values[..., :2], values[..., 0], values[None]):
             changed = replace(strange.instants, **{part: {**given, name: wrong}})
-            with pytest.raises(DataError, match=rf"{re.escape(name)}: the .* must be \((P, 5|5,)\), not \("):
+            with pytest.raises(DataError, match=rf"{re.escape(name)}: {part} must be \((P, )?5\), not \("):
                 strange.predictor.predict(changed)
 
 
@@ -415,9 +415,9 @@ def test_paths_of_a_method_that_are_none_are_named(made: Callable[[Any], Any], m
         ({}, {"std": np.zeros(2)}, "arrays of the method 'mine': 'std' must be above 0"),
         ({}, {"header": np.zeros(2)}, "arrays of the method 'mine': 'header' is a name that is taken: use another"),
         ({}, {"bands.x": np.zeros(2)}, "arrays of the method 'mine': 'bands.x' is a name that is taken"),
-        ({}, {"ragged": [[1.0], [1.0, 2.0]]}, "arrays of the method 'mine': .*inhomogeneous"),
-        ({}, None, "the arrays of the method 'mine' must be a table, not NoneType"),
-        ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them, not list"),
+        ({}, {"ragged": [[1.0], [1.0, 2.0]]}, "arrays of the method 'mine' must .*inhomogeneous"),
+        ({}, None, "the arrays of the method 'mine' must be a table of arrays"),
+        ([1], {}, "the header of the method 'mine' must be a table of texts, numbers and lists of them"),
         ({"a": {1, 2}}, {}, "the header of the method 'mine' must be a table .* not JSON serializable"),
     ],
 )
@@ -469,8 +469,8 @@ def test_planned_commands_are_all_there_and_of_the_horizon() -> None:
         for wrong, message in (
             ({}, "port.n: "),
             ({name: values for name, values in planned.items() if name != "port.n"}, "port.n: "),
-            (planned | {"port.n": planned["port.n"][0]}, "port.n: a planned command must be"),
-            (planned | {"port.n": planned["port.n"][:2]}, "port.n: a planned command must be"),
+            (planned | {"port.n": planned["port.n"][0]}, "port.n: planned must be"),
+            (planned | {"port.n": planned["port.n"][:2]}, "port.n: planned must be"),
         ):
             with pytest.raises(DataError, match=message):
                 known.predict(Instants(WINDOWS.columns, planned=wrong))

@@ -17,7 +17,7 @@ def export_command(
     ],
     to: Annotated[str, typer.Option("--to", help="c, fmu, casadi or onnx")],
     out: Annotated[Path, typer.Option("--out", help="the folder for c, else the file to write")],
-    single: Annotated[bool, typer.Option("--single", help="single precision (c and onnx)")] = False,
+    single: Annotated[bool, typer.Option("--single", help="single precision (onnx)")] = False,
     integrator: Annotated[
         Literal["rk4", "euler"] | None, typer.Option(help="of a vessel's step", show_default="rk4")
     ] = None,
@@ -34,8 +34,9 @@ def export_command(
             raise DocumentError("a predictor keeps that of its study: leave it out", path="--integrator")
         written = export_predictor(read_predictor(Path(what)), to, out, single=single, name=name)
     else:
-        vessel = shipid.load_vessel(what)
-        written = export_vessel(vessel, to, out, integrator=integrator or "rk4", single=single, name=name)
+        if single:
+            raise DocumentError("a vessel is always in double precision: leave it out", path="--single")
+        written = export_vessel(shipid.load_vessel(what), to, out, integrator=integrator or "rk4", name=name)
     for file in written:
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
     if to == "c" and out / EXAMPLE_FILE not in written:

@@ -10,7 +10,6 @@ import numpy as np
 from casadi import MX
 
 from shipid.export.correctors import distance_to_nearest
-from shipid.export.equations import function_by_names, symbols_of
 from shipid.export.known import column_of_entries
 from shipid.hybrid.bands import FEWEST, LEVELS, Bands
 
@@ -24,13 +23,9 @@ def radii_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
     """Radius (T,) of a band, by linear interpolation between `LEVELS`: each table times a weight of 1 at its place."""
     whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])
     near = ca.fmax(0, 1 - ca.fabs(100 * level - ca.DM(100 * LEVELS)))
-    steps = ca.mtimes(ca.DM(bands.steps.T), near)
-    return ca.if_else(pointwise != 0, steps, ca.repmat(_radius_of_kind(whole, near, kind), len(bands.along), 1))
-
-
-def _radius_of_kind(whole: np.ndarray, near: MX, kind: MX) -> MX:
     of = ca.fmax(0, 1 - ca.fabs(kind - ca.DM(range(len(whole)))))
-    return ca.dot(of, ca.mtimes(ca.DM(whole), near))
+    radius = ca.dot(of, ca.mtimes(ca.DM(whole), near))
+    return ca.if_else(pointwise != 0, ca.mtimes(ca.DM(bands.steps.T), near), ca.repmat(radius, len(bands.along), 1))
 
 
 def band_rows(bands: Bands, now: Mapping[str, MX], path: MX, step: float, radius: MX) -> MX:
@@ -81,22 +76,3 @@ def is_band_promised(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
     promised = ca.logic_and(ca.logic_and(level > 0, level <= float(LEVELS[-1])), runs >= FEWEST)
     promised = ca.logic_and(promised, level / (1 - level) - 1e-9 <= runs)
     return ca.logic_and(promised, ca.logic_not(ca.logic_and(pointwise != 0, kind != 0)))
-
-
-def factor_function(bands: Bands) -> ca.Function:
-    """(miss, level, kind) -> growth of an adaptive band, as `shipid.hybrid.bands.adaptive_factor`."""
-    inputs = symbols_of({"miss": 1, "level": 1, "kind": 1})
-    miss, level, kind = inputs.values()
-    whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])
-    most = float(LEVELS[-1])
-
-    def radius(of: MX) -> MX:
-        return _radius_of_kind(whole, ca.fmax(0, 1 - ca.fabs(100 * ca.fmin(of, most) - ca.DM(100 * LEVELS))), kind)
-
-    now, usual = 1 - miss, radius(level)
-    grown = radius(now) / ca.if_else(usual == 0, 1, usual) * ca.exp(ca.fmax(now - most, 0) / 0.05)
-    grown = ca.if_else(now <= 0, 0, ca.if_else(usual == 0, 1, grown))
-    known = ca.mmax(kind == ca.DM(range(len(whole))))
-    known = ca.logic_and(known, ca.logic_and(level > 0, level < 1))
-    result = ca.if_else(ca.logic_and(known, ca.fabs(miss) < np.inf), grown, np.nan)
-    return function_by_names("factor", inputs, {"factor": result})

@@ -1,48 +1,28 @@
-"""Text of C99: names, strings, comments and tables of a wrapper, and the C that CasADi writes of its functions."""
+"""C99 files: the C that CasADi writes of some functions, and a wrapper of names, units, comments and tables."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from string import Template
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from shipid.errors import escape_unprintable
+from shipid.version import __version__
 from shipid.vessel.load import Vessel
 
 Array = np.ndarray
-SINGLE_PRECISION_NOTE = [  # of the header in single precision
-    "Single precision: give north and east from a point nearby. In coordinates of a map, such as 7,000,000 m, the next",
-    "number is 0.5 m away.",
-]
-RESERVED_WORDS = frozenset(
+TAKEN_NAMES = frozenset(
     """
-    auto break case char const continue default do double else enum extern float for goto if inline int long register
-    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while main real
-    acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10 log1p
-    log2 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint lrint llrint
-    round lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin fma isnan isinf
-    isfinite signbit abort abs atexit atof atoi atol atoll bsearch calloc div exit free getenv labs ldiv llabs lldiv
-    malloc qsort rand realloc srand strtod strtof strtol system memchr memcmp memcpy memmove memset strcat strchr strcmp
-    strcpy strlen strncmp strncpy strstr printf fprintf sprintf snprintf scanf puts putchar getchar perror remove rename
-    rewind signal raise time clock gamma j0 j1 jn y0 y1 yn index bool true false complex imaginary linux unix
-    and asm bitand bitor catch class compl delete explicit export friend mutable namespace new not operator or private
-    protected public template this throw try typeid typename using virtual xor math string
-    alignas alignof concept consteval constexpr constinit decltype noexcept nullptr requires static_assert thread_local
-    typeof typeof_unqual const_cast dynamic_cast reinterpret_cast static_cast co_await co_return co_yield
-    stdin stdout stderr errno assert random select
-    above_zero are_finite begin_within choose evaluate follow free_memory get_memory guid identifier is_ours kinds
-    past_rows path_at planned_turns predict_from refuse say self set start_values sum_of t va_list
+    assert complex ctype errno fenv float inttypes iso646 limits locale main math setjmp signal stdalign stdarg
+    stdatomic stdbool stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
     """.split()
 )
-"""Keywords of C99, C23 and C++20, names of C's library and headers and of the sources themselves.
-
-A file of such a name would not compile."""
+"""Names of the headers of C's library, and of the example: files of these names would stand in their place."""
 
 
 @dataclass(frozen=True)
@@ -53,73 +33,109 @@ class SourceFiles:
     texts: dict[str, str]
 
 
-@dataclass(frozen=True)
-class NumberPrecision:
-    """How C writes numbers: in `double` or in `single` precision."""
+class Wrapper(NamedTuple):
+    """Texts of C by hand in which @ stands for the name that begins every public name, and $KEY for a value."""
 
-    single: bool = False
-
-    @property
-    def real(self) -> str:
-        """Type of a number in C."""
-        return "float" if self.single else "double"
-
-    def number(self, value: float) -> str:
-        """A literal that reads back as the value, rounded to the precision."""
-        if self.single:
-            with np.errstate(over="ignore", under="ignore"):
-                value = float(str(np.float32(value)))
-        if np.isinf(value):
-            return "INFINITY" if value > 0 else "(-INFINITY)"
-        return repr(float(value)) + ("f" if self.single else "")
-
-    def table(self, values: Array) -> str:
-        """Literals of an array in a row, without needless zeros."""
-        return ",".join(self.number(value).removesuffix(".0") for value in np.asarray(values, dtype=float).ravel())
+    header: str
+    source: str
+    example: str
 
 
-@dataclass(frozen=True)
-class GeneratedC:
-    """C that CasADi writes of some functions, each called `NAME_casadi_KEY`, and what a wrapper must know of it.
+def source_files(
+    name: str,
+    about: Sequence[str],
+    functions: Mapping[str, ca.Function],
+    units: Mapping[str, Mapping[str, str]],
+    numbers: Mapping[str, Array],
+    vessel: Vessel | None,
+    wrapper: Wrapper,
+    values: Mapping[str, Any],
+) -> SourceFiles:
+    """Header, source, CasADi's source and an example.
 
-    text : of the file. declared : lines of C that declare the functions, on numbers of the type `real`.
-    num_arg, num_res, num_iw, num_w : of the arrays that every call needs.
+    about : lines of the first comment. functions : called `NAME_casadi_KEY` in C. units : group -> entry -> unit, and
+    numbers : name -> array, become public tables. values : of the wrapper, in addition to those of all wrappers.
     """
-
-    text: str
-    declared: str
-    num_arg: int
-    num_res: int
-    num_iw: int
-    num_w: int
-
-    @property
-    def arrays(self) -> str:
-        """C that declares the arrays of a call but for its numbers."""
-        return (
-            f"const real *arg[{self.num_arg}] = {{0}};\n"
-            f"    real *res[{self.num_res}] = {{0}};\n    long long iw[{self.num_iw}] = {{0}};"
-        )
-
-
-def generate_c(functions: Mapping[str, ca.Function], name: str, precision: NumberPrecision) -> GeneratedC:
-    """CasADi's C of functions, key -> function; what is in it but its public functions has a name of its own."""
-    generator = ca.CodeGenerator(
-        f"{name}_casadi", {"casadi_real": precision.real, "with_header": False, "avoid_stack": True}
-    )
-    called = {key: f"{name}_casadi_{key}" for key in functions}
+    generator = ca.CodeGenerator(f"{name}_casadi", {"with_header": False, "avoid_stack": True})
     for key, function in functions.items():
-        generator.add(rename_function(function, called[key]))
-    declared = "\n".join(
-        f"int {one}(const real **arg, real **res, long long *iw, real *w, int mem);" for one in called.values()
+        generator.add(rename_function(function, f"{name}_casadi_{key}"))
+    generated = generator.dump()
+    sizes = {key: max(map(int, re.findall(rf"\*sz_{key} = (\d+);", generated))) for key in ("arg", "res", "iw", "w")}
+    defined = [
+        array_of("char *const", f"{name}_{group}_{what}", texts, f"\n    {c_strings(texts)}")
+        for group, one in units.items()
+        for what, texts in (("names", [*one]), ("units", [*one.values()]))
+    ] + [array_of("double", f"{name}_{key}", array, number_list(array)) for key, array in numbers.items()]
+    declared = "\n".join(f"extern {one.partition(' = ')[0]};" for one in defined)
+    above_zero = frozenset() if vessel is None else vessel.above_zero
+    above = [place for place, key in enumerate(units["parameters"]) if key in above_zero]
+    filled = {
+        "SIZES": "".join(f"    {name}_NUM_{group.upper()} = {len(one)},\n" for group, one in units.items()),
+        "DEFINED": "\n".join(defined),
+        "FUNCTIONS": "\n".join(
+            f"int {name}_casadi_{key}(const double **arg, double **res, long long *iw, double *w, int mem);"
+            for key in functions
+        ),
+        "ARRAYS": f"const double *arg[{max(9, sizes['arg'])}] = {{0}};\n"
+        f"    double *res[{max(4, sizes['res'])}] = {{0}};\n    long long iw[{sizes['iw'] + 1}] = {{0}};",
+        "WORK": sizes["w"] + 1,
+        "ABOVE": f"static {array_of('int', 'above_zero', above)}",
+        "NUM_ABOVE": len(above),
+    } | values  # fmt: skip
+
+    def fill(text: str) -> str:
+        return Template(text.replace("@", name)).substitute(filled)
+
+    guard = f"{name.upper()}_H"
+    header = _IN_C.format(f"{declared}\n\n{fill(wrapper.header)}")
+    origin = f"/* Written by shipid {__version__}; see {name}.h. */\n"
+    return SourceFiles(
+        name,
+        {
+            f"{name}.h": f"{c_comment(about)}\n#ifndef {guard}\n#define {guard}\n\n{header}#endif\n",
+            f"{name}.c": origin + fill(_SOURCE_HEAD + wrapper.source),
+            f"{name}_casadi.c": _IN_C.format(generated),
+            "main.c": fill(wrapper.example),
+        },
     )
-    text = generator.dump()
-    keys = ("arg", "res", "iw", "w")
-    most = (max(1, *(int(size) for size in re.findall(rf"\*sz_{key} = (\d+);", text))) for key in keys)
-    return GeneratedC(_AS_C.format(text), _AS_C.format(declared), *most)
 
 
-_AS_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
+_IN_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
+
+_SOURCE_HEAD = """#include "@.h"
+
+#include <math.h>
+#include <string.h>
+
+#if (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || defined _M_FP_FAST
+#error "compile without -ffast-math, -Ofast and /fp:fast: they take out the checks of values that are not finite"
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+$FUNCTIONS
+#ifdef __cplusplus
+}
+#endif
+
+$DEFINED
+$ABOVE
+
+static int are_finite(const double *values, int count)
+{
+    int i;
+    for (i = 0; i < count; ++i) if (!isfinite(values[i])) return 0;
+    return 1;
+}
+
+static int are_above_zero(const double *parameters)
+{
+    int i;
+    for (i = 0; i < $NUM_ABOVE; ++i) if (!(parameters[above_zero[i]] > 0)) return 0;
+    return 1;
+}
+"""
 
 
 def rename_function(function: ca.Function, name: str) -> ca.Function:
@@ -129,18 +145,16 @@ def rename_function(function: ca.Function, name: str) -> ca.Function:
     return ca.Function(name, inputs, results, function.name_in(), function.name_out(), options)
 
 
-def fill_template(text: str, name: str, values: Mapping[str, str]) -> str:
-    """A text in which @ is the name that begins every public name, and $KEY a value."""
-    return Template(text.replace("@", name)).substitute(values)
-
-
 def c_name(text: str) -> str:
-    """A name for C from any text: letters, digits and _, with a letter first."""
+    """A name for C and its files from any text: letters, digits and _, with a letter first."""
     name = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower() or "model"
-    taken = (
-        name in RESERVED_WORDS or name.endswith("_t") or name.startswith("casadi")
-    )  # types of POSIX; names of CasADi
-    return f"m_{name}" if taken or name[0].isdigit() else name
+    return f"m_{name}" if name in TAKEN_NAMES or name.startswith("casadi") or name[0].isdigit() else name
+
+
+def number_list(values: Array) -> str:
+    """Literals of an array in a row, without needless zeros."""
+    texts = (repr(float(value)).removesuffix(".0") for value in np.ravel(values))
+    return ",".join(text.replace("inf", "INFINITY") for text in texts)
 
 
 def c_strings(values: Sequence[str]) -> str:
@@ -160,55 +174,7 @@ def c_comment(lines: Sequence[str]) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip() for line in kept), " */"])
 
 
-SOURCE_HEAD = """#include "@.h"
-
-#include <math.h>
-#include <string.h>
-
-#if (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || defined _M_FP_FAST
-#error "compile without -ffast-math, -Ofast and /fp:fast: they take out the checks of values that are not finite"
-#endif
-
-typedef @_real real;
-"""
-"""First lines of a source; @ stands for the name that begins every public name."""
-
-ARE_FINITE = """static int are_finite(const real *values, int count)
-{
-    int i;
-    for (i = 0; i < count; ++i) if (!isfinite(values[i])) return 0;
-    return 1;
-}
-"""
-
-
 def array_of(kind: str, name: str, values: Sequence[Any] | Array, body: str | None = None) -> str:
     """A constant array in C; one of a single 0 where it has no entry, as C has no empty arrays."""
     text = ", ".join(map(str, values)) if body is None else body
     return f"const {kind} {name}[{max(1, np.size(values))}] = {{{text or '0'}}};"
-
-
-def tables_of(
-    prefix: str, groups: Mapping[str, Mapping[str, str]], numbers: Mapping[str, Array], precision: NumberPrecision
-) -> tuple[str, str]:
-    """Declarations and definitions of tables: names and units of groups, entry -> unit, and arrays of numbers."""
-    defined = []
-    for group, units in groups.items():
-        for what, texts in (("names", list(units)), ("units", list(units.values()))):
-            defined.append(array_of("char *const", f"{prefix}_{group}_{what}", texts, f"\n    {c_strings(texts)}"))
-    for key, values in numbers.items():
-        defined.append(array_of(f"{prefix}_real", f"{prefix}_{key}", values, precision.table(values)))
-    declared = [f"extern {one.partition(' = ')[0]};" for one in defined]
-    return "\n".join(declared), "\n".join(defined)
-
-
-def places_above_zero(parameters: Sequence[str], vessel: Vessel | None) -> list[int]:
-    """Places of the parameters that must be above 0."""
-    above_zero = frozenset() if vessel is None else vessel.above_zero
-    return [place for place, name in enumerate(parameters) if name in above_zero]
-
-
-def provenance_lines(what: Mapping[str, Any]) -> list[str]:
-    """Plain lines of what is known of an origin, for a comment."""
-    texts = {key: json.dumps(value, default=str, ensure_ascii=True) for key, value in what.items()}
-    return [f"{key}: {text if len(text) <= 400 else text[:400] + ' ...'}" for key, text in texts.items()]

@@ -4,47 +4,30 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.errors import ShipidError
 from shipid.export.equations import Equations, function_by_names, split_by_name, symbols_of
 from shipid.export.known import PredictorInputs, all_within, column_of_entries, feature_expressions, turn_vectors
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
-from shipid.hybrid.compensator import Compensator, Normaliser
+from shipid.hybrid.compensator import Compensator, Layers, Normaliser
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector
 from shipid.hybrid.learned_force import ForceCorrector
-from shipid.hybrid.methods import METHODS
 from shipid.hybrid.modules import ModulesCorrector, physics_without_modules
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector
 from shipid.hybrid.stepping import VELOCITY_LIMIT
 from shipid.hybrid.units import Units
-from shipid.physics.signals import direct_inputs, measurable_signals
+from shipid.physics.signals import measurable_signals
 
 Array = np.ndarray
 ExpressionsByName = Mapping[str, MX]
-
-
-@dataclass(frozen=True)
-class CorrectorInputs:
-    """Inputs of a corrector: names of commands, names of its inputs (without those of the past)."""
-
-    commands: tuple[str, ...]
-    names: tuple[str, ...]
-
-    @property
-    def environment(self) -> tuple[str, ...]:
-        """Channels of the environment that it takes: those of the relative wind, and others as they are."""
-        wind = ("V_w", "beta_w") if any(name.endswith("_rw") for name in self.names) else ()
-        return (*wind, *direct_inputs(self.names))
 
 
 def layer_outputs(x: MX, weight: Array, bias: Array) -> MX:
@@ -75,6 +58,14 @@ def path_of_shapes(weights: MX, basis: Array) -> MX:
     return ca.mtimes(ca.DM(basis), ca.reshape(weights, basis.shape[1], 2)).T
 
 
+def network_outputs(value: MX, layers: Layers) -> MX:
+    """Outputs of layers with tanh between them."""
+    *hidden, last = layers
+    for weight, bias in hidden:
+        value = ca.tanh(layer_outputs(value, weight, bias))
+    return layer_outputs(value, *last)
+
+
 def compensated_path(known: PredictorInputs, corrector: Compensator) -> MX:
     """Path of the physics plus the mean of networks."""
     moments: Sequence[int] = ()
@@ -82,13 +73,12 @@ def compensated_path(known: PredictorInputs, corrector: Compensator) -> MX:
         horizon = known.names.horizon
         moments = np.unique(np.round(np.linspace(0, horizon, corrector.inputs.moments + 1)[1:]).astype(int)).tolist()
     table = known.table(corrector.inputs, moments)
-    paths = []
-    for network in corrector.networks:
-        value, (*hidden, last) = normalised_inputs(table, network.normaliser), network.layers
-        for weight, bias in hidden:
-            value = ca.tanh(layer_outputs(value, weight, bias))
-        paths.append(path_of_shapes(layer_outputs(value, *last), network.basis))
-    return known.path + mean_of(paths)
+    return known.path + mean_of(
+        [
+            path_of_shapes(network_outputs(normalised_inputs(table, one.normaliser), one.layers), one.basis)
+            for one in corrector.networks
+        ]
+    )
 
 
 def physics_path(known: PredictorInputs, corrector: UnchangedPath) -> MX:  # noqa: ARG001
@@ -183,9 +173,8 @@ def gated_network_function(network: GatedNetwork) -> ca.Function:
 # What follows goes step by step: the carry is u, v, r, psi, x, y and what the method keeps.
 
 
-@dataclass(frozen=True)
-class StepStart:
-    """What holds at the start of a step: motion, orders and weather by name, and vectors."""
+class StepStart(NamedTuple):
+    """What holds at the start of a step: motion, orders and weather by name, actuators, numbers of the vessel."""
 
     row: ExpressionsByName
     reached: MX
@@ -199,25 +188,23 @@ AddedAcceleration = Callable[[StepStart, MX, MX], tuple[MX, MX]]
 def stepped_path(known: PredictorInputs, added: AddedAcceleration, kept: MX | None = None) -> MX:
     """Path of the physics with an acceleration added at each step, as `shipid.hybrid.stepping.stepped_paths`."""
     names, kept = known.names, MX(0, 1) if kept is None else kept
-    start, weather = column_of_entries(known.now, (*MOTIONS, "psi")), measurable_signals(names.now)
+    weather = column_of_entries(known.now, measurable_signals(names.now))
     step = corrected_step(known, kept.numel(), added)
-    carry, path = ca.vertcat(start, MX(np.zeros(2)), kept), []
+    carry, path = ca.vertcat(column_of_entries(known.now, (*MOTIONS, "psi")), MX(np.zeros(2)), kept), []
     commands = known.commands(names.commands)
     orders = ca.horzsplit(commands) * (names.horizon // commands.shape[1])
-    reached = reached_at_starts(known, known.inputs["reached"], None)
-    fixed = column_of_entries(known.now, weather), known.now["psi"], known.inputs["parameters"]
+    reached = reached_at_starts(known, known.inputs["reached"], lambda: known.measured_records, names.horizon)
     for k in range(names.horizon):
-        carry = step(carry, orders[k], reached[k], *fixed)
+        carry = step(carry, orders[k], reached[k], weather, known.now["psi"], known.inputs["parameters"])
         path.append(carry[4:6])
     return ca.horzcat(*path)
 
 
-def reached_at_starts(known: PredictorInputs, first: MX, records: MX | None) -> list[MX]:
-    """States of the actuators at the start of each step; records : of the physics, default those of the horizon."""
+def reached_at_starts(known: PredictorInputs, first: MX, records: Callable[[], MX], steps: int) -> list[MX]:
+    """States of the actuators at the start of each step, of records of the physics."""
     if known.physics.vessel is None or not known.equations.model.memory:
-        return [MX(0, 1)] * known.names.horizon
-    records = known.measured_records if records is None else records
-    return [first, *ca.horzsplit(records[len(known.equations.states) :, :])[:-1]]
+        return [MX(0, 1)] * steps
+    return [first, *ca.horzsplit(records()[len(known.equations.states) :, :])[:-1]]
 
 
 def corrected_step(known: PredictorInputs, num_kept: int, added: AddedAcceleration) -> ca.Function:
@@ -225,8 +212,7 @@ def corrected_step(known: PredictorInputs, num_kept: int, added: AddedAccelerati
     names, h = known.names, known.physics.step
     weather = measurable_signals(names.now)
     sizes = {"carry": 6 + num_kept, "commands": len(names.commands), "reached": len(names.reached)}
-    sizes |= {"weather": len(weather), "psi0": 1, "parameters": len(names.parameters)}
-    symbols = symbols_of(sizes)
+    symbols = symbols_of(sizes | {"weather": len(weather), "psi0": 1, "parameters": len(names.parameters)})
     carry, first = symbols["carry"], symbols["psi0"]
     nu, psi, place = carry[:3], carry[3], carry[4:6]
     row = split_by_name((*MOTIONS, "psi"), carry[:4])
@@ -263,26 +249,30 @@ def free_step(known: PredictorInputs, equations: Equations, start: StepStart, pa
     return equations.horizontal(after), ca.vertcat(place, end["psi"] - psi)
 
 
-def unit_outputs(table: ExpressionsByName, units: Units, even: Array, odd: Array) -> MX:
-    """Outputs of `Units.parts`: even ones with a constant by weights (M + 1, p), odd ones by (M or M + 1, q)."""
-    size, z = len(units.offset) ** 0.5, normalised_inputs(table, units.normaliser)
-    plain = ca.tanh(layer_outputs(z, units.weight, units.offset)) / size if size else MX(0, 1)
-    one = MX(np.ones(1))
-    first = second = ca.vertcat(one, plain)
-    if units.reflection is not None:
-        image = ca.tanh(layer_outputs(z, units.reflection @ units.weight, units.offset)) / size if size else MX(0, 1)
-        first, second = ca.vertcat(one, (plain + image) / 2), (plain - image) / 2
-    return ca.vertcat(ca.mtimes(ca.DM(even.T), first), ca.mtimes(ca.DM(odd.T), second))
+def layers_of_units(units: Units, even: Array, odd: Array) -> Layers:
+    """Two layers that give `Units.parts` times weights: `even` (M + 1, p), `odd` (M or M + 1, q)."""
+    size = max(len(units.offset), 1) ** 0.5
+    if units.reflection is None:
+        weight = np.concatenate([even, odd], axis=1)
+        return (units.weight, units.offset), (weight[1:] / size, weight[0])
+    inner = np.concatenate([units.weight, units.reflection @ units.weight], axis=1)
+    outer = np.block([[even[1:], odd], [even[1:], -odd]]) / (2 * size)
+    return (inner, np.tile(units.offset, 2)), (outer, np.r_[even[0], np.zeros(odd.shape[1])])
 
 
 def one_step_path(known: PredictorInputs, corrector: OneStepCorrector) -> MX:
     """Networks that give the missing acceleration at every step."""
 
     def added(start: StepStart, _: MX, kept: MX) -> tuple[MX, MX]:
-        table = feature_expressions(start.row, corrector.commands)
-        return mean_of([unit_outputs(table, head.units, head.surge, head.sway_yaw) for head in corrector.heads]), kept
+        table, networks = feature_expressions(start.row, corrector.commands), networks_of(corrector)
+        return mean_of([network_outputs(normalised_inputs(table, one), layers) for one, layers in networks]), kept
 
     return stepped_path(known, added)
+
+
+def networks_of(corrector: OneStepCorrector) -> list[tuple[Normaliser, Layers]]:
+    """The z-score and the layers of each network."""
+    return [(head.units.normaliser, layers_of_units(head.units, head.surge, head.sway_yaw)) for head in corrector.heads]
 
 
 def distance_to_nearest(point: MX, centres: Array) -> MX:
@@ -302,10 +292,11 @@ def modules_path(known: PredictorInputs, corrector: ModulesCorrector) -> MX:
         for equations in reduced:
             places = [every.index(name) for name in equations.model.parameters]
             afters.append(free_step(known, equations, start, start.parameters[places])[0])
-        table, units = feature_expressions(start.row, corrector.commands), corrector.units
-        num_odd = len(units.offset) + (units.reflection is None)
-        raw = unit_outputs(table, units, corrector.weights.T, np.zeros((num_odd, 0)))
-        away = distance_to_nearest(normalised_inputs(table, units.normaliser), corrector.alarm.centres)
+        even, units = corrector.weights.T, corrector.units
+        z = normalised_inputs(feature_expressions(start.row, corrector.commands), units.normaliser)
+        none = np.zeros((len(units.offset) + (units.reflection is None), 0))
+        raw = network_outputs(z, layers_of_units(units, even, none))
+        away = distance_to_nearest(z, corrector.alarm.centres)
         weight = ca.fmin(ca.fmax(1 - (away - corrector.alarm.radius) / corrector.fade, 0), 1)
         weight = ca.if_else(all_within(away), weight, 0)
         extra = weight * ca.fmin(ca.fmax(raw, -corrector.limit), corrector.limit)
@@ -338,61 +329,26 @@ def hankel_path(known: PredictorInputs, corrector: HankelCorrector) -> MX:
 
 def missed_accelerations(known: PredictorInputs, delays: int) -> list[MX]:
     """Accelerations (3,) that single steps of the physics missed over the last steps of the past."""
-    rows, model = known.past[known.names.before(delays) :], known.equations.model
-    reached = [MX(0, 1)] * delays
-    if model.memory:
-        reached = reached_at_starts(known, column_of_entries(rows[0], tuple(model.memory)), known.past_records(delays))
-    missed = []
+    rows, parameters = known.past[known.names.before(delays) :], known.inputs["parameters"]
+    first = column_of_entries(rows[0], tuple(known.equations.model.memory))
+    reached = reached_at_starts(known, first, lambda: known.past_records(delays), delays)
+    held, missed = {name: rows[0][name] for name in measurable_signals(known.names.now)}, []
     for row, at, later in zip(rows, reached, [*rows[1:], known.now], strict=True):
-        held = {name: rows[0][name] for name in measurable_signals(known.names.now)}
-        taken_ = {name: row[name] for name in (*MOTIONS, "psi", *known.names.commands)}
-        alone_, _ = free_step(known, known.equations, StepStart(held | taken_, at, known.inputs["parameters"]),
-                         known.inputs["parameters"])  # fmt: skip
-        missed.append((column_of_entries(later, MOTIONS) - alone_) / known.physics.step)
+        start = held | {name: row[name] for name in (*MOTIONS, "psi", *known.names.commands)}
+        alone, _ = free_step(known, known.equations, StepStart(start, at, parameters), parameters)
+        missed.append((column_of_entries(later, MOTIONS) - alone) / known.physics.step)
     return missed
 
 
-class Counterpart(NamedTuple):
-    """A corrector in CasADi: its path (2, T) and what it takes."""
-
-    path: Callable[[PredictorInputs, Any], MX]
-    takes: Callable[[Any], CorrectorInputs]
-
-
-def _inputs_of_recurrent(corrector: RecurrentCorrector) -> CorrectorInputs:
-    readers = [network.reader for network in corrector.networks]
-    return CorrectorInputs(
-        corrector.inputs.commands, tuple(n for one in readers for n in (*one.past.names, *one.now.names))
-    )
-
-
-def _inputs_of_compensator(corrector: Compensator) -> CorrectorInputs:
-    return CorrectorInputs(
-        corrector.inputs.commands, tuple(n for one in corrector.networks for n in one.normaliser.names)
-    )
-
-
-CORRECTORS: dict[type[Any], Counterpart] = {
-    UnchangedPath: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
-    ForceCorrector: Counterpart(physics_path, lambda _: CorrectorInputs((), ())),
-    Compensator: Counterpart(compensated_path, _inputs_of_compensator),
-    TrajectoryCompensator: Counterpart(compensated_path, _inputs_of_compensator),
-    ForestCorrector: Counterpart(forest_path, lambda one: CorrectorInputs(one.inputs.commands, one.names)),
-    RecurrentCorrector: Counterpart(recurrent_path, _inputs_of_recurrent),
-    OneStepCorrector: Counterpart(
-        one_step_path,
-        lambda one: CorrectorInputs(one.commands, tuple(n for head in one.heads for n in head.units.normaliser.names)),
-    ),
-    ModulesCorrector: Counterpart(modules_path, lambda one: CorrectorInputs(one.commands, one.units.normaliser.names)),
-    HankelCorrector: Counterpart(hankel_path, lambda one: CorrectorInputs(one.law.commands, one.law.normaliser.names)),
+CORRECTORS: dict[type[Any], Callable[[PredictorInputs, Any], MX]] = {
+    UnchangedPath: physics_path,
+    ForceCorrector: physics_path,
+    Compensator: compensated_path,
+    TrajectoryCompensator: compensated_path,
+    ForestCorrector: forest_path,
+    RecurrentCorrector: recurrent_path,
+    OneStepCorrector: one_step_path,
+    ModulesCorrector: modules_path,
+    HankelCorrector: hankel_path,
 }
-"""Class of a corrector -> its counterpart."""
-
-
-def inputs_of(corrector: Any) -> CorrectorInputs:
-    """Inputs of a corrector; ShipidError for a corrector that cannot be exported."""
-    if type(corrector) not in CORRECTORS:
-        kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
-        named = next((kind for kind, method in METHODS.items() if method.corrector is type(corrector)), "of this kind")
-        raise ShipidError(f"a predictor by the method {named} cannot be exported; these can: {', '.join(kinds)}")
-    return CORRECTORS[type(corrector)].takes(corrector)
+"""Class of a corrector -> its path (2, T)."""

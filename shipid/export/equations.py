@@ -1,4 +1,4 @@
-"""The equations of a vessel as CasADi functions: rates, memories, a step and a rollout."""
+"""The equations of a vessel as CasADi functions: rates, memories, a step and a rollout; their inputs with units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from casadi import MX, SX
 
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate_step
-from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities
+from shipid.physics.grammar import AXES
+from shipid.physics.signals import ACTUAL, SIGNALS, signal_of, signal_row
+from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
 from shipid.vessel.dynamics import INPUTS, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -52,14 +54,25 @@ class Equations:
         """Names of the states and of the hidden states of terms."""
         return (*self.model.state, *self.model.hidden)
 
-    @property
-    def num_carry(self) -> int:
-        """Entries of a carry."""
-        return len(self.states) + len(self.model.memory)
+    @cached_property
+    def groups(self) -> dict[str, dict[str, str]]:
+        """Entries of each input of a step, entry -> SI unit."""
+        model = self.model
+        reached = [f"{ACTUAL}{name}" for name in model.memory]
+        axes = [AXES[axis] for axis in self.vessel.axes]
+        return {
+            "carry": {name: _unit_of_entry(name) for name in (*self.states, *reached)},
+            "commands": {name: _unit_of_entry(name) for name in model.commands},
+            "environment": {name: _unit_of_entry(name) for name in model.environment},
+            "loads": {axis: "N" if axis in "XYZ" else "N m" for axis in axes},
+            "parameters": {name: self.vessel.units[name] for name in model.parameters},
+        }
 
     def _symbols(self) -> list[SX]:
-        model = self.model
-        return [SX.sym(INPUTS[0], len(self.states)), *(SX.sym(name, len(getattr(model, name))) for name in INPUTS[1:])]
+        return [
+            SX.sym("state", len(self.states)),
+            *(SX.sym(name, len(getattr(self.model, name))) for name in INPUTS[1:]),
+        ]
 
     @cached_property
     def rates(self) -> ca.Function:
@@ -79,24 +92,34 @@ class Equations:
         return function_by_names("advance", inputs, {"after": SX(after)}, cse=True)
 
     def step(self, method: Method, step: float | None = None) -> ca.Function:
-        """(carry, commands, environment, tau_extra, parameters) -> carry after `step` [s], or after an input `dt`."""
-        model, states = self.model, len(self.states)
-        sizes = {"carry": self.num_carry, "commands": len(model.commands), "environment": len(model.environment)}
-        sizes |= {"tau_extra": model.num_dof, "parameters": len(model.parameters)} | ({} if step else {"dt": 1})
-        inputs = symbols_of(sizes)
-        carry, commands, environment, tau, parameters = (*inputs.values(),)[:5]
+        """(carry, commands, environment, loads, parameters) -> carry after `step` [s], or after a sixth input `dt`."""
+        states = len(self.states)
+        inputs = symbols_of({group: len(units) for group, units in self.groups.items()} | ({} if step else {"dt": 1}))
+        carry, commands, environment, loads, parameters = (*inputs.values(),)[:5]
 
         def rates(x: MX, m: MX) -> MX:
-            return self.rates(x, m, commands, environment, parameters, tau)
+            return self.rates(x, m, commands, environment, parameters, loads)
 
         def advance(m: MX, after: Any) -> MX:
-            return self.advance(m, commands, parameters, after) if model.memory else m
+            return self.advance(m, commands, parameters, after) if self.model.memory else m
 
         length: Any = step or inputs["dt"]
         after = integrate_step(
             rates, advance, lambda x, a, k: x + a * k, carry[:states], carry[states:], length, method
         )
         return function_by_names("step", inputs, {"after": ca.vertcat(*after)})
+
+    def functions(self, method: Method) -> dict[str, ca.Function]:
+        """`step`, and of its inputs but `dt`: `rates`, and `begin`, the carry with actuators at their orders."""
+        inputs, count = symbols_of({group: len(units) for group, units in self.groups.items()}), len(self.states)
+        carry, commands, environment, loads, parameters = inputs.values()
+        rates = self.rates(carry[:count], carry[count:], commands, environment, parameters, loads)
+        begun = ca.vertcat(carry[:count], self.begun(commands, parameters))
+        return {
+            "step": self.step(method),
+            "rates": function_by_names("rates", inputs, {"rates": rates}),
+            "begin": function_by_names("begin", inputs, {"begun": begun}),
+        }
 
     def begun(self, commands: MX, parameters: MX) -> MX:
         """Memories that have reached their orders, as far as their stops let them."""
@@ -117,10 +140,19 @@ class Equations:
         )
 
 
+def _unit_of_entry(name: str) -> str:
+    """SI unit of a signal, or of a state that a term keeps: a time, or what a velocity adds up to."""
+    row = signal_row(state_column(name))
+    if row is not None:
+        return row.unit
+    state = signal_of(name)
+    return "s" if state == "t" else SIGNALS[state[0]].unit.removesuffix("/s")
+
+
 def rollout_records(step: ca.Function, carry: MX, inputs: Sequence[MX], parameters: MX, count: int) -> MX:
     """Carries (num_carry, T) after 1 ... T steps.
 
-    inputs : commands, environment and tau_extra, each with a column for every step, or one for all.
+    inputs : commands, environment and loads, each with a column for every step, or one for all.
     """
     series = [ca.horzsplit(value) * (count // value.shape[1]) for value in inputs]
     records = []

@@ -13,52 +13,83 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax import saxutils
-
-import numpy as np
+from string import Template
+from typing import Any
+from xml.etree import ElementTree
 
 from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
 from shipid.engine.native import find_compiler
 from shipid.errors import ShipidError
-from shipid.export.c import NumberPrecision, SourceFiles
+from shipid.export.band import BAND_CHOICE, BAND_ROWS
+from shipid.export.c import SourceFiles, number_list
 from shipid.export.c_predictor import predictor_files
-from shipid.export.c_vessel import VesselParts, vessel_files
-from shipid.export.fmu_c import Variable, predictor_wrapper, vessel_wrapper
+from shipid.export.c_vessel import vessel_files
+from shipid.export.equations import Equations
+from shipid.export.fmu_c import FMI_BODY, FMI_HEAD, PREDICTOR_MODEL, VESSEL_MODEL
 from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.physics.signals import ACTUAL, SIGNALS, neutral_value
 from shipid.version import __version__
-from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
 """System and processor -> folder of the binary in an FMU, and how its name ends."""
-_BAND_OUTPUTS = {
-    "along": ("m", "half axis along the predicted track"),
-    "across": ("m", "half axis across the predicted track"),
-    "ahead_x": ("-", "unit vector of the track, ahead"),
-    "ahead_y": ("-", "unit vector of the track, to starboard"),
-}
 LEAST_ABOVE_ZERO = sys.float_info.min  # FMI 2.0 has no limit that is not allowed itself
 LARGEST_STEP = 0.1  # s: inside a communication step, of a ship of 30 m and more; times the root of the length below
+MOST_SOLVER_STEPS = 1_000_000  # in a communication step: some seconds
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A real variable of an FMU.
+
+    start : None where it is calculated. guess : whether it is calculated, too, unless the importer sets a start value.
+    above_zero : whether it is a parameter that must be above 0.
+    """
+
+    name: str
+    causality: str
+    unit: str
+    description: str
+    start: float | None
+    guess: bool = False
+    above_zero: bool = False
+
+    @property
+    def initial(self) -> str:
+        """How it begins, in the words of FMI; nothing for inputs."""
+        known = "calculated" if self.start is None else "approx" if self.guess else "exact"
+        return "" if self.causality == "input" else known
+
+    @property
+    def kind(self) -> str:
+        """The letter by which the C knows who may set it."""
+        exact = self.causality == "output" and self.start is not None
+        return "e" if exact else "a" if self.above_zero else self.causality[0]
 
 
 @dataclass(frozen=True)
 class FmuParts:
-    """The parts of an FMU: its variables in the order of value references, its C, and its name."""
+    """The parts of an FMU: its title, its variables in the order of value references, its C, and the step of a path."""
 
-    identifier: str
     title: str
     variables: tuple[Variable, ...]
     files: SourceFiles
-    wrapper: str
+    model: str
+    values: Mapping[str, Any]
     step: float | None
 
-
-def quoteattr(text: str) -> str:
-    """A text as an attribute of XML; a character that XML cannot hold becomes U+FFFD, the replacement character."""
-    return saxutils.quoteattr(re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\ufffd", text))
+    def wrapper(self, guid: str) -> str:
+        """The C around that of the files."""
+        values = {
+            "NUM_REALS": len(self.variables),
+            "GUID": guid,
+            "STARTS": number_list([one.start or 0.0 for one in self.variables]),
+            "KINDS": ",".join(f"'{one.kind}'" for one in self.variables),
+            **self.values,
+        }
+        return Template((FMI_HEAD + self.model + FMI_BODY).replace("@", self.files.name)).substitute(values)
 
 
 def words_of_signal(name: str) -> str:
@@ -68,121 +99,88 @@ def words_of_signal(name: str) -> str:
     return f"{word}, {component}" if component else word
 
 
-def _input_variables(rows: Mapping[str, tuple[str, str, float]]) -> list[Variable]:
-    """Inputs of an FMU: name -> unit, words, start."""
-    return [Variable(name, "input", "continuous", *row) for name, row in rows.items()]
-
-
-def _output_variables(rows: Mapping[str, tuple[str, str]]) -> list[Variable]:
-    """Outputs that are calculated: name -> unit, words."""
-    return [Variable(name, "output", "continuous", *row, None) for name, row in rows.items()]
-
-
-def _setting_variables(rows: Mapping[str, tuple[str, float]]) -> list[Variable]:
-    """Parameters without a unit: name -> words, start."""
-    return [Variable(name, "parameter", "tunable", "-", *row) for name, row in rows.items()]
-
-
-def _vessel_variables(vessel: Vessel | None) -> list[Variable]:
-    """Parameters: the numbers of a vessel document."""
-    if vessel is None:
-        return []
-    text, above_zero = "number of the vessel document", vessel.above_zero
-    return [
-        Variable(key, "parameter", "tunable", vessel.units[key], text, value, above_zero=key in above_zero)
+def _parameter_variables(vessel: Vessel | None) -> list[Variable]:
+    """The numbers of a vessel document."""
+    return [] if vessel is None else [
+        Variable(key, "parameter", vessel.units[key], "number of the vessel document", value, False, key in vessel.above_zero)
         for key, value in vessel.parameters.items()
-    ]
+    ]  # fmt: skip
 
 
 def vessel_unit(vessel: Vessel, name: str, method: Method) -> FmuParts:
     """The FMU of a vessel: commands, weather and loads in, motion out."""
-    units = VesselParts(vessel, method).units()
+    equations = Equations(vessel)
+    carry, commands, environment, loads, _ = equations.groups.values()
     largest = round(LARGEST_STEP * min(1.0, ((vessel.length or 30.0) / 30.0) ** 0.5), 4)
-    begins = "; begins at its order, within its stops, unless a start value is set"
+    begins = "begins at its order, within its stops, unless a start value is set"
     variables = []
-    for key, unit in units["carry"].items():
-        order, lags = key.removeprefix(ACTUAL), key.startswith(ACTUAL)
-        text = f"reached: {words_of_signal(order)}{begins}" if lags else words_of_signal(order)
-        variables.append(Variable(key, "output", "continuous", unit, text, 0.0, lags))
-    variables += _input_variables(
-        {key: (unit, f"order: {words_of_signal(key)}", neutral_value(key)) for key, unit in units["commands"].items()}
-        | {key: (unit, words_of_signal(key), 0.0) for key, unit in units["environment"].items()}
-        | {f"load.{key}": (unit, f"added {key}, such as waves or a tug", 0.0) for key, unit in units["loads"].items()}
-    )
-    solver = Variable("solver.step", "parameter", "tunable", "s", f"largest internal step of {method}", largest)
-    variables += [*_vessel_variables(vessel), solver]
-    sizes, num_reached = {group: len(names) for group, names in units.items()}, len(vessel_dynamics(vessel).memory)
+    for key, unit in carry.items():
+        words, lags = words_of_signal(key.removeprefix(ACTUAL)), key.startswith(ACTUAL)
+        variables.append(Variable(key, "output", unit, f"reached: {words}; {begins}" if lags else words, 0.0, lags))
+    for key, unit in commands.items():
+        variables.append(Variable(key, "input", unit, f"order: {words_of_signal(key)}", neutral_value(key)))
+    variables += [Variable(key, "input", unit, words_of_signal(key), 0.0) for key, unit in environment.items()]
+    variables += [Variable(f"load.{key}", "input", unit, f"added {key}", 0.0) for key, unit in loads.items()]
+    places = {"NUM_STATES": len(equations.states), "COMMANDS": len(carry), "ENVIRONMENT": len(carry) + len(commands)}
+    places |= {"LOADS": len(variables) - len(loads), "FIRST_PARAMETER": len(variables)}
+    variables += _parameter_variables(vessel)
+    variables.append(Variable("solver.step", "parameter", "s", f"largest internal step of {method}", largest))
+    files = vessel_files(vessel, name, method)
     return FmuParts(
-        name, vessel.name, tuple(variables), vessel_files(vessel, name, method, NumberPrecision()),
-        vessel_wrapper(name, sizes, sizes["carry"] - num_reached, variables), None,
-    )  # fmt: skip
+        vessel.name, tuple(variables), files, VESSEL_MODEL, places | {"MOST_STEPS": MOST_SOLVER_STEPS}, None
+    )
 
 
 def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     """The FMU of a predictor: motion, weather and commands in, path, band and alarm out."""
     names, step, bands = model.layout, model.physics.step, model.predictor.bands
-    steps = range(names.horizon)
-    ends = {key: sum(model.limits.get(key, (0.0, 0.0))) / 2 for key in names.now}
-    rows = {
-        key: (model.unit(key), words_of_signal(key), ends[key] if np.isfinite(ends[key]) else 0.0) for key in names.now
-    }
-    planned = {
-        f"planned[{k + 1}].{key}": (
-            model.unit(key), f"order in force in step {k + 1} of the horizon: {words_of_signal(key)}", 0.0
-        )
+    steps = range(1, names.horizon + 1)
+    variables = [Variable(key, "input", unit, words_of_signal(key), 0.0) for key, unit in model.units("now").items()]
+    variables += [
+        Variable(f"planned[{k}].{key}", "input", unit, f"order in step {k} of the horizon: {words_of_signal(key)}", 0.0)
         for k in steps
-        for key in names.planned
-    }  # fmt: skip
-    shown = {
-        f"{axis}[{k + 1}]": ("m", f"way {word} after {step * (k + 1):g} s, in body axes at the instant of prediction")
-        for axis, word in (("x", "ahead"), ("y", "to starboard"))
+        for key, unit in model.units("planned").items()
+    ]
+    path = len(variables)
+    shown = dict.fromkeys("xy", "m") | (dict(zip(BAND_ROWS, "mm--", strict=True)) if bands is not None else {})
+    variables += [
+        Variable(f"{key}[{k}]", "output", unit, f"{key} of path or band after {step * k:g} s, in body axes then", None)
+        for key, unit in shown.items()
         for k in steps
-    }
-    shown |= {
-        f"{key}[{k + 1}]": (unit, f"band after {step * (k + 1):g} s: {word}")
-        for key, (unit, word) in (_BAND_OUTPUTS.items() if bands is not None else ())
-        for k in steps
-    }
-    shown["instant"] = "s", "time of the row that the path starts from"
+    ]
+    variables.append(Variable("instant", "output", "s", "time of the row that the path starts from", None))
+    first = len(variables)
+    variables += _parameter_variables(model.vessel)
     settings = {}
     if names.planned:
         settings["held"] = "1: orders stay as they are over the horizon; 0: as in planned[...]", 1.0
     if bands is not None:
         kinds = ", ".join(f"{number}: {kind}" for number, kind in enumerate(("any", *bands.kinds)))
-        usual = next(level for level in (0.9, 0.8, 0.5) if bands.promises(level) or level == 0.5)
-        settings["level"] = "share of whole paths that the band holds, above 0 to 0.99", usual
-        settings["pointwise"] = "1: the share is that of positions at each step alone", 0.0
-        settings["kind"] = f"of the manoeuvre under way: {kinds}", 0.0
-    variables = [
-        *_input_variables(rows | planned),
-        *_output_variables(shown),
-        *_vessel_variables(model.vessel),
-        *_setting_variables(settings),
-    ]
+        words = ("share of whole paths in the band", "1: that of positions at each step alone", f"manoeuvre, {kinds}")
+        settings |= dict(zip(BAND_CHOICE, zip(words, (0.9, 0.0, 0.0), strict=True), strict=True))
+    at = {key: f"self->values + {place}" for place, key in enumerate(settings, len(variables))}
+    variables += [Variable(key, "parameter", "-", *setting) for key, setting in settings.items()]
+    values = {"FIRST_PARAMETER": first, "X": path, "BAND": 0 if bands is None else len(BAND_ROWS)}
+    values["PLAN"] = f"*({at['held']}) != 0 ? 0 : self->values + {len(names.now)}" if names.planned else 0
+    values["CHOICE"] = at.get(BAND_CHOICE[0], 0)
     what = "no physics" if model.vessel is None else model.vessel.name
-    return FmuParts(
-        name, f"{what}, {model.predictor.method}", tuple(variables), predictor_files(model, name, NumberPrecision()),
-        predictor_wrapper(name, names.horizon, len(names.parameters), variables),
-        step,
-    )  # fmt: skip
+    files = predictor_files(model, name)
+    return FmuParts(f"{what}, {model.predictor.method}", tuple(variables), files, PREDICTOR_MODEL, values, step)
 
 
 def write_fmu(unit: FmuParts, file: Path) -> list[str]:
     """Write the FMU; the platforms of the binaries in it. ShipidError where the compiler fails."""
-    name = unit.identifier
+    name = unit.files.name
     sources = {key: text for key, text in unit.files.texts.items() if key != "main.c"}
-    sources[f"{name}.c"] += "\n" + unit.wrapper
-    texts = {f"sources/{key}": text for key, text in sources.items()}
-    guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(texts.values()))}}}"
-    texts["modelDescription.xml"] = model_description(unit, guid)
-    texts[f"sources/{name}.c"] = sources[f"{name}.c"].replace("@GUID@", guid)
+    guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(sources.values()) + unit.wrapper(''))}}}"
+    sources[f"{name}.c"] += unit.wrapper(guid)
     place = BINARIES.get((platform.system(), platform.machine())) if find_compiler() is not None else None
     with replace_whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-        for key, text in texts.items():
-            archive.writestr(_archive_entry(key), text)
+        archive.writestr(_archive_entry("modelDescription.xml"), model_description(unit, guid))
+        for key, text in sources.items():
+            archive.writestr(_archive_entry(f"sources/{key}"), text)
+            (temporary.parent / key).write_text(text, encoding="utf-8")
         if place is not None:
-            for key in sources:
-                (temporary.parent / key).write_text(texts[f"sources/{key}"], encoding="utf-8")
             built = _compile_binary(temporary.parent, name)
             archive.writestr(_archive_entry(f"binaries/{place[0]}/{name}{place[1]}", 0o755), built.read_bytes())
     return [] if place is None else [place[0]]
@@ -209,64 +207,56 @@ def _compile_binary(folder: Path, name: str) -> Path:
 
 def model_description(unit: FmuParts, guid: str) -> str:
     """Text of modelDescription.xml (FMI 2.0): the variables with their units, and the sources."""
-    units = sorted({variable.unit for variable in unit.variables} - {"-", ""})
-    rows = []
-    for reference, variable in enumerate(unit.variables):
-        head = f'    <ScalarVariable name={quoteattr(variable.name)} valueReference="{reference}"'
-        head += f' causality="{variable.causality}" variability="{variable.variability}"'
-        head += f' initial="{variable.initial}"' if variable.initial else ""
-        real = "" if variable.unit in ("-", "") else f" unit={quoteattr(variable.unit)}"
-        real += f' min="{LEAST_ABOVE_ZERO!r}"' if variable.above_zero else ""
-        real += "" if variable.start is None else f' start="{float(variable.start)!r}"'
-        rows.append(
-            f"{head} description={quoteattr(variable.description)}>\n      <Real{real}/>\n    </ScalarVariable>"
-        )
-    alarm = unit.step is not None  # a predictor: what is computed from the inputs is so at the start, too
-    known = "calculated" if alarm else "exact"
-    rows.append(
-        f'    <ScalarVariable name="status" valueReference="0" causality="output" variability="discrete" initial="{known}"'
-        ' description="0, or a sum of the results that the header in sources lists">\n'
-        + ("      <Integer/>" if alarm else '      <Integer start="0"/>')
-        + "\n    </ScalarVariable>"
-    )
+    name, alarm = unit.files.name, unit.step is not None  # of a predictor all is calculated at the start
+    root = ElementTree.Element(
+        "fmiModelDescription", fmiVersion="2.0", modelName=_xml_text(unit.title), guid=guid,
+        generationTool=f"shipid {__version__}", variableNamingConvention="flat",
+    )  # fmt: skip
+
+    def add(parent: ElementTree.Element, tag: str, **attributes: Any) -> ElementTree.Element:
+        return ElementTree.SubElement(parent, tag, {key: _xml_text(str(value)) for key, value in attributes.items()})
+
+    able = {"canHandleVariableCommunicationStepSize": "true", "canGetAndSetFMUstate": "true"}
+    sources = add(add(root, "CoSimulation", modelIdentifier=name, **able), "SourceFiles")
+    for part in ("", "_casadi"):
+        add(sources, "File", name=f"{name}{part}.c")
+    units = sorted({one.unit for one in unit.variables} - {"-", ""})
+    if units:
+        definitions = add(root, "UnitDefinitions")
+        for one in units:
+            add(definitions, "Unit", name=one)
+    add(add(root, "LogCategories"), "Category", name="logStatusError", description="values that are refused")
+    add(root, "DefaultExperiment", startTime=0.0, stopTime=60.0, stepSize=unit.step or 0.1)
+    listed, outputs, unknowns = add(root, "ModelVariables"), list[int](), list[int]()
+
+    def variable(name: str, reference: int, causality: str, initial: str, words: str, kind: str, **more: Any) -> None:
+        variability = "discrete" if kind != "Real" else "tunable" if causality == "parameter" else "continuous"
+        attributes = {"name": name, "valueReference": reference, "causality": causality, "variability": variability}
+        attributes |= {"initial": initial} if initial else {}
+        add(add(listed, "ScalarVariable", **attributes, description=words), kind, **more)
+        if causality == "output":
+            outputs.append(len(listed))
+            unknowns.extend([len(listed)] if initial != "exact" else [])
+
+    for number, real in enumerate(unit.variables):
+        more: dict[str, Any] = {} if real.unit in ("-", "") else {"unit": real.unit}
+        more |= {"min": LEAST_ABOVE_ZERO} if real.above_zero else {}
+        more |= {} if real.start is None else {"start": float(real.start)}
+        variable(real.name, number, real.causality, real.initial, real.description, "Real", **more)
+    words, initial = "0, or a sum of the results that the header in sources lists", "calculated" if alarm else "exact"
+    variable("status", 0, "output", initial, words, "Integer", **({} if alarm else {"start": 0}))
     if alarm:
-        rows.append(
-            '    <ScalarVariable name="alarm" valueReference="0" causality="output" variability="discrete"'
-            ' initial="calculated" description="the instant lies outside of what training has seen">\n'
-            "      <Boolean/>\n    </ScalarVariable>"
-        )
-    outputs = [i + 1 for i, variable in enumerate(unit.variables) if variable.causality == "output"]
-    unknown = [i for i in outputs if unit.variables[i - 1].initial != "exact"]
-    others = [len(unit.variables) + 1 + k for k in range(1 + alarm)]
-    outputs += others
-    unknown += others if alarm else []
-    structure = "    <Outputs>\n" + "".join(f'      <Unknown index="{i}"/>\n' for i in outputs) + "    </Outputs>\n"
-    if unknown:
-        listed = "".join(f'      <Unknown index="{i}"/>\n' for i in unknown)
-        structure += f"    <InitialUnknowns>\n{listed}    </InitialUnknowns>\n"
-    newline = "\n"
-    experiment = f' stepSize="{unit.step!r}"' if unit.step is not None else ' stepSize="0.1"'
-    return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName={quoteattr(unit.title)} guid={quoteattr(guid)}
-  generationTool="shipid {__version__}" variableNamingConvention="flat">
-  <CoSimulation modelIdentifier="{unit.identifier}" canHandleVariableCommunicationStepSize="true"
-    canGetAndSetFMUstate="true" canSerializeFMUstate="true">
-    <SourceFiles>
-      <File name="{unit.identifier}.c"/>
-      <File name="{unit.identifier}_casadi.c"/>
-    </SourceFiles>
-  </CoSimulation>
-  <UnitDefinitions>
-{newline.join(f"    <Unit name={quoteattr(name)}/>" for name in units)}
-  </UnitDefinitions>
-  <LogCategories>
-    <Category name="logStatusError" description="values that are refused"/>
-  </LogCategories>
-  <DefaultExperiment startTime="0.0" stopTime="60.0"{experiment}/>
-  <ModelVariables>
-{newline.join(rows)}
-  </ModelVariables>
-  <ModelStructure>
-{structure}  </ModelStructure>
-</fmiModelDescription>
-"""
+        words = "the instant lies outside of what training has seen"
+        variable("alarm", 0, "output", "calculated", words, "Boolean")
+    structure = add(root, "ModelStructure")
+    for tag, places in (("Outputs", outputs), ("InitialUnknowns", unknowns)):
+        part = add(structure, tag) if places else None
+        for place in places:
+            add(part, "Unknown", index=place)  # type: ignore[arg-type]
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _xml_text(text: str) -> str:
+    """A text in which U+FFFD, the replacement character, stands for what XML cannot hold."""
+    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\ufffd", text)

@@ -61,43 +61,6 @@ class InputLayout:
         }
 
 
-def input_layout(
-    physics: Physics,
-    commands: Sequence[str],
-    num_past: int,
-    *,
-    known: bool,
-    environment: Sequence[str],
-    limited: Sequence[str] = (),
-) -> InputLayout:
-    """Inputs that a predictor takes.
-
-    physics : with all terms, also those of a method. commands : that a method takes. environment : channels that
-    it takes. limited : columns that the alarm looks at.
-    """
-    states: list[str] = []
-    memory, taken, weather = tuple[str, ...](), tuple[str, ...](), tuple[str, ...]()
-    if physics.vessel is not None:
-        model = Equations(physics.vessel).model
-        states = [name for name in model.state if name not in (*POSITION_ENTRIES, "psi", *MOTIONS)]
-        memory, taken, weather = tuple(model.memory), model.commands, model.environment
-    every = tuple(dict.fromkeys((*taken, *commands)))
-    others = dict.fromkeys((*weather, *environment, *limited))
-    channels = [name for name in others if name not in (*MOTIONS, *every)]
-    now = (*POSITION_ENTRIES, "psi", *MOTIONS, *states, *every, *channels)
-    return InputLayout(
-        now=now,
-        reached=memory,
-        past=(*now[len(POSITION_ENTRIES) :], "x", "y") if num_past else (),
-        num_past=num_past,
-        planned=every if known else (),
-        horizon=physics.horizon,
-        estimates=tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS) if physics.observer is not None else (),
-        parameters=() if physics.vessel is None else tuple(physics.vessel.parameters),
-        commands=every,
-    )
-
-
 def column_of_entries(table: NamedExpressions, names: Sequence[str]) -> MX:
     """Entries of a table in a column, in the order of the names; what it does not hold is 0."""
     return ca.vertcat(MX(0, 1), *(table.get(name, MX(0)) for name in names))

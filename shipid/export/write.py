@@ -13,10 +13,10 @@ from typing import get_args
 from shipid.arguments import as_path, check_choice, check_class
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, escape_unprintable, suggest_name
-from shipid.export.c import NumberPrecision, SourceFiles, c_name
+from shipid.export.c import SourceFiles, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
-from shipid.export.casadi import predictor_function, vessel_function, write_function
+from shipid.export.casadi import write_predictor_function, write_vessel_function
 from shipid.export.fmu import FmuParts, predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import ExportModel, build_model
 from shipid.export.onnx import write_onnx
@@ -33,15 +33,13 @@ EXAMPLE_FILE = "main.c"
 class ExportTarget:
     """A form in which a predictor or a vessel is written for others; both functions return the files they wrote.
 
-    predictor : (model, name, file, single). vessel : (vessel, name, integrator, file, single); None where a vessel has
-    nothing for it. ending : of the file; empty where the target is a folder. single : whether it can have numbers in
-    single precision.
+    predictor : (model, name, file). vessel : (vessel, name, integrator, file); None where a vessel has nothing for it.
+    ending : of the file; empty where the target is a folder.
     """
 
-    predictor: Callable[[ExportModel, str, Path, bool], list[Path]]
-    vessel: Callable[[Vessel, str, Method, Path, bool], list[Path]] | None = None
+    predictor: Callable[[ExportModel, str, Path], list[Path]]
+    vessel: Callable[[Vessel, str, Method, Path], list[Path]] | None = None
     ending: str = ""
-    single: bool = False
 
 
 def export_predictor(
@@ -54,7 +52,7 @@ def export_predictor(
     to : `c` (a folder with NAME.c, NAME_casadi.c, NAME.h, main.c), `fmu` (FMI 2.0), `casadi` (a function, and its names
         as JSON) or `onnx` (the networks alone).
     out : the folder for `c`, else the file.
-    single : numbers in single precision (`c` and `onnx`).
+    single : numbers in single precision, of `onnx` alone.
     name : begins every public name in C, and is the model identifier of an FMU; default the stem of `out`.
 
     Raises
@@ -63,18 +61,15 @@ def export_predictor(
     """
     if not hasattr(predictor, "corrector"):
         raise DocumentError(f"give a Predictor, as of `fit` or `Predictor.load`, not {type(predictor).__name__}")
-    target, file, title = _check_target(to, out, single, name)
-    return target.predictor(build_model(predictor), title, file, single)
+    target, file, title = _check_target(to, out, name)
+    if single and to != "onnx":
+        raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
+    model = build_model(predictor)
+    return [write_onnx(model, title, file, single=True)] if single else target.predictor(model, title, file)
 
 
 def export_vessel(
-    vessel: Vessel,
-    to: str,
-    out: str | os.PathLike[str],
-    *,
-    integrator: Method = "rk4",
-    single: bool = False,
-    name: str | None = None,
+    vessel: Vessel, to: str, out: str | os.PathLike[str], *, integrator: Method = "rk4", name: str | None = None
 ) -> list[Path]:
     """Write a vessel alone, its step, for simulation: to `c`, `fmu` or `casadi`; see `export_predictor`.
 
@@ -82,31 +77,24 @@ def export_vessel(
 
     Raises ShipidError as there, and for an unknown integrator.
     """
-    target, file, title = _check_target(to, out, single, name)
+    check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
+    target, file, title = _check_target(to, out, name)
     check_choice("integrator", integrator, get_args(Method))
     if target.vessel is None:
-        *others, last = (other for other, one in EXPORT_TARGETS.items() if one.vessel is not None)
-        remedy = f"export it to {', '.join(others)} or {last}"
-        raise DocumentError(f"a vessel has no networks, and {to} takes nothing else: {remedy}", path="--to")
-    return target.vessel(vessel, title, integrator, file, single)
+        raise DocumentError(f"a vessel has no networks, and {to} takes nothing else: choose another", path="--to")
+    return target.vessel(vessel, title, integrator, file)
 
 
-def _check_target(
-    to: str, out: str | os.PathLike[str], single: bool, name: str | None
-) -> tuple[ExportTarget, Path, str]:
+def _check_target(to: str, out: str | os.PathLike[str], name: str | None) -> tuple[ExportTarget, Path, str]:
     """The target, the file or folder, and the name that begins every public name."""
     if name is not None:
         check_class("name", name, str, "such as 'gunnerus'", DocumentError)
     target, file = EXPORT_TARGETS.get(str(to)), as_path("out", out)
     if target is None:
         raise DocumentError(f"no such target: {suggest_name(str(to), EXPORT_TARGETS)}", path="--to")
-    if single and not target.single:
-        raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
     if not target.ending and file.exists() and not file.is_dir():
         raise DocumentError(f"is a file: the target {to} takes a folder", file=file, path="--out")
-    if target.ending and file.is_dir():
-        raise DocumentError(f"is a folder: the target {to} takes a file", file=file, path="--out")
-    if target.ending and file.suffix != target.ending:
+    if target.ending and (file.is_dir() or file.suffix != target.ending):
         raise DocumentError(f"the target {to} is a file that ends in {target.ending}", file=file, path="--out")
     return target, file, c_name(name or file.stem)
 
@@ -134,24 +122,15 @@ def _write_unit(unit: FmuParts, file: Path) -> list[Path]:
 
 EXPORT_TARGETS: dict[str, ExportTarget] = {
     "c": ExportTarget(
-        lambda kept, title, file, single: _write_sources(predictor_files(kept, title, NumberPrecision(single)), file),
-        lambda ship, title, rule, file, single: _write_sources(
-            vessel_files(ship, title, rule, NumberPrecision(single)), file
-        ),
-        single=True,
+        lambda model, title, file: _write_sources(predictor_files(model, title), file),
+        lambda ship, title, rule, file: _write_sources(vessel_files(ship, title, rule), file),
     ),
     "fmu": ExportTarget(
-        lambda kept, title, file, _: _write_unit(predictor_unit(kept, title), file),
-        lambda ship, title, rule, file, _: _write_unit(vessel_unit(ship, title, rule), file),
+        lambda model, title, file: _write_unit(predictor_unit(model, title), file),
+        lambda ship, title, rule, file: _write_unit(vessel_unit(ship, title, rule), file),
         ".fmu",
     ),
-    "casadi": ExportTarget(
-        lambda kept, title, file, _: write_function(*predictor_function(kept, title), file),
-        lambda ship, title, rule, file, _: write_function(*vessel_function(ship, title, rule), file),
-        ".casadi",
-    ),
-    "onnx": ExportTarget(
-        lambda kept, title, file, single: [write_onnx(kept, title, file, single=single)], None, ".onnx", single=True
-    ),
+    "casadi": ExportTarget(write_predictor_function, write_vessel_function, ".casadi"),
+    "onnx": ExportTarget(lambda model, title, file: [write_onnx(model, title, file)], None, ".onnx"),
 }
 """Name of a target, as after `--to`, -> how it is written."""

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.windows import Instants
-from shipid.export.c import NumberPrecision, SourceFiles
+from shipid.export.c import SourceFiles
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import ExportModel, build_model
 from shipid.hybrid.deployed import DeployedMethod
@@ -79,12 +79,12 @@ def run_example(files: SourceFiles, folder: Path, *options: str) -> str:
 class Recorder:
     """An exported predictor that is given rows."""
 
-    def __init__(self, predictor: DeployedMethod, folder: Path, precision: NumberPrecision | None = None) -> None:
-        self.model, precision = build_model(predictor), precision or NumberPrecision()
-        self.files, self.real = predictor_files(self.model, "odd", precision), np.dtype(precision.real)
+    def __init__(self, predictor: DeployedMethod, folder: Path) -> None:
+        self.model = build_model(predictor)
+        self.files = predictor_files(self.model, "odd")
         write(self.files, folder)
         (folder / "size.c").write_text(
-            '#include <stdio.h>\n#include "odd.h"\nint main(void) { printf("%d", (int)sizeof(odd)); return 0; }\n'
+            '#include <stdio.h>\n#include "odd.h"\nint main(void) { printf("%d", (int)sizeof(odd_recorder)); }\n'
         )
         compile_([compiler()], folder, "-O0", "-o", "size", "size.c")
         size = int(subprocess.run([folder / "size"], capture_output=True, text=True, check=True).stdout)
@@ -97,14 +97,14 @@ class Recorder:
 
     def record(self, t: float, values: Mapping[str, float]) -> int:
         """Result of a row; what `values` lacks is 0."""
-        row = np.array([values.get(name, 0.0) for name in self.model.layout.now], dtype=self.real)
+        row = np.array([values.get(name, 0.0) for name in self.model.layout.now])
         return int(self.loaded.odd_record(pointer(self.kept), t, pointer(row)))
 
     def predict(self, plan: np.ndarray | None = None) -> tuple[np.ndarray, int]:
         """Path (T, 2) from the newest row, and its result."""
-        path = np.zeros((self.model.layout.horizon, 2), dtype=self.real)
-        given = None if plan is None else pointer(np.ascontiguousarray(plan, dtype=self.real))
-        return path, int(self.loaded.odd_predict(pointer(self.kept), given, pointer(path)))
+        path = np.zeros((self.model.layout.horizon, 2))
+        given = None if plan is None else pointer(np.ascontiguousarray(plan))
+        return path, int(self.loaded.odd_predict(pointer(self.kept), given, None, pointer(path), None))
 
     def path(self, t: float, values: Mapping[str, float], plan: np.ndarray | None = None) -> tuple[np.ndarray, int]:
         """Path and result after one more row, which is kept."""
@@ -122,32 +122,36 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
+def inputs_of_model(model: ExportModel, instants: Instants) -> dict[str, np.ndarray]:
+    """The inputs of the function for S instants, name -> (S, entries); what a log does not hold is 0."""
+    names, count, zero = model.layout, len(instants), np.zeros(len(instants))
+    planned, columns = instants.planned or {}, {"down": instants.columns.get("z", zero), **instants.columns}
+    past = {"down": instants.past.get("z", np.zeros((names.num_past, count))), **instants.past}
+    orders = {name: planned.get(name, [columns.get(name)])[0] for name in names.reached}
+    steps = range(-names.num_past, 0)
+    groups = {
+        "now": [columns.get(name, zero) for name in names.now],
+        "reached": [(instants.hidden or orders)[name] for name in names.reached],
+        "past": [past[name][k] if name in past else zero for k in steps for name in names.past],
+        "planned": [planned[name][k] for k in range(names.horizon) for name in names.planned],
+        "estimates": [instants.estimates[name] for name in names.estimates],
+        "parameters": np.tile(model.parameters[:, None], (1, count)),
+    }
+    return {key: np.array(rows, dtype=float).reshape(-1, count).T.copy() for key, rows in groups.items()}
+
+
 def paths(
-    loaded: ctypes.CDLL, name: str, exported: ExportModel, instants: Instants, kind: type = np.float64
-) -> tuple[np.ndarray, np.ndarray]:
-    """Paths (T, S, 2) and results (S,) of the pure function."""
-    given = {key: np.ascontiguousarray(values, dtype=kind) for key, values in exported.inputs(instants).items()}
-    function = getattr(loaded, f"{name}_path")
-    predicted = np.zeros((len(instants), exported.layout.horizon, 2), dtype=kind)
-    work = np.zeros(1_000_000)
-    results = [
-        function(*(pointer(given[key][i]) for key in exported.layout.sizes), pointer(predicted[i]), pointer(work))
-        for i in range(len(instants))
-    ]
-    return predicted.swapaxes(0, 1), np.array(results)
-
-
-def bands(
-    loaded: ctypes.CDLL, name: str, exported: ExportModel, instants: Instants, *asked: float
+    loaded: ctypes.CDLL, name: str, exported: ExportModel, instants: Instants, *choice: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Paths (T, S, 2) and rows (T, S, 4) of their bands for level, pointwise, kind, and results (S,)."""
-    given = {key: np.ascontiguousarray(values, dtype=float) for key, values in exported.inputs(instants).items()}
-    function, size = getattr(loaded, f"{name}_path_band"), (len(instants), exported.layout.horizon)
-    function.argtypes = [ctypes.c_void_p] * 6 + [ctypes.c_double] + [ctypes.c_int] * 2 + [ctypes.c_void_p] * 3
+    """Paths (T, S, 2) of the pure function, rows (T, S, 4) of bands for level, pointwise, kind, and results (S,)."""
+    given, size = inputs_of_model(exported, instants), (len(instants), exported.layout.horizon)
     predicted, regions, work = np.zeros((*size, 2)), np.zeros((*size, 4)), np.zeros(1_000_000)
+    wanted = pointer(np.array(choice, dtype=float)) if choice else None
     results = [
-        function(*(pointer(given[key][i]) for key in exported.layout.sizes), *asked,
-                 *map(pointer, (predicted[i], regions[i], work)))
+        getattr(loaded, f"{name}_path")(
+            *(pointer(given[key][i]) for key in exported.layout.sizes), wanted,
+            *map(pointer, (predicted[i], regions[i], work)),
+        )
         for i in range(len(instants))
     ]  # fmt: skip
     return predicted.swapaxes(0, 1), regions.swapaxes(0, 1), np.array(results)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import replace
 
 import casadi as ca
@@ -12,15 +11,14 @@ import pytest
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.export.band import BAND_CHOICE, band_rows, radii_at
-from shipid.export.c import NumberPrecision
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import build_model
 from shipid.hybrid.alone import UnchangedPath
-from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
+from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
-from tests.export.compiled import Recorder, bands, library, pointer
+from tests.export.compiled import Recorder, library, paths, pointer
 from tests.export.strange import KINDS, drawn
 
 NEAR = 1e-10
@@ -45,12 +43,12 @@ def expected(predictor, instants, path, level, pointwise, kind):
 def agrees(predictor, instants, folder):
     """Half axes and directions of C are those of Python for every level; how many bands there were."""
     exported, count = build_model(predictor), 0
-    loaded = library(predictor_files(exported, "odd", NumberPrecision()), folder)
+    loaded = library(predictor_files(exported, "odd"), folder)
     outside = np.where(predictor.outside(instants.columns), OUTSIDE, 0)
     for asked in ASKED:
-        path, computed, results = bands(loaded, "odd", exported, instants, *asked)
+        path, computed, results = paths(loaded, "odd", exported, instants, *asked)
         whole = np.isfinite(path).all(axis=(0, 2))
-        assert (results[~whole] == outside[~whole] + DIVERGED).all()
+        assert (results[~whole] == outside[~whole] + DIVERGED + NO_BAND).all()
         assert np.isnan(computed[:, ~whole]).all()
         right = expected(predictor, instants, path, *asked)
         if right is None:
@@ -109,11 +107,11 @@ def test_faults_give_a_result_and_no_band(tmp_path):
     strange = drawn("alone", 6, count=4, vessel="mariner")
     predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), limits={"u": (-1e9, 1e9)})
     exported = build_model(predictor)
-    loaded = library(predictor_files(exported, "odd", NumberPrecision()), tmp_path)
+    loaded = library(predictor_files(exported, "odd"), tmp_path)
 
     def result(level=0.9, pointwise=0, kind=0, **changed):
         instants = replace(strange.instants, columns={**strange.instants.columns, **changed})
-        _, computed, results = bands(loaded, "odd", exported, instants, level, pointwise, kind)
+        _, computed, results = paths(loaded, "odd", exported, instants, level, pointwise, kind)
         assert np.isnan(computed[:, results > 0]).all()
         assert np.isfinite(computed[:, results == 0]).all()
         return set(results)
@@ -128,33 +126,18 @@ def test_faults_give_a_result_and_no_band(tmp_path):
         assert result(r=np.full(4, fault)) == {1}
 
 
-def test_a_band_adapts_as_in_python(tmp_path):
-    rng = np.random.default_rng(0)
-    strange = drawn("alone", 6, vessel="mariner")
-    table = strange.predictor.bands
-    loaded = library(predictor_files(build_model(strange.predictor), "odd", NumberPrecision()), tmp_path)
-    for name, kinds in (("odd_adapted", "dddi"), ("odd_factor", "ddi")):
-        function = getattr(loaded, name)
-        function.argtypes = [ctypes.c_double if kind == "d" else ctypes.c_int for kind in kinds]
-        function.restype = ctypes.c_double
-    for level, rate, share in ((0.9, 0.02, 0.1), (0.5, 0.3, 0.9), (0.99, 0.05, 0.0), (0.3, 0.2, 1.0)):
-        state, miss = start_adaptation(level, rate), 1 - level
-        for missed in rng.random(60) < share:
-            state, miss = adapt_band(state, bool(missed)), loaded.odd_adapted(miss, level, rate, int(missed))
-            assert miss == pytest.approx(state.miss, rel=1e-12, abs=1e-14)
-            for kind, radius in enumerate((table.whole, *table.by_kind)):
-                assert loaded.odd_factor(miss, level, kind) == pytest.approx(adaptive_factor(state, radius), rel=1e-9)
-    for wrong in ((0.1, 0.9, 9), (np.nan, 0.9, 0), (np.inf, 0.9, 0), (0.1, np.nan, 0), (0.1, 0.0, 0), (0.1, 1.5, 0)):
-        assert np.isnan(loaded.odd_factor(*wrong))
-
-
-def test_no_bands_leave_no_trace():
+def test_without_bands_none_is_promised(tmp_path):
     predictor = Predictor(
         Physics(load_vessel("mariner"), 3, 5.0), "alone", UnchangedPath({}), {}, {"no_band": "too few"}
     )
-    files = predictor_files(build_model(predictor), "m", NumberPrecision())
-    assert "No band: too few." in files.texts["m.h"]
-    assert "m_predict_band" not in files.texts["m.h"]
+    recorder = Recorder(predictor, tmp_path)
+    assert "No band: too few." in recorder.files.texts["odd.h"]
+    recorder.record(0.0, {"u": 4.0})
+    path, band = np.zeros((3, 2)), np.zeros((3, 4))
+    given = pointer(recorder.kept), None, pointer(np.array([0.9, 0.0, 0.0])), pointer(path), pointer(band)
+    assert recorder.loaded.odd_predict(*given) == OUTSIDE + NO_BAND
+    assert np.isfinite(path).all()
+    assert np.isnan(band).all()
 
 
 def test_the_recorder_gives_path_and_band(tmp_path):
@@ -163,12 +146,10 @@ def test_the_recorder_gives_path_and_band(tmp_path):
     predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), commands="held")
     recorder, columns = Recorder(predictor, tmp_path), strange.instants.columns
     path, band = (np.zeros((predictor.physics.horizon, size)) for size in (2, 4))
-    around = [ctypes.c_double, ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p]
-    recorder.loaded.odd_predict_band.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *around]
 
     def result(level):
-        given = pointer(recorder.kept), None, level, 0, 0, pointer(path), pointer(band)
-        return recorder.loaded.odd_predict_band(*given)
+        choice = np.array([level, 0.0, 0.0])
+        return recorder.loaded.odd_predict(pointer(recorder.kept), None, pointer(choice), pointer(path), pointer(band))
 
     assert result(0.9) == 8
     assert np.isnan(band).all()

@@ -18,9 +18,9 @@ from shipid.data.dataset import Dataset, sample_columns
 from shipid.data.windows import Instants, past_of_instants
 from shipid.engine.casadi import memory_along
 from shipid.engine.rollout import rollout
-from shipid.export.c import NumberPrecision, SourceFiles, c_comment, c_name, c_strings
+from shipid.export.c import SourceFiles, c_comment, c_name, c_strings
 from shipid.export.c_predictor import predictor_files
-from shipid.export.c_vessel import VesselParts, vessel_files
+from shipid.export.c_vessel import vessel_files
 from shipid.export.equations import Equations
 from shipid.export.known import POSITION_ENTRIES
 from shipid.export.model import build_model
@@ -38,6 +38,7 @@ from tests.export.compiled import (
     Recorder,
     compile_,
     compiler,
+    inputs_of_model,
     library,
     paths,
     pointer,
@@ -66,10 +67,10 @@ def with_faults(instants, taken, rng):
 def agrees(strange, folder):
     """Paths, alarms and refusals are those of Python at instants with faults."""
     exported = build_model(strange.predictor)
-    loaded = library(predictor_files(exported, "odd", NumberPrecision()), folder)
+    loaded = library(predictor_files(exported, "odd"), folder)
     taken = [name for name in exported.layout.now[len(POSITION_ENTRIES) :] if name in strange.instants.columns]
     instants, faulty, fast = with_faults(strange.instants, taken, np.random.default_rng(0))
-    computed, results = paths(loaded, "odd", exported, instants)
+    computed, _, results = paths(loaded, "odd", exported, instants)
     np.testing.assert_array_equal(results[faulty], INVALID)
     assert np.isnan(computed[:, faulty]).all()
     outside = strange.predictor.outside(instants.columns)
@@ -98,15 +99,19 @@ def test_every_method_is_that_of_python_on_strange_ships(kind, seed, tmp_path):
 def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
     strange = drawn("path-drawn", 3, vessel="mariner")
     exported = build_model(strange.predictor)
-    loaded = library(predictor_files(exported, "odd", NumberPrecision()), tmp_path)
-    given = {key: np.ascontiguousarray(values[0]) for key, values in exported.inputs(strange.instants).items()}
+    loaded = library(predictor_files(exported, "odd"), tmp_path)
+    given = {
+        key: np.ascontiguousarray(values[0]) for key, values in inputs_of_model(exported, strange.instants).items()
+    }
     path, work = np.zeros((exported.layout.horizon, 2)), np.zeros(1_000_000)
 
     def result(group, place, value):
         faulty = given[group].copy()
         faulty[place] = value
         changed = {**given, group: faulty}
-        code = loaded.odd_path(*(pointer(changed[key]) for key in exported.layout.sizes), pointer(path), pointer(work))
+        code = loaded.odd_path(
+            *(pointer(changed[key]) for key in exported.layout.sizes), None, pointer(path), None, pointer(work)
+        )
         assert code & (OUTSIDE | DIVERGED) or np.isfinite(path).all() == (code == 0)
         return code
 
@@ -117,36 +122,18 @@ def test_faults_in_the_inputs_give_a_result_and_no_path(tmp_path):
         assert result("parameters", exported.layout.parameters.index(name), 0.0) == PARAMETER
 
 
-@pytest.mark.parametrize("vessel", [None, "mariner"])
-def test_a_position_that_is_missing_matters_where_python_takes_it(vessel, tmp_path):
-    """Without physics Python does not look at north and east; C refused such rows."""
-    physics = Physics(vessel and load_vessel(vessel), 6, 5.0)
-    predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (0.0, 1.0)})
-    recorder = Recorder(predictor, tmp_path)
-    row = np.linspace(0.1, 0.3, len(recorder.model.layout.now))
-    row[: len(POSITION_ENTRIES)] = np.nan, -np.inf
-    columns = {name: row[None, i] for i, name in enumerate(recorder.model.layout.now)}
-    with np.errstate(invalid="ignore"):
-        expected = predictor.predict(Instants(columns))
-    result = recorder.loaded.odd_record(pointer(recorder.kept), 0.0, pointer(row))
-    assert result == (0 if np.isfinite(expected).all() else INVALID) == (0 if vessel is None else INVALID)
-    computed, results = paths(recorder.loaded, "odd", recorder.model, Instants(columns))
-    assert results.tolist() == [result]
-    np.testing.assert_array_equal(computed, expected)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_sanitizers_are_silent(kind, tmp_path):
     plain = (drawn(kind, seed) for seed in range(2, 20))
     strange = next(one for one in plain if one.predictor.physics.observer is None)
-    run_example(predictor_files(build_model(strange.predictor), "odd", NumberPrecision()), tmp_path, *SANITIZERS)
+    run_example(predictor_files(build_model(strange.predictor), "odd"), tmp_path, *SANITIZERS)
 
 
 @pytest.mark.slow
 def test_no_address_is_wrong_with_an_observer(tmp_path):
     predictor = Predictor(Physics(variety()["actuators"], 10, 1.0, "rk4", Observer()), "alone", UnchangedPath({}), {})
-    run_example(predictor_files(build_model(predictor), "odd", NumberPrecision()), tmp_path, "-fsanitize=address")
+    run_example(predictor_files(build_model(predictor), "odd"), tmp_path, "-fsanitize=address")
 
 
 @pytest.mark.slow
@@ -164,7 +151,7 @@ def test_a_prediction_is_fast_small_and_allocates_nothing(tmp_path):
     recorder.follow(dataset.frame)
     path, begun = np.zeros((30, 2)), time.perf_counter()
     for _ in range(100):
-        assert loaded.odd_predict(pointer(recorder.kept), None, pointer(path)) == 0
+        assert loaded.odd_predict(pointer(recorder.kept), None, None, pointer(path), None) == 0
     assert time.perf_counter() - begun < 0.1
     objects = tmp_path / "fast" / "odd_casadi.o"
     assert objects.stat().st_size + len(recorder.kept) < 3e6
@@ -326,17 +313,13 @@ def test_after_a_pause_an_observer_begins_anew_aboard_and_in_python(step, tmp_pa
     assert 5 < anew < 30
 
 
-@pytest.mark.parametrize("single", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(single, tmp_path):
+def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(tmp_path):
     """A clock in micro- or nanoseconds: else a row would take minutes, or would never end."""
     vessel = variety()["gunnerus-28.9"]
     physics = Physics(vessel, 5, 1.0, "rk4", ONE_FILTER)
     predictor = Predictor(physics, "alone", UnchangedPath({}), {"u": (-99.0, 99.0)}, run_up=3.0)
-    recorder, limit = (
-        Recorder(predictor, tmp_path, NumberPrecision(single)),
-        MOST_FILTER_STEPS * filter_bank(vessel, ONE_FILTER).longest,
-    )
-    assert f"After {limit:.4g} s all does, pause or not." in recorder.files.texts["odd.h"]
+    recorder, limit = Recorder(predictor, tmp_path), MOST_FILTER_STEPS * filter_bank(vessel, ONE_FILTER).longest
+    assert f"after {limit:.4g} s, pause or not." in recorder.files.texts["odd.h"]
     for apart, result in ((0.99 * limit, 0), (1.01 * limit, OUTSIDE), (1e9, OUTSIDE)):
         recorder.begin()
         for i in range(4):
@@ -345,39 +328,9 @@ def test_an_observer_begins_anew_after_rows_as_far_apart_as_python_refuses(singl
         assert np.isfinite(path).all()
 
 
-def test_a_long_way_costs_single_precision_no_digits(tmp_path):
-    """The past by integrated velocities: what came long before moves no path."""
-    physics = Physics(variety()["gunnerus-28.9"], 3, 1.0, path="velocity")
-    log = log_of(physics.vessel, 16, np.random.default_rng(1), 1.0).frame
-    t = log["t"].to_numpy()[12:]
-    instants = Instants(sample_columns(log, t), past_of_instants(log, t, 10, 1.0, "velocity"))
-    predictor = remembering(physics, Memory(history=(1.0, 10.0), error=(10.0,)), instants)
-    recorder = Recorder(predictor, tmp_path, NumberPrecision(single=True))
-
-    def path_after(fast):
-        """Path where so many rows of 2 km/s came before those of 7 m/s."""
-        recorder.begin()
-        for k in range(fast + 120):
-            row = {"u": 2000.0 if k < fast else 7.0, "psi": 0.4, "port.n": 1.5, "starboard.n": 1.5}
-            assert recorder.record(0.1 * k, row) == 0
-        return recorder.predict()[0]
-
-    np.testing.assert_allclose(path_after(3000), path_after(0), rtol=0, atol=1e-3)
-
-
-@pytest.mark.slow
-def test_single_precision_is_near(tmp_path):
-    strange = drawn("path-drawn", 5, vessel="mariner")
-    exported = build_model(strange.predictor)
-    loaded = library(predictor_files(exported, "odd", NumberPrecision(single=True)), tmp_path)
-    computed, _ = paths(loaded, "odd", exported, strange.instants, np.float32)
-    expected = strange.predictor.predict(strange.instants)
-    assert np.abs(computed - expected).max() < 1e-4 * np.abs(expected).max()
-
-
 def test_fast_math_is_refused_at_compilation(tmp_path):
     """It takes out isfinite: a row of NaN was kept, with result 0."""
-    write(vessel_files(load_vessel("mariner"), "odd", "rk4", NumberPrecision()), tmp_path)
+    write(vessel_files(load_vessel("mariner"), "odd", "rk4"), tmp_path)
     command = [compiler(), "-std=c99", "-O2", "-ffast-math", "-c", "odd.c"]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert result.returncode != 0
@@ -385,14 +338,12 @@ def test_fast_math_is_refused_at_compilation(tmp_path):
 
 
 @pytest.mark.parametrize("program", ["gcc", "clang"])
-@pytest.mark.parametrize("single", [False, True])
-def test_no_compiler_warns_of_a_conversion(program, single, tmp_path):
+def test_no_compiler_warns_of_a_conversion(program, tmp_path):
     if shutil.which(program) is None:
         pytest.skip(f"no {program}")
-    precision = NumberPrecision(single)
     for files in (
-        vessel_files(drawn_ship(100, 4), "odd", "rk4", precision),
-        predictor_files(build_model(drawn("recurrent", 100).predictor), "odd", precision),
+        vessel_files(drawn_ship(100, 4), "odd", "rk4"),
+        predictor_files(build_model(drawn("recurrent", 100).predictor), "odd"),
     ):
         options = ("-O0", "-Wsign-conversion", "-o", "example", "main.c")
         compile_([program], write(files, tmp_path), *options, *sources(files))
@@ -402,7 +353,7 @@ def test_a_ship_without_orders_compiles_without_a_warning(tmp_path):
     vessel = variety()["mariner"]
     adrift = vessel.with_values({f"thruster.{name}.off": True for name in vessel.document["thruster"]})
     predictor = Predictor(Physics(adrift, 3, 1.0, observer=Observer()), "alone", UnchangedPath({}))
-    library(predictor_files(build_model(predictor), "odd", NumberPrecision()), tmp_path)
+    library(predictor_files(build_model(predictor), "odd"), tmp_path)
 
 
 @pytest.mark.parametrize("name", ["actuators"])
@@ -414,7 +365,7 @@ def test_a_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
 @pytest.mark.parametrize("name", list(variety()))
 def test_every_vessel_steps_as_in_python(name, tmp_path, draw_inputs):
     _steps(variety()[name], tmp_path, draw_inputs)
-    run_example(vessel_files(variety()[name], "ship", "rk4", NumberPrecision()), tmp_path / "example", *SANITIZERS)
+    run_example(vessel_files(variety()[name], "ship", "rk4"), tmp_path / "example", *SANITIZERS)
 
 
 def _steps(vessel, folder, draw_inputs):
@@ -422,7 +373,7 @@ def _steps(vessel, folder, draw_inputs):
     equations, slow, steps = Equations(vessel), pace(vessel), 60
     drawn_ = draw_inputs(vessel, 3)
     loads = 1e-3 * float(vessel.document["inertia"]["m"]) * np.ones(equations.model.num_dof)
-    loaded = library(vessel_files(vessel, "ship", "rk4", NumberPrecision()), folder)
+    loaded = library(vessel_files(vessel, "ship", "rk4"), folder)
     loaded.ship_step.argtypes = [*[ctypes.c_void_p] * 5, ctypes.c_double]
     expected = rollout(
         vessel, drawn_["start"], drawn_["commands"], drawn_["environment"], step=0.1 * slow, num_steps=steps,
@@ -430,11 +381,11 @@ def _steps(vessel, folder, draw_inputs):
     )  # fmt: skip
     names, values = equations.model.state, np.array(list(vessel.parameters.values()))
     for i in range(3):
-        carry = np.zeros(equations.num_carry)
+        carry = np.zeros(len(equations.groups["carry"]))
         carry[: len(names)] = [drawn_["start"][name][i] for name in names]
         groups = [np.array([drawn_[key][name][i] for name in getattr(equations.model, key)] + [0.0])
                   for key in ("commands", "environment")]  # fmt: skip
-        loaded.ship_begin(pointer(carry), pointer(groups[0]))
+        loaded.ship_begin(pointer(carry), pointer(groups[0]), pointer(values))
         given = [pointer(array) for array in (carry, *groups, loads, values)]
         before = carry.copy()
         assert [loaded.ship_step(*given, dt) for dt in (0.0, float("nan"))] == [2, 1]
@@ -450,7 +401,7 @@ def _steps(vessel, folder, draw_inputs):
 
 
 def test_states_that_terms_keep_have_units():
-    units = VesselParts(load_vessel("gunnerus-28.9-6dof"), "rk4").units()["carry"]
+    units = Equations(load_vessel("gunnerus-28.9-6dof")).groups["carry"]
     assert "-" not in units.values()
     kept = ("heave_pitch.w0c", "heave_pitch.q2s", "roll.p1c")
     assert [units[f"radiation.{name}"] for name in kept] == ["m", "rad", "rad"]
@@ -459,16 +410,16 @@ def test_states_that_terms_keep_have_units():
 
 def test_names_are_those_of_c():
     given = {"moderate-3+drawn-N0030-s0": "moderate_3_drawn_n0030_s0", "33.9 m": "m_33_9_m", "Ærø": "r", "øøø": "model"}
-    given |= {word: f"m_{word}" for word in ("double", "exp", "class", "concept", "math")}
+    given |= {word: f"m_{word}" for word in ("main", "math", "casadi_x")} | {"double": "double"}
     assert {name: c_name(name) for name in given} == given
 
 
 def test_examples_run_and_end_with_the_result_of_a_row_that_is_refused(tmp_path):
     predictor = Predictor(Physics(load_vessel("mariner"), 6, 5.0), "alone", UnchangedPath({}), {"u": (0.0, 8.0)})
-    files = predictor_files(build_model(predictor), "m", NumberPrecision())
+    files = predictor_files(build_model(predictor), "m")
     assert "30 s: " in run_example(files, tmp_path / "a")
-    assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4", NumberPrecision()), tmp_path / "b")
-    broken = files.texts["main.c"].replace("[m_NUM_ROW] = {0,0,0", "[m_NUM_ROW] = {0,0,0.0 / 0.0", 1)
+    assert "psi" in run_example(vessel_files(load_vessel("mariner"), "m", "rk4"), tmp_path / "b")
+    broken = files.texts["main.c"].replace("[m_NUM_ROW] = {0}", "[m_NUM_ROW] = {0.0 / 0.0}")
     write(replace(files, texts={**files.texts, "main.c": broken}), tmp_path)
     compile_([compiler()], tmp_path, "-O0", "-o", "example", "main.c", *sources(files))
     result = subprocess.run([tmp_path / "example"], capture_output=True, text=True)

@@ -21,6 +21,7 @@ from shipid.observer import ESTIMATE_COLUMNS, Observer
 from shipid.predictor import Predictor
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
+from tests.export.compiled import inputs_of_model
 from tests.export.strange import drawn
 
 
@@ -29,7 +30,7 @@ def test_a_predictor_is_one_function(kind, tmp_path):
     strange = drawn(kind, 5, count=4, vessel="mariner")
     file, names, *_ = export_predictor(strange.predictor, "casadi", tmp_path / "ship.casadi")
     function, listed = ca.Function.load(str(file)), json.loads(names.read_text())
-    given = build_model(strange.predictor).inputs(strange.instants)
+    given = inputs_of_model(build_model(strange.predictor), strange.instants)
     expected = strange.predictor.predict(strange.instants)
     for i in range(4):
         path = np.array(function(**{key: values[i] for key, values in given.items()})["path"])
@@ -54,7 +55,7 @@ def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
     )
     instants = Instants(columns, estimates=estimates)
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
-    given, expected = build_model(predictor).inputs(instants), predictor.predict(instants)
+    given, expected = inputs_of_model(build_model(predictor), instants), predictor.predict(instants)
     for i in range(3):
         seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
         np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=0, atol=1e-9)
@@ -69,7 +70,7 @@ def test_a_path_that_diverged_is_none(step, tmp_path):
     columns |= {"propeller.n": np.array([1.3, 0.0]), "rudder.delta": np.array([0.5, 0.0])}
     predictor = Predictor(Physics(vessel, 6, step), "alone", UnchangedPath({}), {"u": (0.0, 9.0)})
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
-    given, expected = build_model(predictor).inputs(Instants(columns)), predictor.predict(Instants(columns))
+    given, expected = inputs_of_model(build_model(predictor), Instants(columns)), predictor.predict(Instants(columns))
     for i in range(2):
         seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
         np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=1e-9)
@@ -107,7 +108,7 @@ def test_a_point_of_the_training_has_derivatives():
     """Before, those of `modules` by the state at it, which has no distance to the nearest one, were no numbers."""
     strange = drawn("modules", 301, count=1)
     exported = build_model(strange.predictor)
-    given = {key: values[0] for key, values in exported.inputs(strange.instants).items()}
+    given = {key: values[0] for key, values in inputs_of_model(exported, strange.instants).items()}
     now = ca.MX.sym("now", exported.layout.sizes["now"])
     path = exported.function(**{**given, "now": now})["path"]
     assert np.isfinite(ca.Function("slopes", [now], [ca.jacobian(path, now)])(given["now"]).full()).all()

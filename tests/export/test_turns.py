@@ -36,21 +36,15 @@ def limits_of(low, high):
     return FREE | {f"{side}.alpha": (np.radians(low), np.radians(high)) for side in ("port", "starboard")}
 
 
-def played(folder, gear, limits, angles, observer=None, plan=None):
+def played(folder, gear, limits, angles, observer=None):
     """Paths (N, T, 2) and alarms (N,) with angles [deg] of both units, a second apart."""
     physics = Physics(gunnerus(gear), 20, 1.0, "rk4", observer)
-    known = "held" if plan is None else "known"
-    recorder = Recorder(Predictor(physics, "alone", UnchangedPath({}), limits, commands=known), folder)
+    recorder = Recorder(Predictor(physics, "alone", UnchangedPath({}), limits), folder)
     paths, alarms = [], []
     for i, angle in enumerate(angles):
         values = {"u": 4.0, "north": 4.0 * i, "port.n": 2.5, "starboard.n": 2.5}
         values |= dict.fromkeys(("port.alpha", "starboard.alpha"), np.radians(angle))
-        orders = None
-        if plan is not None:
-            orders = np.tile([values[name] for name in recorder.model.layout.planned], (20, 1))
-            for name in ("port.alpha", "starboard.alpha"):
-                orders[:, recorder.model.layout.planned.index(name)] = np.radians(plan)
-        path, result = recorder.path(float(i), values, orders)
+        path, result = recorder.path(float(i), values)
         assert result & ~OUTSIDE == 0
         paths.append(path)
         alarms.append(result == OUTSIDE)
@@ -137,16 +131,6 @@ def test_stops_that_are_changed_aboard_count(tmp_path):
     through, back = path(200, 0, 340), path(-160, 0, 340)
     np.testing.assert_allclose(through, back, rtol=0, atol=1e-9)
     assert np.abs(path(200) - through).max() > 1  # with stops at 170 deg 200 is -160: the other way round
-
-
-@pytest.mark.parametrize("low_high", [(-170, 170), (-1000, 1000)])
-def test_a_plan_goes_on_from_the_newest_row(low_high, tmp_path):
-    """Whatever turns it comes by: orders that cross 180 deg do not turn the gear back."""
-    plan = np.linspace(165, 240, 20)
-    whole, _ = played(tmp_path / "whole", LAG, FREE, [150, 165], plan=plan)
-    odd = plan + 360 * (np.arange(20) % 3 - 1)
-    paths, _ = played(tmp_path / "odd", LAG, limits_of(*low_high), [510, -195], plan=odd)
-    np.testing.assert_allclose(paths, whole, rtol=0, atol=1e-9)
 
 
 SHIPS = (2, 7, 17, 25, 33, 34, 38)  # with an azimuth unit
