@@ -17,7 +17,7 @@ RAW, RUNS = {870183: "right", 870176: "reported"}, 4  # raw folders: all that th
 
 
 @pytest.fixture(
-    scope="module", params=[range(300, 308), pytest.param(range(308, 328), marks=pytest.mark.slow)], ids=["few", "more"]
+    scope="module", params=[range(300, 304), pytest.param(range(304, 324), marks=pytest.mark.slow)], ids=["few", "more"]
 )
 def words(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[int, str]:
     return {seed: judge(draw(seed, tmp_path_factory.mktemp("drawn") / "logs")).word for seed in request.param}
@@ -31,7 +31,7 @@ def test_most_are_right(words: dict[int, str]) -> None:
     assert sum(word == "right" for word in words.values()) >= LEAST * len(words)
 
 
-@pytest.mark.parametrize("clock", CLOCKS[1::3])
+@pytest.mark.parametrize("clock", CLOCKS[1::4])
 def test_a_clock_in_any_unit_is_read_as_one_in_seconds(clock: str, tmp_path: Path) -> None:
     """Same ship, same columns: the verdict is that of the log in seconds, and nothing is asked of a right clock."""
     seed = SEEDS[CLOCKS.index(clock) % len(SEEDS)]
@@ -43,7 +43,7 @@ def test_a_clock_in_any_unit_is_read_as_one_in_seconds(clock: str, tmp_path: Pat
     assert words == ["right", "right"]
 
 
-@pytest.mark.parametrize(("seed", "unit"), [(302, "kn"), (306, "km/h"), (323, "mm/s")])
+@pytest.mark.parametrize(("seed", "unit"), [(302, "kn"), (323, "mm/s")])
 def test_speeds_in_any_unit_are_read(unit: str, seed: int, tmp_path: Path) -> None:
     drawn = draw(seed, tmp_path / "logs", speed=unit)
     assert judge(drawn).word == "right"
