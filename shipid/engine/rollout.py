@@ -344,11 +344,8 @@ def _initial_memory(
 def _drawn_components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
     """Components (num_entries, S, num_components) of each sum with drawn components; zeros if none are given."""
     result, paths = [], [term.path for term in model.drawn]
-    unknown = next((path for path in given if path not in paths), None)
-    if unknown is not None:
-        raise ShipidError(
-            f"components: the vessel has no term {unknown!r} whose components are drawn: {suggest_name(unknown, paths)}"
-        )
+    for path in given:
+        check_choice("components: a term whose components are drawn,", path, paths)
     for term in model.drawn:
         entries = sum(term.widths.values())
         values = as_float_array(f"components of {term.path}", given.get(term.path, np.zeros((num_samples, 1, entries))))
