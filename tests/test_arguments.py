@@ -199,7 +199,7 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
     "components": (lambda: performed(components=3), "components must be a dict"),
     "components of one": (
         lambda: performed(components={"waves": 1.0}),
-        "there is no|components: the vessel has no term",
+        "there is no|whose components are drawn",
     ),
     "engine of a list": (lambda: performed(engine=["casadi"]), "engine .* is not known"),
     "outputs": (lambda: performed(outputs=3), "outputs must be a name, or several names"),

@@ -165,8 +165,8 @@ def _compare_turning(stretches: list[pd.DataFrame]) -> tuple[Array, Array, Array
             + width * (usual * curvature / 12) ** 2
         )
         errors.append(np.full(len(edges) - 1, np.sqrt(variance)))
-    seen, integrated, errors = (np.concatenate([np.empty(0), *parts]) for parts in (seen, integrated, errors))
-    return seen, integrated, errors
+    joined = [np.concatenate([np.empty(0), *parts]) for parts in (seen, integrated, errors)]
+    return joined[0], joined[1], joined[2]
 
 
 def _check_heading(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:

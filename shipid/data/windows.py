@@ -243,10 +243,7 @@ def cut_windows(
     past : number P of steps before the instant that a window holds. The first instant of a run is P steps after its
         first row.
 
-    Raises
-    ------
-    DataError : a horizon or past that is no whole number, a time that is not positive and finite, an unknown path, or
-        no run is as long as past and horizon together.
+    DataError for an argument that does not fit, or where no run is as long as past and horizon together.
     """
     check_class("dataset", dataset, Dataset, "as of `read_dataset`", DataError)
     horizon, past = check_whole_number("horizon", horizon, 1, DataError), check_whole_number("past", past, 0, DataError)

@@ -87,12 +87,10 @@ ENGINES: dict[str, Engine] = {  # in the order in which `auto` asks them
 
 def check_device(device: str) -> None:
     """Raise ShipidError unless PyTorch can compute on the device, such as `cpu` or `cuda:0`."""
-    if device == "cpu":
-        return
-    from shipid.engine.torch import is_torch_device
+    if device != "cpu":
+        from shipid.engine.torch import check_torch_device
 
-    if not is_torch_device(device):
-        raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {device}")
+        check_torch_device(device)
 
 
 def engine_by_name(name: str, device: str) -> Engine | None:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipid.arguments import check_choice
 from shipid.engine.adjoint import Adjoint, Loss
 from shipid.engine.engines import AUTO, Engine, choose_gradient_engine, run_with_fallback
 from shipid.engine.integrate import Array, Method, RolloutJob
 from shipid.engine.rollout import SPEED_LIMIT, channel_names, channel_places, finite_samples, prepare_batch
-from shipid.errors import ShipidError, suggest_name
+from shipid.errors import ShipidError
 from shipid.vessel.load import Vessel
 
 PATH = ("north", "east")
@@ -83,9 +84,8 @@ def rollout_gradient(
     model, batch = prepare_batch(vessel, start, commands, weather, {}, num_steps, values, memory, tau_extra, None)
     if model.drawn:
         raise ShipidError(f"{model.drawn[0].path} draws its components and has no gradient: switch it off")
-    wrong = next((name for name in names if name not in model.parameters), None)
-    if wrong is not None:
-        raise ShipidError(f"{vessel.name} has no parameter {wrong!r}: {suggest_name(wrong, model.parameters)}")
+    for name in names:
+        check_choice(f"parameter of {vessel.name}", name, model.parameters)
     order = {name: place for place, name in enumerate(model.parameters)}
     job = RolloutJob(step, num_steps, method, 1, channel_places(keep, channel_names(model), vessel), device)
     wanted = tuple(order[name] for name in names)

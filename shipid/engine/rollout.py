@@ -77,9 +77,7 @@ def rollout(
     Parameters
     ----------
     start : state name -> (S,), SI; names that the vessel does not have are passed over, missing ones raise DataError.
-    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step. In a
-        dict, a command that the vessel does not have is an error, and so is a name in the environment that is no
-        signal at all.
+    commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
     parameters : (V, P) in the order of `vessel.parameters`; one row for each variant. A DataFrame, a Series or a dict
         with dotted paths is read by these. Default: the numbers of the vessel.
@@ -89,17 +87,11 @@ def rollout(
         from `shipid.simulation.sea`; default: none, calm water.
     helmsman : control law that gives the orders; `commands` are then its inputs; see `shipid.physics.helm`.
     keep : channels to record, default all states and memories.
-    engine : `native` (C on SIMD vectors and threads), `single` (the same in single precision, for starts near the
-        origin: a northing of 6,500 km counts in steps of 0.5 m), `casadi` (its virtual machine, sample by sample),
-        `torch`, or `auto`: by size and by what there is; `repeated` is `auto` where so many calls follow that
-        compiling pays for any size.
+    engine : of `ENGINES`, or `auto`: by size and by what there is; `repeated` is `auto` where so many calls follow that
+        compiling pays. `single` counts a northing of 6,500 km in steps of 0.5 m.
     device : a PyTorch device; the engines `native` and `casadi` are for the CPU.
 
-    Raises
-    ------
-    DataError : a state, command or signal of the environment that the vessel needs is missing.
-    ShipidError : an array of another shape or without numbers, a step or number of steps that is not positive, an
-        unknown method, engine, channel, parameter, component or signal of the environment.
+    DataError for an input that is missing, ShipidError for one that does not fit or is not known.
     """
     asked = engine_by_name(engine, device)
     num_steps, every = check_whole_number("num_steps", num_steps, 1), check_whole_number("every", every, 1)
@@ -344,11 +336,8 @@ def _initial_memory(
 def _drawn_components(model: Dynamics, given: Mapping[str, Array], num_samples: int) -> tuple[Array, ...]:
     """Components (num_entries, S, num_components) of each sum with drawn components; zeros if none are given."""
     result, paths = [], [term.path for term in model.drawn]
-    unknown = next((path for path in given if path not in paths), None)
-    if unknown is not None:
-        raise ShipidError(
-            f"components: the vessel has no term {unknown!r} whose components are drawn: {suggest_name(unknown, paths)}"
-        )
+    for path in given:
+        check_choice("components: a term whose components are drawn,", path, paths)
     for term in model.drawn:
         entries = sum(term.widths.values())
         values = as_float_array(f"components of {term.path}", given.get(term.path, np.zeros((num_samples, 1, entries))))

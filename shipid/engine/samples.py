@@ -6,7 +6,6 @@ each other.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -21,8 +20,6 @@ from shipid.engine.printing import print_function
 from shipid.engine.threads import run_tasks, threaded_source
 from shipid.engine.vectors import vector_source
 from shipid.interrupts import hold_interrupts
-
-log = logging.getLogger(__name__)
 
 COMPILE_FROM = 1e9  # operations: below it compiling C (five seconds or more, once) costs more than it saves
 QUICKER = ("-O1", "-fno-schedule-insns")  # of the compiler; higher levels take twice as long and gain nothing here
@@ -88,10 +85,8 @@ def _compile_sample_function(function: ca.Function, shared: tuple[str, ...]) -> 
     """The compiled function `run`; None where it cannot be compiled, which is logged once."""
     try:
         return compile_source(_sample_source(function, shared), QUICKER)
-    except NoLibrary as error:
-        note_interpretation(function.name(), error.message)
-    except ValueError as error:
-        log.warning("%s is not compiled (%s): slower, with the same results", function.name(), error)
+    except (NoLibrary, ValueError) as error:
+        note_interpretation(function.name(), str(error))
     return None
 
 

@@ -220,7 +220,11 @@ class _TableSearch(InstructionGraph):
             table = found.get(before)
             for bend, corner in self.pairs(ramp, ca.OP_MUL) if table else ():
                 for beyond, zero in self.pairs(corner, ca.OP_FMAX):
-                    if self.operation[beyond] == ca.OP_SUB and self.is_zero(zero):
+                    if (
+                        self.operation[beyond] == ca.OP_SUB
+                        and self.operation[zero] == ca.OP_CONST
+                        and not self.function.instruction_constant(zero)
+                    ):
                         x, knot = self.operands[beyond]
                         if table is not None and x == table.x:
                             knots, bends, ramps = (*table.knots, knot), (*table.bends, bend), (*table.ramps, ramp)
@@ -242,10 +246,6 @@ class _TableSearch(InstructionGraph):
             return ()
         first, second = self.operands[k]
         return (first, second), (second, first)
-
-    def is_zero(self, k: int) -> bool:
-        """Whether an instruction is the number 0."""
-        return self.operation[k] == ca.OP_CONST and self.function.instruction_constant(k) == 0
 
     def of_parameters(self, wanted: Sequence[int]) -> tuple[list[int], ca.Function] | None:
         """Entries of the input `parameters` that give some instructions, and their function; None for other inputs."""

@@ -13,6 +13,7 @@ import torch
 from shipid.engine.adjoint import Adjoint, Loss, evaluate_loss
 from shipid.engine.integrate import Method, RolloutBatch, RolloutJob, integrate_step
 from shipid.engine.lowering import lower_function
+from shipid.errors import ShipidError
 from shipid.vessel.dynamics import Dynamics
 
 CPU_BLOCK, DEVICE_BLOCK = (
@@ -98,8 +99,8 @@ def _sum_components(value: Any, count: int) -> Any:
     return value.expand(*value.shape[:-1], count).sum(-1)
 
 
-def is_torch_device(name: str) -> bool:
-    """Whether PyTorch can compute on a device here.
+def check_torch_device(name: str) -> None:
+    """Raise ShipidError unless PyTorch can compute on a device here.
 
     Each kind of device that is not there fails in another way: RuntimeError (no such name; no numbers come back from
     `meta`), AssertionError (`cuda` of a build without it), ImportError and AttributeError (`hpu`, `privateuseone`).
@@ -107,8 +108,7 @@ def is_torch_device(name: str) -> bool:
     try:
         float(torch.zeros(1, device=torch.device(name)))
     except (RuntimeError, AssertionError, TypeError, ImportError, AttributeError):
-        return False
-    return True
+        raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {name}") from None
 
 
 def run_torch(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[np.ndarray, np.ndarray]:

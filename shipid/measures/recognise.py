@@ -29,14 +29,11 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
     parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
     that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
     of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. In a stop it is the slowest of
-    those that are reversed, or stopped where none is reversed: the ship loses her way ahead after it. So a stop begins
-    with the first order, and a tunnel thruster that runs all the time has no part in it. A shaft with a controllable
+    those that are reversed, or stopped where none is reversed. A shaft with a controllable
     pitch counts as its speed times the pitch over the greatest pitch; that of an azimuth unit which is turned to push
     astern as its speed times 1 at 0 deg, 0 at 90 deg and -1 at 180 deg, in proportion to the angle.
 
-    Raises
-    ------
-    DataError : a column is missing.
+    DataError for a missing column.
     """
     missing = next((name for name in RECORD_STATES if name not in columns), None)
     if missing is not None:

@@ -40,9 +40,7 @@ class Record:
     helm : helm as ordered, or as measured, > 0 where it turns the ship to starboard [rad].
     shaft : shaft speed as ordered [rev/s], < 0 also where the pitch drives astern; None where it is not known.
 
-    Raises
-    ------
-    DataError : fewer than two rows, unequal lengths, a value that is not finite, time that does not increase.
+    DataError for rows that are no such arrays, values that are not finite, or time that does not increase.
     """
 
     t: Array

@@ -218,10 +218,7 @@ def steady_approach(
     0.02 s U^2 / L), with the helm amidships, or held on course by a helmsman. Position and heading are then set to 0.
     With the helm amidships she goes straight if she turns by less than 0.001 rad/s, and 0.02 rad in a ship length.
 
-    Raises
-    ------
-    ShipidError : it diverges, is steady neither after an hour nor after 200 ship lengths, or turns with the helm
-        amidships (`NotStraight`).
+    ShipidError where it diverges; `NotStraight` where it is not steady after an hour or 200 ship lengths, or turns.
     """
     vessel, count, speeds, length = controls.vessel, len(n), n.tolist(), _length_or_usual(controls.vessel)
     helmsman = course_helmsman(controls.commands) if held else None

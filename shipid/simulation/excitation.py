@@ -36,8 +36,7 @@ def multisine_series(
     The phases are searched. From those of Schroeder, phi_k = -pi k (k - 1) / K, k = 1..K (1970, IEEE Trans. Inf.
     Theory 16), and from random phases by `key`, repeat: clip the peaks, keep the phases of the clipped signal, restore
     the amplitudes (Van der Ouderaa, Schoukens and Renneboog 1988, IEEE Trans. Instrum. Meas. 37). The best result is
-    used: a crest factor of 1.4 for 10 to 40 harmonics of a wide band, 1.7 to 1.9 for narrow (17..21) and sparse bands,
-    where Schroeder's are 1.9 for successive harmonics and up to 3 for sparse ones.
+    used: a crest factor of 1.4 for 10 to 40 harmonics of a wide band, where Schroeder's is 1.9.
 
     Several commands at once get disjoint harmonics (`deal_harmonics`), which makes them orthogonal over a period, and
     are shifted in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).

@@ -61,11 +61,8 @@ def perform_manoeuvres(
         actuator states (`actual.port.n`), wind if the vessel has wind forces, `flags` (0). Without `actual.*` these
         are the columns of a dataset. SI units and radians.
 
-    Raises
-    ------
-    DocumentError : a manoeuvre that this vessel cannot perform.
-    ShipidError : an approach that does not settle, a run that diverges, an interval that is no multiple of the step, a
-        time that is not positive, an unknown method or output.
+    DocumentError for a manoeuvre that this vessel cannot perform, ShipidError where an approach does not settle, a run
+    diverges or an argument does not fit.
     """
     manoeuvres = _check_manoeuvres(manoeuvres)
     step = check_positive("step", step)

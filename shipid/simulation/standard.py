@@ -75,10 +75,7 @@ def define_standard(
     approach : `steady` with the helm amidships, held on course by a `helmsman`, or from `rest`.
     n : shaft speed [rev/s] of the approach; default: that which gives the speed.
 
-    Raises
-    ------
-    ShipidError : an unknown name, side or approach, angles that do not fit, no length, a speed that no shaft speed
-        gives, a time that is not positive.
+    ShipidError for what is not known or does not fit, and for a speed that no shaft speed gives.
     """
     check_class("vessel", vessel, Vessel, "as of `load_vessel`")
     kinds = standard_manoeuvres()
@@ -137,10 +134,7 @@ def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
 def shaft_speed(controls: Controls, speed: float) -> float:
     """Shaft speed [rev/s] at which the ship goes straight ahead in calm water at a steady speed [m/s].
 
-    Raises
-    ------
-    DocumentError : no command drives the ship.
-    ShipidError : the speed is not positive, or no shaft speed up to 60,000 rpm gives it.
+    DocumentError where no command drives the ship, ShipidError where no shaft speed gives the speed.
     """
     if not 0 < speed <= SPEED_LIMIT:
         raise ShipidError(

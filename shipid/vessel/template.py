@@ -403,10 +403,7 @@ def guess_screw(given: Particulars) -> tuple[float, tuple[float, float, float], 
         if least < wanted < most:
             D, words = wanted, f"drives {given.service:.3g} m/s at {60 * n:.4g} rpm with P / D = {PITCH:g}"
     if not _is_pitch_between(given, D, n, PITCHES):
-        low, high = sorted(
-            60 * bisect_root(lambda n, pitch=pitch: _thrust_surplus(given, D, n, pitch), 0.0, FASTEST)
-            for pitch in PITCHES
-        )
+        low, high = sorted(60 * _shaft_speed_of_screw(given, D, pitch) for pitch in PITCHES)
         raise ShipidError(
             f"no screw of {D:.3g} m drives this ship at {given.service:.3g} m/s with {60 * n:.4g} rpm: {low:.3g} to "
             f"{high:.3g} rpm could. Is it the engine's speed, not the screw's? Is --speed another one?",
@@ -421,6 +418,11 @@ def _is_pitch_between(given: Particulars, D: float, n: float, pitches: tuple[flo
     """Whether a pitch ratio between two gives a screw the thrust that the ship needs."""
     weak, strong = (_thrust_surplus(given, D, n, pitch) for pitch in pitches)
     return weak <= 0 <= strong
+
+
+def _shaft_speed_of_screw(given: Particulars, D: float, pitch: float) -> float:
+    """Shaft speed [rev/s] at which a screw drives the ship at its service speed."""
+    return bisect_root(lambda n: _thrust_surplus(given, D, n, pitch), 0.0, FASTEST)
 
 
 def _thrust_surplus(given: Particulars, D: float, n: float, pitch: float) -> float:
@@ -539,7 +541,7 @@ def _azimuth_size(given: Particulars, unit: Mapping[str, Any]) -> tuple[float, f
 
     needed, balanced = total_resistance(given), f"{given.service:.3g} m/s and {given.rpm:.4g} rpm"
     if known is None:
-        D = bisect_root(lambda diameter: thrust(diameter) - needed, *(share * given.draught for share in DIAMETERS))
+        D = bisect_root(lambda one: thrust(one) - needed, DIAMETERS[0] * given.draught, DIAMETERS[1] * given.draught)
         size = f"balances the resistance at {balanced}"
     scale = needed / thrust(D) if thrust(D) > 0 else math.inf
     if not SCALES[0] <= scale <= SCALES[1]:

@@ -163,9 +163,9 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
     ),
     "manoeuvre": (
         "shipid.simulation.measured:measure_standard",
-        f"manoeuvre {SHIP} zigzag 15 5 --speed 3 --side port --duration 90 --step 0.2 --approach rest",
+        f"manoeuvre {SHIP} zigzag 15 5 --speed 3 --side port --duration 90 --approach rest",
         {"vessel": is_ship, "name": "zigzag", "angles": [15.0, 5.0], "speed": 3.0, "side": "port", "duration": 90.0}
-        | {"step": 0.2, "approach": "rest"},
+        | {"approach": "rest"},
     ),
     "simulate": (
         "shipid.simulation.scripted:simulate_script",

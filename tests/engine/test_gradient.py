@@ -128,7 +128,7 @@ def test_a_diverged_sample_is_named_and_harms_no_other(draw_inputs: Draw, engine
     ("changes", "message"),
     [
         ({"engine": "casadi"}, "no gradient: use 'native' or 'torch'"),
-        ({"names": ("hull.learned.w_u.9",)}, r"has no parameter 'hull\.learned\.w_u\.9'.*hull\.learned\.w_u"),
+        ({"names": ("hull.learned.w_u.9",)}, r"'hull\.learned\.w_u\.9' is not known.*hull\.learned\.w_u"),
         ({"keep": ("north", "depth")}, "'depth' is not known"),
         ({"loss": lambda path: (path.sum(), path)}, r"shapes \(5,\) and \(5, 5, 4\), not \(\) and"),
     ],
