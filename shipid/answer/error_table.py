@@ -8,14 +8,12 @@ from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.evidence import Differences, paired_difference, training_noise
 from shipid.metrics import position_error
 from shipid.report.wording import metres_text
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import learns_from_runs
 from shipid.study.results import Results
 
 Array = NDArray[np.float64]
@@ -124,25 +122,3 @@ def _upper_errors(results: Results, path: Array) -> Array:
     """(R,) 90th percentile [m] of the errors of a path (T, S, 2) [m] in each test manoeuvre."""
     error, run = position_error(path, results.test.future), results.test.run
     return np.array([np.quantile(error[:, run == name], 0.9) for name in np.unique(run)])
-
-
-def intervals_frame(results: Results) -> pd.DataFrame:
-    """95 % interval of H over test manoeuvres, of every model at every amount of data.
-
-    Columns: model, N_D, low, high [m]; not numbers with fewer than five test manoeuvres. H is the mean over seeds; what
-    another training would give is in the interval of every model that learns.
-    """
-    parts, weights = [], results.windows / results.windows.sum()
-    for N_D, mine in results.cells[results.cells["cell"].isin(list(results.errors))].groupby("N_D", sort=True):
-        by_model = {str(name): same for name, same in mine.groupby("model", sort=False)}
-        errors = [np.stack([results.errors[str(cell)] for cell in same["cell"]]) for same in by_model.values()]
-        trained = np.array(
-            [learns_from_runs(results.plan, *same.iloc[0][["family", "method"]]) for same in by_model.values()]
-        )
-        noise = training_noise([each @ weights for each, moved in zip(errors, trained, strict=True) if moved])
-        means = np.stack([each.mean(axis=0) for each in errors])
-        training = trained * noise * (means @ weights) / np.sqrt([len(each) for each in errors])
-        one = paired_difference(means, results.windows, training)
-        low = np.maximum(one.low, 0.0)
-        parts.append(pd.DataFrame({"model": list(by_model), "N_D": N_D, "low": low, "high": one.high}))
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["model", "N_D", "low", "high"])

@@ -10,7 +10,6 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from shipid.answer import bands, frames, methods, sentences
-from shipid.answer.error_table import intervals_frame
 from shipid.answer.findings import judge_findings
 from shipid.arguments import as_path
 from shipid.errors import ResultError
@@ -32,7 +31,6 @@ REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "coverage": bands.coverage_frame,
     "no_band": bands.refused_frame,
     "methods": methods.compare_methods,
-    "intervals": intervals_frame,
 }
 """Further frames of the report by name: what a section names in `needs` that is no field of `ReportContent`."""
 

@@ -54,6 +54,33 @@ def one_run(rows: int, step: float = 1.0, **commands: np.ndarray) -> Dataset:
     return Dataset(frame.astype({"run": "str"}), {"clock": "run", "flags": []})
 
 
+@pytest.mark.parametrize(
+    ("hours", "step", "lasts", "size", "held"),
+    [
+        (1, 1.0, 20.0, 5.0, False),
+        (1 / 6, 1.0, 5.0, 5.0, False),
+        (10, 1.0, 5.0, 5.0, False),
+        (10, 0.1, 5.0, 5.0, False),
+        (10, 10.0, 10.0, 5.0, False),
+        (1, 1.0, 20.0, 3.0, False),
+        (1, 1.0, 20.0, 1.5, True),
+        (1, 1.0, 1.0, 35.0, True),
+        (1, 0.1, 1.0, 35.0, True),
+        (1 / 6, 1.0, 1.0, 35.0, False),
+    ],
+)
+def test_a_short_kick_in_a_long_run_varies(hours: float, step: float, lasts: float, size: float, held: bool) -> None:
+    """The scatter of a whole run shrinks with its length; what is one faulty row in a thousand is no kick."""
+    rows = round(3600 * hours / step)
+    helm = np.zeros(rows)
+    for begin in (0, rows // 2, rows - round(lasts / step)):
+        moved = helm.copy()
+        moved[begin : begin + round(lasts / step)] = np.radians(size)
+        log = one_run(rows, step, rudder_delta=moved, propeller_n=np.full(rows, 2.0))
+        assert ("rudder.delta" in constant_commands(log, log.runs)) == held
+        assert bool(warn_of_constant_commands(log, log.runs)) == held
+
+
 @pytest.mark.parametrize(("angle", "share", "held"), [(0.4, 0.008, True), (0.65, 0.013, False)])
 def test_noise_of_feedback_is_no_order(angle: float, share: float, held: bool) -> None:
     """Standard deviations of 0.5 deg and of 1 % count as none, in a run of any length."""
