@@ -20,7 +20,7 @@ MULTIPLE = 1e-6  # of a step: by so much less or more a time is still a multiple
 
 
 def check_whole_number(name: str, value: Any, least: int = 0, error: Kind = ShipidError) -> int:
-    """Return a whole number, also one that NumPy holds or that is written as 10.0; raise `error` for anything else."""
+    """Return a whole number, of any type, 10.0 too; raise `error` for anything else."""
     import numpy as np
 
     try:
@@ -33,7 +33,7 @@ def check_whole_number(name: str, value: Any, least: int = 0, error: Kind = Ship
 
 
 def check_number(name: str, value: Any, error: Kind = ShipidError) -> float:
-    """Return a number as a float, whatever type of number it was; raise `error` for anything else."""
+    """Return a number of any type as a float; raise `error` for anything else."""
     import numpy as np
 
     if isinstance(value, bool) or not isinstance(value, int | float | np.number) or np.iscomplexobj(value):
@@ -42,7 +42,7 @@ def check_number(name: str, value: Any, error: Kind = ShipidError) -> float:
 
 
 def check_positive(name: str, value: Any, error: Kind = ShipidError) -> float:
-    """Return a number above 0 as a float, whatever type of number it was; raise `error` for anything else."""
+    """Return a finite number above 0 as a float; raise `error` for anything else."""
     number = check_number(name, value, error)
     if not 0 < number < math.inf:
         raise error(f"{name} must be a number above 0 and finite, not {value!r}")

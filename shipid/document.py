@@ -119,8 +119,8 @@ def parse_toml(text: str, file: Path | str | None = None) -> Document:
 def check_values(document: Any, file: Path | str | None) -> None:
     """Raise DocumentError for a value that no document may hold, with its dotted path.
 
-    That is None, a date or another object that no document uses, a number beyond 1e24 or below 1e-100, an integer
-    beyond 1e15, a control character, and nesting deeper than Python goes.
+    That is an object that TOML has not or no document uses, a number that is too large or too near to 0, a control
+    character, and nesting deeper than Python goes.
     """
     try:
         leaves = list(document_leaves(document))
@@ -289,7 +289,7 @@ def match_paths(pattern: str, paths: Iterator[str] | list[str]) -> list[str]:
 def parse_model(model: Any, data: Any, file: Path | str | None, prefix: str = "") -> Any:
     """Validate data by a pydantic model; DocumentError with path, value and remedy for the first problem.
 
-    An unknown key is reported before a missing one, because it is usually the missing key, mistyped.
+    An unknown key goes before a missing one: it is usually that key, mistyped.
     """
     from pydantic import ValidationError
 

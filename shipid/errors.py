@@ -11,14 +11,9 @@ LONGEST = 500  # characters of one part of a message
 
 
 class ShipidError(Exception):
-    """An error that the user can correct: where it is, what is wrong, what would be right.
+    """An error that the user can correct: what is wrong and what would be right, in one sentence.
 
-    Parameters
-    ----------
-    message : what is wrong and what would be right, one sentence.
-    file : the document or log with the error.
-    path : dotted path, column or row inside the file.
-    others : further errors of the same document, a line each.
+    file : the document or log. path : dotted path, column or row in it. others : more errors of it, a line each.
     """
 
     def __init__(
@@ -66,10 +61,7 @@ def is_utf_8(text: str) -> bool:
 
 
 def escape_unprintable(text: str) -> str:
-    """The text with every character that is not printable written out: contents of a file must not control a terminal.
-
-    Ends of lines stay as they are.
-    """
+    """The text with characters that could control a terminal written out; ends of lines stay."""
     return "".join(
         sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode() for sign in text
     )
@@ -82,10 +74,7 @@ def shorten_line(text: str) -> str:
 
 
 def suggest_name(value: object, valid: Iterable[str], limit: int = 12) -> str:
-    """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names.
-
-    The same name in other capitals is the closest.
-    """
+    """Hint for an invalid name: `did you mean 'x'?`, or the first `limit` valid names."""
     names = sorted(valid)
     same = [name for name in names if name.casefold() == str(value).casefold()]
     close = same or get_close_matches(str(value), names, n=1)

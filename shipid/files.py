@@ -89,10 +89,7 @@ def sync_to_disk(place: Path) -> None:
 
 @contextmanager
 def temporary_folder(parent: Path) -> Iterator[Path]:
-    """Give a folder for files that are not whole yet; its name says which process made it.
-
-    The first one that a process makes beside others removes those that killed processes left.
-    """
+    """Give a folder for files that are not whole yet; the first of a process removes those that killed ones left."""
     if parent not in _SWEPT:
         _SWEPT.add(parent)
         sweep_temporary(parent)
@@ -147,8 +144,7 @@ def write_new(text: str, file: Path) -> Path:
 def write_set(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Path]:
     """Write text files of one folder that belong together, whole; `former` are files of an earlier set that go.
 
-    An error before all are on the disk leaves what was there. A process that is killed leaves the old set, the new one
-    or a set with files missing, never files of both. Raises OSError, as `replace_whole`.
+    A process that is killed leaves the old set, the new one or a set with files missing, never files of both.
     """
     with ExitStack() as replaced:
         for file, text in texts.items():
@@ -201,7 +197,7 @@ def write_table(file: Path, frame: DataFrame) -> None:
 
 
 def read_arrow(source: Path | BinaryIO) -> Table:
-    """Read a Parquet file in this thread alone: where a user may start no other, PyArrow waits for one without end."""
+    """Read a Parquet file in this thread alone: PyArrow would wait without end where no other may be started."""
     import pyarrow.parquet
 
     return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)

@@ -9,10 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 DOUBLE = 1.0
-"""Seconds after Ctrl-C in which another one counts as the same press, so that it does not break off how the first ends.
-
-Longer than a double press, shorter than a second thought: who sees that nothing ends and presses again is answered.
-"""
+"""Seconds after Ctrl-C in which another one counts as the same press: longer than a double press."""
 _holding: list[list[int]] = []  # the outermost call that holds interrupts back, if any
 
 
@@ -21,8 +18,7 @@ def hold_interrupts() -> Iterator[list[int]]:
     """Hold back Ctrl-C until the block ends: inside CasADi it would become an error about arguments.
 
     Gives the list of signals held back so far, so that a long call can look and stop. In nested blocks the outermost
-    one holds. At the end of the block, also where it failed, a Ctrl-C that was held back is answered as it would have
-    been without the block: with KeyboardInterrupt, unless a handler of Python passes it over. Where Ctrl-C is ignored,
+    one holds. What was held back is answered at the end of the block, also where it failed. Where Ctrl-C is ignored,
     as in workers, it stays so.
     """
     before = signal.getsignal(signal.SIGINT)
@@ -48,8 +44,7 @@ def hold_interrupts() -> Iterator[list[int]]:
 def raise_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt for any error of the block after Ctrl-C was pressed: compiled code makes others of it.
 
-    A second press within a second is passed over: it would break off how the block ends, with a traceback.
-    Nothing is changed in a thread, or where something else answers Ctrl-C.
+    A second press within a second is passed over. Nothing changes in a thread, or where something else answers Ctrl-C.
     """
     before = signal.getsignal(signal.SIGINT)
     if before is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():

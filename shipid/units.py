@@ -41,10 +41,7 @@ def _is_unit_product(unit: str) -> bool:
 
 
 def length_decimals(length: float) -> int:
-    """Number of decimals that a length [m] is written with: two, or more where it has two digits only so, up to six.
-
-    So errors of a model ship are no zeros. What is below 0.0000005 m counts as 0.
-    """
+    """Number of decimals of a length [m]: two, or more where it has two digits only so, up to six."""
     size = abs(length)
     power = int(f"{size:.1e}".partition("e")[2]) if 0.0000005 <= size < 0.0995 else 0  # once two digits are rounded
     return min(max(1 - power, 2), 6)

@@ -35,9 +35,7 @@ def unwrap_callable(kind: Callable[..., Any]) -> Callable[..., Any]:
 def locate_errors(where: str, kind: Callable[..., Any], what: str = "method") -> Iterator[None]:
     """Raise ShipidError, one line with its place, for a mistake in a user's class or function, or a call of `sys.exit`.
 
-    Errors that arise elsewhere pass as they are.
-
-    where : what is called, the beginning of the line. what : the word for what the user wrote.
+    Errors that arise elsewhere pass. where : what is called. what : the word for what the user wrote.
     """
     try:
         yield

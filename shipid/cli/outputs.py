@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Iterable
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -38,7 +37,7 @@ class GuardedCommand(typer.core.TyperCommand):
             if one.name in OUTPUTS and one.param_type_name == "option" and value:
                 written[one.name] = Path(value)
             else:
-                read += _existing_files(values)
+                read += [Path(one) for one in values if isinstance(one, Path | str) and os.path.isfile(one)]
         for name, file in written.items():
             check_output(file, read, OUTPUTS[name], f"--{name}")
             read.append(file)
@@ -55,7 +54,7 @@ def check_output(file: Path, read: Iterable[Path] = (), endings: tuple[str, ...]
     folder = next(one for one in (file.absolute(), *file.absolute().parents) if one.exists())
     if endings and file.suffix not in endings:
         fault = f"let the name end in {' or '.join(endings)}"
-    elif any(_is_same_file(file, one) for one in read):
+    elif any(os.path.realpath(file) == os.path.realpath(one) for one in read):
         fault = "is named twice, and would be written over: name another file to write"
     elif endings == (".toml",) and file.exists():
         fault = "exists already and is not written over: name another file to write"
@@ -75,19 +74,3 @@ def check_output(file: Path, read: Iterable[Path] = (), endings: tuple[str, ...]
 def results_folder(file: Path) -> Path | None:
     """The folder of results that a file belongs to, if it does."""
     return next((one for one in file.absolute().parents if all((one / name).is_file() for name in RESULTS)), None)
-
-
-def _existing_files(values: Iterable[Any]) -> Iterator[Path]:
-    """Files that exist among the values of a parameter."""
-    for one in values:
-        if isinstance(one, Path | str) and one and "\0" not in str(one):
-            with suppress(OSError):  # no name of a file
-                if Path(one).is_file():
-                    yield Path(one)
-
-
-def _is_same_file(one: Path, other: Path) -> bool:
-    try:
-        return one.resolve() == other.resolve() or one.samefile(other)
-    except (OSError, RuntimeError):  # not there, or a link to itself
-        return False

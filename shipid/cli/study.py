@@ -93,14 +93,11 @@ def study_screen(
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.engine.engines import ENGINES, REPEATED, engine_by_name
+    from shipid.engine.engines import REPEATED
     from shipid.study import screen
     from shipid.study.prepare import obtain_runs, partition
 
     engine = "single" if single else REPEATED
-    engine_by_name(engine, device)
-    if single and not ENGINES[engine].available():
-        raise ShipidError("needs a C compiler, and there is none: install gcc, or leave it out", path="--single")
     plan, file = _prepare_command(study, changes, device, out, "screen")
     wanted, dataset = screen.drawn_families(plan, family), obtain_runs(plan)
     cut = partition(plan, dataset)

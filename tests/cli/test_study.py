@@ -13,7 +13,6 @@ import pytest
 from typer.testing import CliRunner
 
 from shipid.cli import app
-from shipid.engine import engines
 from shipid.errors import ShipidError
 from shipid.study import run
 from shipid.study.store import DATASET, read_rows
@@ -31,12 +30,6 @@ def test_a_table_replaces_nothing_that_the_study_reads(study: Path) -> None:
     assert status == 1
     assert "data.parquet: --out: is named twice" in error
     assert Path("data.parquet").read_bytes() == before
-
-
-def test_single_precision_needs_a_compiler(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(engines, "find_compiler", lambda: None)
-    with pytest.raises(ShipidError, match="--single: needs a C compiler"):
-        output_of("study", "screen", study, "--single")
 
 
 def test_screen_writes_a_row_per_member(study: Path) -> None:
