@@ -198,7 +198,7 @@ class Predictor(DeployedMethod):
         if len(count) != 1:
             raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
         motion = {name: values for name, values in instants.columns.items() if name != "run"}  # as of a table
-        parts = {"columns": _locked_floats("columns", motion, count)}
+        parts: dict[str, Any] = {"columns": _locked_floats("columns", motion, count)}
         horizon = self.physics.horizon if self.commands == "known" else None
         for part, leading in (("past", (None,)), ("planned", (horizon,)), ("hidden", ()), ("estimates", ())):
             given = getattr(instants, part)

@@ -42,6 +42,7 @@ from shipid.observer import (
     filter_bank,
     filter_function,
     first_filter_states,
+    observed_start,
     observer_function,
     run_observer,
     tune_observer,
@@ -259,6 +260,8 @@ def test_the_force_fades_and_moves_the_ship_as_its_acceleration_says() -> None:
     vessel = load_vessel("gunnerus-28.9")
     filters = filter_bank(vessel)
     columns = {f"observer.{name}": np.array([x]) for name, x in zip("XYN", (0.01, -0.02, 0.001), strict=True)}
+    still = dict.fromkeys((*MEASURED_MOTION, "current_north", "current_east"), np.zeros(1))
+    columns |= still | {f"observer.{name}": values for name, values in still.items()}
     tau = observed_start(filters, columns, 30, 1.0).tau_extra
     assert tau.shape == (30, 1, 3)
     assert tau[20, 0, 0] / tau[0, 0, 0] == pytest.approx(np.exp(-20.0 / filters.fade))

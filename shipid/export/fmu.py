@@ -99,14 +99,6 @@ def words_of_signal(name: str) -> str:
     return f"{word}, {component}" if component else word
 
 
-def _parameter_variables(vessel: Vessel | None) -> list[Variable]:
-    """The numbers of a vessel document."""
-    return [] if vessel is None else [
-        Variable(key, "parameter", vessel.units[key], "number of the vessel document", value, False, key in vessel.above_zero)
-        for key, value in vessel.parameters.items()
-    ]  # fmt: skip
-
-
 def vessel_unit(vessel: Vessel, name: str, method: Method) -> FmuParts:
     """The FMU of a vessel: commands, weather and loads in, motion out."""
     equations = Equations(vessel)
@@ -123,7 +115,9 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> FmuParts:
     variables += [Variable(f"load.{key}", "input", unit, f"added {key}", 0.0) for key, unit in loads.items()]
     places = {"NUM_STATES": len(equations.states), "COMMANDS": len(carry), "ENVIRONMENT": len(carry) + len(commands)}
     places |= {"LOADS": len(variables) - len(loads), "FIRST_PARAMETER": len(variables)}
-    variables += _parameter_variables(vessel)
+    for key, value in vessel.parameters.items():
+        least, words = key in vessel.above_zero, "number of the vessel document"
+        variables.append(Variable(key, "parameter", vessel.units[key], words, value, above_zero=least))
     variables.append(Variable("solver.step", "parameter", "s", f"largest internal step of {method}", largest))
     files = vessel_files(vessel, name, method)
     return FmuParts(
@@ -150,7 +144,6 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     ]
     variables.append(Variable("instant", "output", "s", "time of the row that the path starts from", None))
     first = len(variables)
-    variables += _parameter_variables(model.vessel)
     settings = {}
     if names.planned:
         settings["held"] = "1: orders stay as they are over the horizon; 0: as in planned[...]", 1.0
@@ -160,7 +153,7 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
         settings |= dict(zip(BAND_CHOICE, zip(words, (0.9, 0.0, 0.0), strict=True), strict=True))
     at = {key: f"self->values + {place}" for place, key in enumerate(settings, len(variables))}
     variables += [Variable(key, "parameter", "-", *setting) for key, setting in settings.items()]
-    values = {"FIRST_PARAMETER": first, "X": path, "BAND": 0 if bands is None else len(BAND_ROWS)}
+    values: dict[str, Any] = {"FIRST_PARAMETER": first, "X": path, "BAND": 0 if bands is None else len(BAND_ROWS)}
     values["PLAN"] = f"*({at['held']}) != 0 ? 0 : self->values + {len(names.now)}" if names.planned else 0
     values["CHOICE"] = at.get(BAND_CHOICE[0], 0)
     what = "no physics" if model.vessel is None else model.vessel.name
@@ -250,9 +243,9 @@ def model_description(unit: FmuParts, guid: str) -> str:
         variable("alarm", 0, "output", "calculated", words, "Boolean")
     structure = add(root, "ModelStructure")
     for tag, places in (("Outputs", outputs), ("InitialUnknowns", unknowns)):
-        part = add(structure, tag) if places else None
+        under = add(structure, tag) if places else structure
         for place in places:
-            add(part, "Unknown", index=place)  # type: ignore[arg-type]
+            add(under, "Unknown", index=place)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

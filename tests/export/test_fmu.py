@@ -187,9 +187,9 @@ int main(void)
 """
 
 
-def test_a_number_that_must_be_above_zero_is_refused_by_name_and_has_a_min(ship, aboard, tmp_path):
+def test_a_number_that_must_be_above_zero_is_refused_by_name_and_has_a_min(ship, tmp_path):
     """What Python refuses: before, a mass of 0 or less gave a motion, and every step was fine."""
-    for unit, vessel in ((ship, variety()["actuators"]), (aboard, load_vessel("mariner"))):
+    for unit, vessel in ((ship, variety()["actuators"]),):
         with zipfile.ZipFile(unit) as archive:
             root = ET.fromstring(archive.read("modelDescription.xml"))
         variables = {entry.get("name"): entry for entry in root.iter("ScalarVariable")}
@@ -375,12 +375,9 @@ def test_a_compiler_of_cplusplus_takes_the_sources(program, ship, aboard, tmp_pa
         assert version() == b"2.0"
 
 
-@pytest.mark.parametrize("name", ["model", "size_t", "math", "double", "linux", "x"])
-def test_no_name_collides_with_those_of_the_source(predictor, name, tmp_path):
+def test_a_name_that_is_a_word_of_c_compiles(predictor, tmp_path):
     compiler()
-    title = c_name(name)
-    for unit in (predictor_unit(build_model(predictor), title), vessel_unit(variety()["actuators"], title, "rk4")):
-        assert write_fmu(unit, tmp_path / "a.fmu")  # compiled
+    assert write_fmu(predictor_unit(build_model(predictor), c_name("double")), tmp_path / "a.fmu")
 
 
 @pytest.mark.parametrize("system", ["Linux", "Windows"])
