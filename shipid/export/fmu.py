@@ -5,6 +5,7 @@ The standard: Functional Mock-up Interface 2.0.4, fmi-standard.org.
 
 from __future__ import annotations
 
+import logging
 import platform
 import re
 import sys
@@ -20,7 +21,7 @@ from xml.etree import ElementTree
 from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
 from shipid.engine.native import find_compiler
-from shipid.errors import ShipidError
+from shipid.errors import ShipidError, escape_unprintable
 from shipid.export.band import BAND_CHOICE, BAND_ROWS
 from shipid.export.c import SourceFiles, number_list
 from shipid.export.c_predictor import predictor_files
@@ -32,6 +33,8 @@ from shipid.files import replace_whole
 from shipid.physics.signals import ACTUAL, SIGNALS, neutral_value
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
+
+log = logging.getLogger(__name__)
 
 BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
 """System and processor -> folder of the binary in an FMU, and how its name ends."""
@@ -161,22 +164,31 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     return FmuParts(f"{what}, {model.predictor.method}", tuple(variables), files, PREDICTOR_MODEL, values, step)
 
 
-def write_fmu(unit: FmuParts, file: Path) -> list[str]:
-    """Write the FMU; the platforms of the binaries in it. ShipidError where the compiler fails."""
+def write_fmu(unit: FmuParts, file: Path) -> list[Path]:
+    """Write the FMU; ShipidError where the compiler fails, a line in the log where it has no binary."""
     name = unit.files.name
     sources = {key: text for key, text in unit.files.texts.items() if key != "main.c"}
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(sources.values()) + unit.wrapper(''))}}}"
     sources[f"{name}.c"] += unit.wrapper(guid)
-    place = BINARIES.get((platform.system(), platform.machine())) if find_compiler() is not None else None
+    here = platform.system(), platform.machine()
+    compiler, place = find_compiler(), BINARIES.get(here)
     with replace_whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(_archive_entry("modelDescription.xml"), model_description(unit, guid))
         for key, text in sources.items():
             archive.writestr(_archive_entry(f"sources/{key}"), text)
             (temporary.parent / key).write_text(text, encoding="utf-8")
-        if place is not None:
-            built = _compile_binary(temporary.parent, name)
+        if place is not None and compiler is not None:
+            built = temporary.parent / f"{name}.so"
+            options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s", "-o", str(built)]
+            parts = [str(temporary.parent / f"{name}{part}.c") for part in ("", "_casadi")]
+            complaint, _ = run_compiler([compiler, *options, *parts, "-lm"], temporary.parent)
+            if complaint is not None:
+                raise ShipidError(f"the C compiler failed ({complaint.splitlines()[0]})", file=file)
             archive.writestr(_archive_entry(f"binaries/{place[0]}/{name}{place[1]}", 0o755), built.read_bytes())
-    return [] if place is None else [place[0]]
+    if place is None or compiler is None:
+        shown, system = escape_unprintable(str(file)), " ".join(here)
+        log.warning("%s has no binary for %s: the tool that imports it must compile its sources", shown, system)
+    return [file]
 
 
 def _archive_entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
@@ -184,18 +196,6 @@ def _archive_entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
     entry = zipfile.ZipInfo(name)
     entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, mode << 16
     return entry
-
-
-def _compile_binary(folder: Path, name: str) -> Path:
-    command = find_compiler()
-    assert command is not None
-    options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s"]
-    built = folder / f"{name}.so"
-    sources = [str(folder / f"{name}{part}.c") for part in ("", "_casadi")]
-    complaint, _ = run_compiler([command, *options, "-o", str(built), *sources, "-lm"], folder)
-    if complaint is not None:
-        raise ShipidError(f"the C compiler failed ({complaint.splitlines()[0]})")
-    return built
 
 
 def model_description(unit: FmuParts, guid: str) -> str:
