@@ -129,12 +129,6 @@ def test_sanitizers_are_silent(kind, tmp_path):
 
 
 @pytest.mark.slow
-def test_no_address_is_wrong_with_an_observer(tmp_path):
-    predictor = Predictor(Physics(variety()["actuators"], 10, 1.0, "rk4", Observer()), "alone", UnchangedPath({}), {})
-    run_example(predictor_files(build_model(predictor), "odd"), tmp_path, "-fsanitize=address")
-
-
-@pytest.mark.slow
 def test_a_prediction_is_fast_small_and_allocates_nothing(tmp_path):
     """Below 1 ms; object and working memory below 3 MB, for networks of some thousand weights and an observer."""
     physics = Physics(load_vessel("gunnerus-28.9"), 30, 1.0, observer=Observer())
