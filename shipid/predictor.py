@@ -228,15 +228,14 @@ class Predictor(DeployedMethod):
             without a column, are passed over.
         """
         check_mapping("columns", columns, "a name to an array", DataError)
-        known = _locked_floats("columns", columns, np.shape(next(iter(columns.values()), [])))
-        count = next((len(values) for values in known.values()), 0)
-        outside = np.full(count, not self.limits)
+        shape = np.shape(next((columns[name] for name in columns), []))[:1] or (1,)
+        known, outside = _locked_floats("columns", columns, shape), np.full(shape, not self.limits)
         for name, ends in self.limits.items():
             if name in known:
                 low, high = widen_range(*ends)
                 outside |= ~((known[name] >= low) & (known[name] <= high))
         if self.run_up > 0:
-            age = known.get(AGE_COLUMN, np.zeros(count))
+            age = known.get(AGE_COLUMN, np.zeros(shape))
             outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)
         return outside
 
