@@ -229,7 +229,8 @@ class Predictor(DeployedMethod):
         """
         check_mapping("columns", columns, "a name to an array", DataError)
         shape = np.shape(next((columns[name] for name in columns), []))[:1] or (1,)
-        known, outside = _locked_floats("columns", columns, shape), np.full(shape, not self.limits)
+        given = {name: columns[name] for name in (*self.limits, AGE_COLUMN) if name in columns}
+        known, outside = _locked_floats("columns", given, shape), np.full(shape, not self.limits)
         for name, ends in self.limits.items():
             if name in known:
                 low, high = widen_range(*ends)

@@ -73,8 +73,8 @@ def export_vessel(
 
     Raises ShipidError as there, and for an unknown integrator.
     """
-    check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     target, file, title = _check_target(to, out, name)
+    check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     check_choice("integrator", integrator, get_args(Method))
     if target.vessel is None:
         raise DocumentError(f"a vessel has no networks, and {to} takes nothing else: choose another", path="--to")
