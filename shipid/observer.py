@@ -126,7 +126,7 @@ class Observer(CheckedModel, BaseModel):
     period: Annotated[PositiveNumber, Field(description="of the waves met, x sqrt(L / g)")] = 2.9
     damping: Annotated[FiniteFloat, Field(gt=0, lt=1, description="of the wave model: how broad the waves are")] = 0.5
     noise: Annotated[
-        dict[str, PositiveNumber], Field(description="column -> standard deviation of a sample, SI; others by size")
+        dict[Motion, PositiveNumber], Field(description="column -> standard deviation of a sample, SI; others by size")
     ] = {}
     memory: Annotated[PositiveNumber, Field(description="time in which likelihoods are forgotten, x sqrt(L / g)")] = (
         20.0
@@ -142,9 +142,6 @@ class Observer(CheckedModel, BaseModel):
 
     @model_validator(mode="after")
     def _seen(self) -> Observer:
-        twice = next((name for name in self.measured if self.measured.count(name) > 1), None)
-        if twice is not None:
-            raise ValueError(f"measured names {twice!r} twice: once is enough")
         if "psi" not in self.measured:
             raise ValueError("measured lacks 'psi': every force turns with the heading, add it")
         if self.current and not {"north", "east"} <= set(self.measured):
@@ -198,11 +195,6 @@ def filter_bank(vessel: Vessel, settings: Observer | None = None) -> FilterBank:
             f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends"
         )
         raise DocumentError(message, file=vessel.file, path="dof")
-    unknown = next((name for name in settings.noise if name not in MEASURED_MOTION), None)
-    if unknown is not None:
-        raise DocumentError(
-            f"no measured column: {suggest_name(unknown, MEASURED_MOTION)}", path=f"observer.noise.{unknown}"
-        )
     length = vessel.length or 0.0
     if not length:
         message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
@@ -224,8 +216,8 @@ def filter_bank(vessel: Vessel, settings: Observer | None = None) -> FilterBank:
         )
         slow = [settings.force * linear, settings.force * linear, settings.moment * yaw]
         first.append([0.0] * 6 + slow + [current * speed] * 2 + [x / omega for x in w] + [*w])
-    sizes = {"north": length, "east": length, "psi": 1.0, "u": speed, "v": speed, "r": 1 / time}
-    noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes.items()])
+    sizes = zip(MEASURED_MOTION, (length, length, 1.0, speed, speed, 1 / time), strict=True)
+    noise = np.array([settings.noise.get(name, 5e-4 * size) for name, size in sizes])
     return FilterBank(
         vessel, settings, np.array(numbers), noise, np.array(first), settings.fade * time, vessel.mass,
         LONGEST_FILTER_STEP * time, LONGEST_PAUSE * time,
@@ -442,11 +434,6 @@ class Estimates:
     spread: Array
     weights: Array
 
-    @property
-    def age(self) -> Array:
-        """Time [s] since the observer began, (N,): `observer.age`."""
-        return self.columns[AGE_COLUMN]
-
     def select(self, rows: Array) -> Estimates:
         """Estimates at some rows: a mask or indices."""
         columns = {name: values[rows] for name, values in self.columns.items()}
@@ -631,8 +618,8 @@ def estimates_at_windows(dataset: Dataset, estimates: Estimates, windows: Window
 
     `estimates` are of the rows of `dataset`. The heading counts full turns as that of the windows does.
     """
-    if len(estimates.age) != len(dataset.frame):
-        raise ValueError(f"{len(estimates.age)} estimates for {len(dataset.frame)} rows")
+    if len(estimates.weights) != len(dataset.frame):
+        raise ValueError(f"{len(estimates.weights)} estimates for {len(dataset.frame)} rows")
     frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:

@@ -198,7 +198,7 @@ class Predictor(DeployedMethod):
         if len(count) != 1:
             raise DataError(f"must be (S,), a value for each instant, not {count}", path="u")
         motion = {name: values for name, values in instants.columns.items() if name != "run"}  # as of a table
-        parts = {"columns": _locked_floats("columns", motion, count)}
+        parts: dict[str, Any] = {"columns": _locked_floats("columns", motion, count)}
         horizon = self.physics.horizon if self.commands == "known" else None
         for part, leading in (("past", (None,)), ("planned", (horizon,)), ("hidden", ()), ("estimates", ())):
             given = getattr(instants, part)
@@ -228,18 +228,15 @@ class Predictor(DeployedMethod):
             without a column, are passed over.
         """
         check_mapping("columns", columns, "a name to an array", DataError)
-        shapes = {name: np.shape(columns[name]) for name in columns}
-        count = next((shape[0] for shape in shapes.values() if len(shape) == 1), 0)
-        odd = next((name for name, shape in shapes.items() if shape != (count,)), None)
-        if odd is not None:
-            raise DataError(f"must be (S,), a value for each instant, not {shapes[odd]}", path=odd)
-        outside = np.full(count, not self.limits)
+        shape = np.shape(next((columns[name] for name in columns), []))[:1] or (1,)
+        given = {name: columns[name] for name in (*self.limits, AGE_COLUMN) if name in columns}
+        known, outside = _locked_floats("columns", given, shape), np.full(shape, not self.limits)
         for name, ends in self.limits.items():
-            if name in columns:
-                (low, high), values = widen_range(*ends), as_float_array(name, columns[name], DataError)
-                outside |= ~((values >= low) & (values <= high))
+            if name in known:
+                low, high = widen_range(*ends)
+                outside |= ~((known[name] >= low) & (known[name] <= high))
         if self.run_up > 0:
-            age = as_float_array(AGE_COLUMN, columns.get(AGE_COLUMN, np.zeros(len(outside))), DataError)
+            age = known.get(AGE_COLUMN, np.zeros(shape))
             outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)
         return outside
 

@@ -178,8 +178,8 @@ CALLS: dict[str, tuple[Callable[[], Any], str]] = {
         "step must be a number, not '1 s'",
     ),
     "outside": (
-        lambda: PREDICTOR.outside({"u": np.zeros(3), "v": np.zeros(2)}),
-        r"v: must be \(S,\), a value for each",
+        lambda: PREDICTOR.outside({"u": np.zeros(3), "observer.age": np.zeros(2)}),
+        r"age: columns must be \(3\), not",
     ),
     "observe": (lambda: run_observer(SHIP, ANY), "dataset must be a Dataset, as of"),
     "bank": (lambda: filter_bank(SHIP, {"fade": 0.0}), "settings must be an Observer, such as"),  # type: ignore[arg-type]

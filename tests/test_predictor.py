@@ -102,13 +102,6 @@ def test_windows_of_another_step_are_refused(tiny_run: Path, predictor: Predicto
         predictor.alone(replace(test, step=2.0).instants())
 
 
-def test_the_perturbed_numbers_are_aboard(predictor: Predictor) -> None:
-    assert predictor.vessel is not None
-    base = load_vessel("gunnerus-28.9").parameters
-    changed = {path for path, value in predictor.vessel.parameters.items() if value != base[path]}
-    assert changed == {path for path in base if path.startswith("hull.derivatives.") and base[path] != 0}
-
-
 def test_physics_alone_and_compensation_alone(tiny_run: Path, predictor: Predictor) -> None:
     instants = read_test(tiny_run)[0].instants()
     compensator, physics = predictor.corrector, predictor.physics
@@ -160,12 +153,6 @@ def rewritten(source: Path, target: Path, **changes: Any) -> Path:
         arrays["header"] = np.array(json.dumps(header))
     np.savez(target, **arrays)
     return target
-
-
-def test_saved_without_pickle(tiny_run: Path) -> None:
-    for file in (tiny_run / "cells").iterdir():
-        with np.load(file, allow_pickle=False) as stored:
-            assert all(stored[name].dtype != object for name in stored.files)
 
 
 class Trap:
@@ -292,12 +279,6 @@ def test_a_log_is_predicted_by_what_was_known(tmp_path: Path) -> None:
     early = frames[0]["t"] <= 10.0
     pd.testing.assert_frame_equal(frames[0][early], frames[1][early])
     assert not frames[0].equals(frames[1])
-
-
-def test_pure_data_driven_has_no_physics_path(tmp_path: Path, tiny_run: Path) -> None:
-    frame, _ = predict_log(tiny_run, PURE, tiny_run / DATASET, None, tmp_path / "paths.csv")
-    assert frame[["physics_north", "physics_east"]].isna().all(axis=None)
-    assert frame[["cooperative_north", "cooperative_east"]].notna().all(axis=None)
 
 
 def test_what_is_wrong_with_a_request_is_one_line(tmp_path: Path, tiny_run: Path) -> None:

@@ -87,12 +87,6 @@ def test_the_order_of_the_runs_in_the_table_changes_no_digit(method: Method) -> 
     np.testing.assert_array_equal(one, other)
 
 
-def test_physics_alone_is_the_physics() -> None:
-    physics = Physics(load_vessel("gunnerus-28.9"), HORIZON, 1.0)
-    alone = fit(Alone(), physics, WINDOWS)
-    np.testing.assert_array_equal(alone.predict(WINDOWS.instants()), physics.paths(WINDOWS.instants()))
-
-
 def test_known_commands_are_needed_to_predict() -> None:
     known = fit(SMALL, NONE, WINDOWS, commands="known")
     assert known.predict(WINDOWS.instants(known=True)).shape == WINDOWS.future.shape

@@ -13,7 +13,6 @@ import numpy as np
 
 from shipid.errors import escape_unprintable
 from shipid.version import __version__
-from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 TAKEN_NAMES = frozenset(
@@ -47,7 +46,6 @@ def source_files(
     functions: Mapping[str, ca.Function],
     units: Mapping[str, Mapping[str, str]],
     numbers: Mapping[str, Array],
-    vessel: Vessel | None,
     wrapper: Wrapper,
     values: Mapping[str, Any],
 ) -> SourceFiles:
@@ -67,9 +65,7 @@ def source_files(
         for what, texts in (("names", [*one]), ("units", [*one.values()]))
     ] + [array_of("double", f"{name}_{key}", array, number_list(array)) for key, array in numbers.items()]
     declared = "\n".join(f"extern {one.partition(' = ')[0]};" for one in defined)
-    above_zero = frozenset() if vessel is None else vessel.above_zero
-    above = [place for place, key in enumerate(units["parameters"]) if key in above_zero]
-    filled = {
+    filled: dict[str, Any] = {
         "SIZES": "".join(f"    {name}_NUM_{group.upper()} = {len(one)},\n" for group, one in units.items()),
         "DEFINED": "\n".join(defined),
         "FUNCTIONS": "\n".join(
@@ -79,9 +75,8 @@ def source_files(
         "ARRAYS": f"const double *arg[{max(9, sizes['arg'])}] = {{0}};\n"
         f"    double *res[{max(4, sizes['res'])}] = {{0}};\n    long long iw[{sizes['iw'] + 1}] = {{0}};",
         "WORK": sizes["w"] + 1,
-        "ABOVE": f"static {array_of('int', 'above_zero', above)}",
-        "NUM_ABOVE": len(above),
-    } | values  # fmt: skip
+        **values,
+    }
 
     def fill(text: str) -> str:
         return Template(text.replace("@", name)).substitute(filled)
@@ -120,19 +115,11 @@ $FUNCTIONS
 #endif
 
 $DEFINED
-$ABOVE
 
 static int are_finite(const double *values, int count)
 {
     int i;
     for (i = 0; i < count; ++i) if (!isfinite(values[i])) return 0;
-    return 1;
-}
-
-static int are_above_zero(const double *parameters)
-{
-    int i;
-    for (i = 0; i < $NUM_ABOVE; ++i) if (!(parameters[above_zero[i]] > 0)) return 0;
     return 1;
 }
 """
@@ -151,7 +138,7 @@ def c_name(text: str) -> str:
     return f"m_{name}" if name in TAKEN_NAMES or name.startswith("casadi") or name[0].isdigit() else name
 
 
-def number_list(values: Array) -> str:
+def number_list(values: Array | Sequence[float]) -> str:
     """Literals of an array in a row, without needless zeros."""
     texts = (repr(float(value)).removesuffix(".0") for value in np.ravel(values))
     return ",".join(text.replace("inf", "INFINITY") for text in texts)

@@ -23,7 +23,7 @@ def predictor_files(model: ExportModel, name: str) -> SourceFiles:
     names, filters, bands, step = model.layout, filters_of(model), model.predictor.bands, model.physics.step
     functions = {"predict": model.function, **recorder_functions(model)}
     units = {"row": model.units("now")}
-    units |= {group: model.units(group) for group in ("reached", "past", "planned", "estimates", "parameters")}
+    units |= {group: model.units(group) for group in ("reached", "past", "planned", "estimates")}
     if bands is not None:
         units["kind"] = dict.fromkeys(("any", *bands.kinds), "-")
     limits = [model.limits.get(key, (-np.inf, np.inf)) for key in names.now]
@@ -62,8 +62,8 @@ def predictor_files(model: ExportModel, name: str) -> SourceFiles:
         "ORDERED": "planned" if names.planned else "row",
         "SPEED": names.now.index("u"),
     }
-    numbers = {"defaults": model.parameters, "limits": np.array(limits)}
-    return source_files(name, _about(model), functions, units, numbers, model.vessel, _WRAPPER, values)
+    numbers = {"limits": np.array(limits)}
+    return source_files(name, _about(model), functions, units, numbers, _WRAPPER, values)
 
 
 def _about(model: ExportModel) -> list[str]:
@@ -105,13 +105,11 @@ $SIZES
     @_DIVERGED = 4,   /* the path is not finite */
     @_NO_PAST = 8,    /* the past is shorter than @_PAST steps, or there is no row: the path is NAN */
     @_TIME = 16,      /* time does not go on: the row is not kept */
-    @_NO_BAND = 32,   /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
-    @_PARAMETER = 64  /* a parameter that must be above 0 is not, such as inertia.m: the path is NAN */
+    @_NO_BAND = 32    /* no band can be promised: too few runs for the level or kind, or no such level: it is NAN */
 };
 
-/* What is kept of the past. Make one, call @_init, and change `parameters` where the ship differs. */
+/* What is kept of the past. Make one, and call @_init. */
 typedef struct {
-    double parameters[@_NUM_PARAMETERS + 1];
     double t[$CAPACITY], begun, least; /* s; of the first row after a gap; shortest interval of late */
     double rows[$CAPACITY][$WIDTH];
     int first, count;
@@ -139,10 +137,9 @@ int @_record(@_recorder *self, double t, const double *row);
 int @_predict(@_recorder *self, const double *planned, const double *choice, double *path, double *band);
 
 /* The same as a pure function, without a recorder. reached: positions of actuators, or a null pointer: at their orders.
- * past: @_PAST rows, the oldest first; x, y in the frame of the instant. estimates: of an observer. parameters:
- * @_defaults, or a changed copy. Arrays without entries may be null pointers. work: @_WORK numbers, whatever they are. */
+ * past: @_PAST rows, the oldest first; x, y in the frame of the instant. estimates: of an observer. Arrays without entries may be null pointers. work: @_WORK numbers, whatever they are. */
 int @_path(const double *row, const double *reached, const double *past, const double *planned, const double *estimates,
-    const double *parameters, const double *choice, double *path, double *band, double *work);
+    const double *choice, double *path, double *band, double *work);
 """
 
 _SOURCE = """
@@ -154,7 +151,7 @@ static void clear_results(double *path, double *band)
 }
 
 int @_path(const double *row, const double *reached, const double *past, const double *planned, const double *estimates,
-    const double *parameters, const double *choice, double *path, double *band, double *work)
+    const double *choice, double *path, double *band, double *work)
 {
     static $ORDERS
     static $ACTUATORS
@@ -163,8 +160,7 @@ int @_path(const double *row, const double *reached, const double *past, const d
     $ARRAYS
     clear_results(path, band);
     if (!are_finite(row, @_NUM_ROW) || !are_finite(past, @_PAST * @_NUM_PAST)
-        || !are_finite(estimates, @_NUM_ESTIMATES) || !are_finite(parameters, @_NUM_PARAMETERS)) return @_NOT_FINITE;
-    if (!are_above_zero(parameters)) return @_PARAMETER;
+        || !are_finite(estimates, @_NUM_ESTIMATES)) return @_NOT_FINITE;
     if (!planned) {
         for (k = 0; k < @_HORIZON; ++k)
             for (i = 0; i < @_NUM_PLANNED; ++i) held[k * @_NUM_PLANNED + i] = row[orders[i]];
@@ -179,8 +175,7 @@ int @_path(const double *row, const double *reached, const double *past, const d
     arg[2] = past;
     arg[3] = planned;
     arg[4] = estimates;
-    arg[5] = parameters;
-    for (i = 0; choice && i < $CHOICES; ++i) arg[6 + i] = choice + i;
+    for (i = 0; choice && i < $CHOICES; ++i) arg[5 + i] = choice + i;
     res[0] = path;
     res[1] = &outside;
     if (choice && $CHOICES) {
@@ -198,7 +193,6 @@ int @_path(const double *row, const double *reached, const double *past, const d
 void @_init(@_recorder *self)
 {
     memset(self, 0, sizeof *self);
-    memcpy(self->parameters, @_defaults, @_NUM_PARAMETERS * sizeof(double));
 }
 
 /* Place of a row, 0 for the oldest. */
@@ -230,9 +224,8 @@ int @_record(@_recorder *self, double t, const double *row)
     arg[0] = last;
     arg[1] = row;
     arg[2] = self->reached;
-    arg[3] = self->parameters;
-    arg[4] = &dt;
-    arg[5] = &anew;
+    arg[3] = &dt;
+    arg[4] = &anew;
     res[0] = kept;
     res[1] = moved;
     res[2] = after;
@@ -249,8 +242,7 @@ int @_record(@_recorder *self, double t, const double *row)
         arg[1] = last;
         arg[2] = kept;
         arg[3] = moved;
-        arg[4] = self->parameters;
-        arg[5] = &part;
+        arg[4] = &part;
         for (; self->count && parts > 0.5; parts -= 1) {
             res[1] = self->estimates; /* a call also works with what follows its own results */
             if (parts > 1.5) @_casadi_between(arg, res, iw, self->work, 0);
@@ -316,7 +308,7 @@ int @_predict(@_recorder *self, const double *planned, const double *choice, dou
 #endif
     clear_results(path, band);
     if (!known) return @_NO_PAST;
-    status = @_path(self->rows[newest], self->reached, past, planned, self->estimates, self->parameters, choice, path,
+    status = @_path(self->rows[newest], self->reached, past, planned, self->estimates, choice, path,
         band, self->work);
     return self->t[newest] - self->begun < $SETTLED ? status | @_OUTSIDE : status; /* no run-up of the observer */
 }

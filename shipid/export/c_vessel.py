@@ -6,7 +6,7 @@ import numpy as np
 
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.export.c import SourceFiles, Wrapper, source_files
+from shipid.export.c import SourceFiles, Wrapper, array_of, source_files
 from shipid.export.equations import Equations
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
@@ -28,9 +28,10 @@ def vessel_files(vessel: Vessel, name: str, method: Method) -> SourceFiles:
     ]
     num_dof, entries = equations.model.num_dof, list(equations.groups["carry"])
     values = {"FIRST": num_dof, "LAST": 2 * num_dof, "LIMIT": f"{SPEED_LIMIT:g}", "RULE": method}
-    values |= {"SPEED": entries.index("u")}
+    above = [place for place, name in enumerate(equations.groups["parameters"]) if name in vessel.above_zero]
+    values |= {"SPEED": entries.index("u"), "ABOVE": array_of("int", "above_zero", above), "NUM_ABOVE": len(above)}
     defaults = {"defaults": np.array(list(vessel.parameters.values()))}
-    return source_files(name, about, equations.functions(method), equations.groups, defaults, vessel, _WRAPPER, values)
+    return source_files(name, about, equations.functions(method), equations.groups, defaults, _WRAPPER, values)
 
 
 _HEADER = """enum {
@@ -56,6 +57,15 @@ int @_step(double *carry, const double *commands, const double *environment,
 """
 
 _SOURCE = """
+static $ABOVE
+
+static int are_above_zero(const double *parameters)
+{
+    int i;
+    for (i = 0; i < $NUM_ABOVE; ++i) if (!(parameters[above_zero[i]] > 0)) return 0;
+    return 1;
+}
+
 void @_begin(double *carry, const double *commands, const double *parameters)
 {
     double begun[@_NUM_CARRY], w[$WORK];

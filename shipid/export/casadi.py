@@ -38,7 +38,6 @@ def write_predictor_function(model: ExportModel, name: str, file: Path) -> list[
     described: dict[str, Any] = {
         "what": f"path after 1 ... {names.horizon} steps of {model.physics.step:g} s, method {model.predictor.method}",
         "rows": {"past": names.num_past, "planned": names.horizon},
-        "defaults": {"parameters": model.parameters.tolist()},
         "limits": model.limits,
         "provenance": dict(model.predictor.provenance),
     }

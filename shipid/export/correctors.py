@@ -174,11 +174,10 @@ def gated_network_function(network: GatedNetwork) -> ca.Function:
 
 
 class StepStart(NamedTuple):
-    """What holds at the start of a step: motion, orders and weather by name, actuators, numbers of the vessel."""
+    """What holds at the start of a step: motion, orders and weather by name, and actuators."""
 
     row: ExpressionsByName
     reached: MX
-    parameters: MX
 
 
 AddedAcceleration = Callable[[StepStart, MX, MX], tuple[MX, MX]]
@@ -195,7 +194,7 @@ def stepped_path(known: PredictorInputs, added: AddedAcceleration, kept: MX | No
     orders = ca.horzsplit(commands) * (names.horizon // commands.shape[1])
     reached = reached_at_starts(known, known.inputs["reached"], lambda: known.measured_records, names.horizon)
     for k in range(names.horizon):
-        carry = step(carry, orders[k], reached[k], weather, known.now["psi"], known.inputs["parameters"])
+        carry = step(carry, orders[k], reached[k], weather, known.now["psi"])
         path.append(carry[4:6])
     return ca.horzcat(*path)
 
@@ -208,18 +207,18 @@ def reached_at_starts(known: PredictorInputs, first: MX, records: Callable[[], M
 
 
 def corrected_step(known: PredictorInputs, num_kept: int, added: AddedAcceleration) -> ca.Function:
-    """(carry, commands, reached, weather, psi at the instant, parameters) -> carry."""
+    """(carry, commands, reached, weather, psi at the instant) -> carry."""
     names, h = known.names, known.physics.step
     weather = measurable_signals(names.now)
     sizes = {"carry": 6 + num_kept, "commands": len(names.commands), "reached": len(names.reached)}
-    symbols = symbols_of(sizes | {"weather": len(weather), "psi0": 1, "parameters": len(names.parameters)})
+    symbols = symbols_of(sizes | {"weather": len(weather), "psi0": 1})
     carry, first = symbols["carry"], symbols["psi0"]
     nu, psi, place = carry[:3], carry[3], carry[4:6]
     row = split_by_name((*MOTIONS, "psi"), carry[:4])
     row |= split_by_name(names.commands, symbols["commands"]) | split_by_name(weather, symbols["weather"])
-    start, after, way = StepStart(row, symbols["reached"], symbols["parameters"]), nu, None
+    start, after, way = StepStart(row, symbols["reached"]), nu, None
     if known.physics.vessel is not None:
-        after, way = free_step(known, known.equations, start, start.parameters)
+        after, way = free_step(known, known.equations, start)
     more, kept = added(start, after, carry[6:])
     then = after + h * more
     then = ca.if_else(all_within(then, VELOCITY_LIMIT), then, np.nan)
@@ -233,7 +232,7 @@ def corrected_step(known: PredictorInputs, num_kept: int, added: AddedAccelerati
     return function_by_names("corrected_step", symbols, {"after": after_all})
 
 
-def free_step(known: PredictorInputs, equations: Equations, start: StepStart, parameters: MX) -> tuple[MX, MX]:
+def free_step(known: PredictorInputs, equations: Equations, start: StepStart) -> tuple[MX, MX]:
     """Velocities (3,) after one step of the physics, and its way along, across and in heading (3,)."""
     model, names = equations.model, known.names
     memory = start.reached[[names.reached.index(name) for name in model.memory]] if model.memory else MX(0, 1)
@@ -243,7 +242,7 @@ def free_step(known: PredictorInputs, equations: Equations, start: StepStart, pa
         column_of_entries(start.row, model.environment),
     )
     step = equations.step(known.physics.integrator, known.physics.step)
-    after = step(carry, commands, environment, np.zeros(model.num_dof), parameters)
+    after = step(carry, commands, environment, np.zeros(model.num_dof), equations.values)
     end, psi = split_by_name(equations.states, after[: len(equations.states)]), start.row["psi"]
     place = turn_vectors(column_of_entries(end, ("north", "east")), -psi)
     return equations.horizontal(after), ca.vertcat(place, end["psi"] - psi)
@@ -285,13 +284,9 @@ def distance_to_nearest(point: MX, centres: Array) -> MX:
 def modules_path(known: PredictorInputs, corrector: ModulesCorrector) -> MX:
     """Factors of single modules, faded out far from the training data."""
     reduced = [Equations(one.vessel) for one in physics_without_modules(known.physics) if one.vessel is not None]
-    every, h = known.names.parameters, known.physics.step
 
     def added(start: StepStart, whole: MX, kept: MX) -> tuple[MX, MX]:
-        afters = [whole]
-        for equations in reduced:
-            places = [every.index(name) for name in equations.model.parameters]
-            afters.append(free_step(known, equations, start, start.parameters[places])[0])
+        afters = [whole, *(free_step(known, equations, start)[0] for equations in reduced)]
         even, units = corrector.weights.T, corrector.units
         z = normalised_inputs(feature_expressions(start.row, corrector.commands), units.normaliser)
         none = np.zeros((len(units.offset) + (units.reflection is None), 0))
@@ -301,7 +296,7 @@ def modules_path(known: PredictorInputs, corrector: ModulesCorrector) -> MX:
         weight = ca.if_else(all_within(away), weight, 0)
         extra = weight * ca.fmin(ca.fmax(raw, -corrector.limit), corrector.limit)
         shares = ca.horzcat(*(before - after for before, after in itertools.pairwise(afters)))
-        return ca.mtimes(shares, extra) / h, kept
+        return ca.mtimes(shares, extra) / known.physics.step, kept
 
     return stepped_path(known, added)
 
@@ -329,13 +324,13 @@ def hankel_path(known: PredictorInputs, corrector: HankelCorrector) -> MX:
 
 def missed_accelerations(known: PredictorInputs, delays: int) -> list[MX]:
     """Accelerations (3,) that single steps of the physics missed over the last steps of the past."""
-    rows, parameters = known.past[known.names.before(delays) :], known.inputs["parameters"]
+    rows = known.past[known.names.before(delays) :]
     first = column_of_entries(rows[0], tuple(known.equations.model.memory))
     reached = reached_at_starts(known, first, lambda: known.past_records(delays), delays)
     held, missed = {name: rows[0][name] for name in measurable_signals(known.names.now)}, []
     for row, at, later in zip(rows, reached, [*rows[1:], known.now], strict=True):
         start = held | {name: row[name] for name in (*MOTIONS, "psi", *known.names.commands)}
-        alone, _ = free_step(known, known.equations, StepStart(start, at, parameters), parameters)
+        alone, _ = free_step(known, known.equations, StepStart(start, at))
         missed.append((column_of_entries(later, MOTIONS) - alone) / known.physics.step)
     return missed
 

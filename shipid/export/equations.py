@@ -54,6 +54,11 @@ class Equations:
         """Names of the states and of the hidden states of terms."""
         return (*self.model.state, *self.model.hidden)
 
+    @property
+    def values(self) -> MX:
+        """Numbers of the vessel."""
+        return MX(ca.DM(list(self.vessel.parameters.values())))
+
     @cached_property
     def groups(self) -> dict[str, dict[str, str]]:
         """Entries of each input of a step, entry -> SI unit."""

@@ -5,6 +5,7 @@ The standard: Functional Mock-up Interface 2.0.4, fmi-standard.org.
 
 from __future__ import annotations
 
+import logging
 import platform
 import re
 import sys
@@ -20,7 +21,7 @@ from xml.etree import ElementTree
 from shipid.engine.integrate import Method
 from shipid.engine.libraries import run_compiler
 from shipid.engine.native import find_compiler
-from shipid.errors import ShipidError
+from shipid.errors import ShipidError, escape_unprintable
 from shipid.export.band import BAND_CHOICE, BAND_ROWS
 from shipid.export.c import SourceFiles, number_list
 from shipid.export.c_predictor import predictor_files
@@ -32,6 +33,8 @@ from shipid.files import replace_whole
 from shipid.physics.signals import ACTUAL, SIGNALS, neutral_value
 from shipid.version import __version__
 from shipid.vessel.load import Vessel
+
+log = logging.getLogger(__name__)
 
 BINARIES = {("Linux", "x86_64"): ("linux64", ".so"), ("Darwin", "x86_64"): ("darwin64", ".dylib")}
 """System and processor -> folder of the binary in an FMU, and how its name ends."""
@@ -99,14 +102,6 @@ def words_of_signal(name: str) -> str:
     return f"{word}, {component}" if component else word
 
 
-def _parameter_variables(vessel: Vessel | None) -> list[Variable]:
-    """The numbers of a vessel document."""
-    return [] if vessel is None else [
-        Variable(key, "parameter", vessel.units[key], "number of the vessel document", value, False, key in vessel.above_zero)
-        for key, value in vessel.parameters.items()
-    ]  # fmt: skip
-
-
 def vessel_unit(vessel: Vessel, name: str, method: Method) -> FmuParts:
     """The FMU of a vessel: commands, weather and loads in, motion out."""
     equations = Equations(vessel)
@@ -123,7 +118,9 @@ def vessel_unit(vessel: Vessel, name: str, method: Method) -> FmuParts:
     variables += [Variable(f"load.{key}", "input", unit, f"added {key}", 0.0) for key, unit in loads.items()]
     places = {"NUM_STATES": len(equations.states), "COMMANDS": len(carry), "ENVIRONMENT": len(carry) + len(commands)}
     places |= {"LOADS": len(variables) - len(loads), "FIRST_PARAMETER": len(variables)}
-    variables += _parameter_variables(vessel)
+    for key, value in vessel.parameters.items():
+        least, words = key in vessel.above_zero, "number of the vessel document"
+        variables.append(Variable(key, "parameter", vessel.units[key], words, value, above_zero=least))
     variables.append(Variable("solver.step", "parameter", "s", f"largest internal step of {method}", largest))
     files = vessel_files(vessel, name, method)
     return FmuParts(
@@ -150,7 +147,6 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     ]
     variables.append(Variable("instant", "output", "s", "time of the row that the path starts from", None))
     first = len(variables)
-    variables += _parameter_variables(model.vessel)
     settings = {}
     if names.planned:
         settings["held"] = "1: orders stay as they are over the horizon; 0: as in planned[...]", 1.0
@@ -160,7 +156,7 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
         settings |= dict(zip(BAND_CHOICE, zip(words, (0.9, 0.0, 0.0), strict=True), strict=True))
     at = {key: f"self->values + {place}" for place, key in enumerate(settings, len(variables))}
     variables += [Variable(key, "parameter", "-", *setting) for key, setting in settings.items()]
-    values = {"FIRST_PARAMETER": first, "X": path, "BAND": 0 if bands is None else len(BAND_ROWS)}
+    values: dict[str, Any] = {"FIRST_PARAMETER": first, "X": path, "BAND": 0 if bands is None else len(BAND_ROWS)}
     values["PLAN"] = f"*({at['held']}) != 0 ? 0 : self->values + {len(names.now)}" if names.planned else 0
     values["CHOICE"] = at.get(BAND_CHOICE[0], 0)
     what = "no physics" if model.vessel is None else model.vessel.name
@@ -168,22 +164,31 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     return FmuParts(f"{what}, {model.predictor.method}", tuple(variables), files, PREDICTOR_MODEL, values, step)
 
 
-def write_fmu(unit: FmuParts, file: Path) -> list[str]:
-    """Write the FMU; the platforms of the binaries in it. ShipidError where the compiler fails."""
+def write_fmu(unit: FmuParts, file: Path) -> list[Path]:
+    """Write the FMU; ShipidError where the compiler fails, a line in the log where it has no binary."""
     name = unit.files.name
     sources = {key: text for key, text in unit.files.texts.items() if key != "main.c"}
     guid = f"{{{uuid.uuid5(uuid.NAMESPACE_URL, unit.title + ''.join(sources.values()) + unit.wrapper(''))}}}"
     sources[f"{name}.c"] += unit.wrapper(guid)
-    place = BINARIES.get((platform.system(), platform.machine())) if find_compiler() is not None else None
+    here = platform.system(), platform.machine()
+    compiler, place = find_compiler(), BINARIES.get(here)
     with replace_whole(file) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(_archive_entry("modelDescription.xml"), model_description(unit, guid))
         for key, text in sources.items():
             archive.writestr(_archive_entry(f"sources/{key}"), text)
             (temporary.parent / key).write_text(text, encoding="utf-8")
-        if place is not None:
-            built = _compile_binary(temporary.parent, name)
+        if place is not None and compiler is not None:
+            built = temporary.parent / f"{name}.so"
+            options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s", "-o", str(built)]
+            parts = [str(temporary.parent / f"{name}{part}.c") for part in ("", "_casadi")]
+            complaint, _ = run_compiler([compiler, *options, *parts, "-lm"], temporary.parent)
+            if complaint is not None:
+                raise ShipidError(f"the C compiler failed ({complaint.splitlines()[0]})", file=file)
             archive.writestr(_archive_entry(f"binaries/{place[0]}/{name}{place[1]}", 0o755), built.read_bytes())
-    return [] if place is None else [place[0]]
+    if place is None or compiler is None:
+        shown, system = escape_unprintable(str(file)), " ".join(here)
+        log.warning("%s has no binary for %s: the tool that imports it must compile its sources", shown, system)
+    return [file]
 
 
 def _archive_entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
@@ -191,18 +196,6 @@ def _archive_entry(name: str, mode: int = 0o644) -> zipfile.ZipInfo:
     entry = zipfile.ZipInfo(name)
     entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, mode << 16
     return entry
-
-
-def _compile_binary(folder: Path, name: str) -> Path:
-    command = find_compiler()
-    assert command is not None
-    options = ["-std=c99", "-O1", "-fPIC", "-shared", "-fvisibility=hidden", "-s"]
-    built = folder / f"{name}.so"
-    sources = [str(folder / f"{name}{part}.c") for part in ("", "_casadi")]
-    complaint, _ = run_compiler([command, *options, "-o", str(built), *sources, "-lm"], folder)
-    if complaint is not None:
-        raise ShipidError(f"the C compiler failed ({complaint.splitlines()[0]})")
-    return built
 
 
 def model_description(unit: FmuParts, guid: str) -> str:
@@ -250,9 +243,9 @@ def model_description(unit: FmuParts, guid: str) -> str:
         variable("alarm", 0, "output", "calculated", words, "Boolean")
     structure = add(root, "ModelStructure")
     for tag, places in (("Outputs", outputs), ("InitialUnknowns", unknowns)):
-        part = add(structure, tag) if places else None
+        under = add(structure, tag) if places else structure
         for place in places:
-            add(part, "Unknown", index=place)  # type: ignore[arg-type]
+            add(under, "Unknown", index=place)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

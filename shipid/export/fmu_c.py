@@ -107,6 +107,7 @@ static const char *Model_step(Model *self, double t, double h)
 }
 
 #define OUTSIDE 0
+#define NAME_OF(reference) @_parameters_names[(reference) - FIRST_PARAMETER]
 """
 
 PREDICTOR_MODEL = """
@@ -131,7 +132,6 @@ static const char *path_at(Model *self, @_recorder *kept, double t)
 {
     double path[2 * @_HORIZON], band[4 * @_HORIZON];
     int i, k;
-    memcpy(kept->parameters, self->values + FIRST_PARAMETER, @_NUM_PARAMETERS * sizeof(double));
     k = @_record(kept, t, self->values); /* refused: status and alarm stay those of the path that is there */
     if (k) return k == @_TIME ? "time does not go on" : "an input is not finite";
     self->status = @_predict(kept, $PLAN, $CHOICE, path, band);
@@ -156,6 +156,7 @@ static const char *Model_step(Model *self, double t, double h)
 }
 
 #define OUTSIDE @_OUTSIDE
+#define NAME_OF(reference) ""
 """
 
 FMI_BODY = """
@@ -332,7 +333,7 @@ FUNCTION(fmi2SetReal, (fmi2Component c, const fmi2ValueReference vr[], size_t n,
         if (!isfinite(value[i]))
             return refuse(self, fmi2Discard, "variable %u: %g is not a finite number", vr[i], value[i]);
         if (kinds[vr[i]] == 'a' && !(value[i] > 0))
-            return refuse(self, fmi2Discard, "%s: %g must be above 0", @_parameters_names[vr[i] - FIRST_PARAMETER], value[i]);
+            return refuse(self, fmi2Discard, "%s: %g must be above 0", NAME_OF(vr[i]), value[i]);
     }
     for (i = 0; i < n; ++i) {
         self->model.values[vr[i]] = value[i];

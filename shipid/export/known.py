@@ -29,7 +29,7 @@ class InputLayout:
 
     now : measured at the instant. reached : actuators that lag behind their orders. past : entries of each of
     `num_past` rows, the oldest first, 1 ... num_past steps before the instant; x, y are positions in the frame of the
-    instant. planned : commands of each of `horizon` rows. estimates : of the observer. parameters : dotted paths.
+    instant. planned : commands of each of `horizon` rows. estimates : of the observer.
     """
 
     now: tuple[str, ...]
@@ -39,7 +39,6 @@ class InputLayout:
     planned: tuple[str, ...]
     horizon: int
     estimates: tuple[str, ...]
-    parameters: tuple[str, ...]
     commands: tuple[str, ...]
 
     def before(self, steps: int) -> int:
@@ -57,7 +56,6 @@ class InputLayout:
             "past": self.num_past * len(self.past),
             "planned": self.horizon * len(self.planned),
             "estimates": len(self.estimates),
-            "parameters": len(self.parameters),
         }
 
 
@@ -116,7 +114,7 @@ class PredictorInputs:
     def _rolled_out(self, begun: MX, environment: MX, tau: MX) -> MX:
         inputs = [self.commands(self.equations.model.commands), environment, tau]
         carry = ca.vertcat(begun, self.inputs["reached"])
-        return rollout_records(self.step, carry, inputs, self.inputs["parameters"], self.names.horizon)
+        return rollout_records(self.step, carry, inputs, self.equations.values, self.names.horizon)
 
     @cached_property
     def measured_records(self) -> MX:
@@ -182,7 +180,7 @@ class PredictorInputs:
         carry = ca.vertcat(self._begun(rows[0]), column_of_entries(rows[0], tuple(model.memory)))
         commands = ca.horzcat(*(column_of_entries(row, model.commands) for row in rows))
         inputs = [commands, column_of_entries(rows[0], model.environment), MX(np.zeros(model.num_dof))]
-        return rollout_records(self.step, carry, inputs, self.inputs["parameters"], steps)
+        return rollout_records(self.step, carry, inputs, self.equations.values, steps)
 
     def _past_error(self, seconds: float) -> MX:
         """x, y, u, v, r of `shipid.hybrid.features.past_error`."""

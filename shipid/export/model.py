@@ -86,11 +86,6 @@ class ExportModel:
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
         return function_by_names("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
 
-    @property
-    def parameters(self) -> Array:
-        """Values of the parameters, in order."""
-        return np.array(list(self.vessel.parameters.values())) if self.vessel is not None else np.zeros(0)
-
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:
         """Entry of `now` -> least and greatest value without an alarm, with the slack of `Predictor.outside`."""
@@ -99,13 +94,10 @@ class ExportModel:
 
     def units(self, group: str) -> dict[str, str]:
         """Entries of an input, entry -> SI unit."""
-        return {name: self._unit(name) for name in getattr(self.layout, group)}
-
-    def _unit(self, name: str) -> str:
-        if self.vessel is not None and name in self.vessel.units:
-            return self.vessel.units[name]
-        row = signal_row(state_column(name))
-        return UNITS_OF_FORCES.get(signal_of(name), "m/s") if row is None else row.unit
+        rows = {name: signal_row(state_column(name)) for name in getattr(self.layout, group)}
+        return {
+            name: UNITS_OF_FORCES.get(signal_of(name), "m/s") if row is None else row.unit for name, row in rows.items()
+        }
 
 
 def build_model(predictor: DeployedMethod) -> ExportModel:
@@ -122,12 +114,10 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
         )
     if isinstance(corrector, ForceCorrector):
         physics = corrector.with_force(physics)
-    states, memory, orders, weather = (), (), (), ()
-    parameters: tuple[str, ...] = ()
+    states, memory, orders, weather = (tuple[str, ...](),) * 4
     if physics.vessel is not None:
         model = vessel_dynamics(physics.vessel)
         states, memory, orders, weather = model.state, tuple(model.memory), model.commands, model.environment
-        parameters = tuple(physics.vessel.parameters)
     limited = [*predictor.limits, *(() if predictor.bands is None else predictor.bands.names)]
     wind = ("V_w", "beta_w") if "V_w" in limited else ()
     commands = tuple(dict.fromkeys((*orders, *(name for name in predictor.limits if "." in name))))
@@ -139,5 +129,5 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
     return ExportModel(
         predictor,
         physics,
-        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, parameters, commands),
+        InputLayout(now, memory, past, predictor.past, planned, physics.horizon, estimates, commands),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -59,20 +59,20 @@ def angles_of(names: Sequence[str]) -> list[str]:
 
 
 def keep_function(model: ExportModel) -> ca.Function:
-    """(last, row, reached, parameters, dt, anew) -> kept row, what is added to all kept before, reached after dt [s].
+    """(last, row, reached, dt, anew) -> kept row, what is added to all kept before, reached after dt [s].
 
     last : the newest kept row. anew : 1 for a row before which nothing is known. Angles go on by the turn of
     `angle_by_turn`; headings and directions by the nearest one.
     """
     names = model.layout
     sizes_ = {"last": len(kept_names(model)), "row": len(names.now), "reached": len(names.reached)}
-    symbols = symbols_of(sizes_ | {"parameters": len(names.parameters), "dt": 1, "anew": 1})
+    symbols = symbols_of(sizes_ | {"dt": 1, "anew": 1})
     dt, anew = symbols["dt"], symbols["anew"]
     last, row = split_by_name(kept_names(model), symbols["last"]), split_by_name(names.now, symbols["row"])
-    numbers, moved = split_by_name(names.parameters, symbols["parameters"]), dict[str, MX]()
+    moved: dict[str, MX] = {}
     for name in angles_of(names.now):
         before = ca.if_else(anew, first_angle(row[name], model.limits.get(name)), last[name])
-        row[name], moved[name] = angle_by_turn(model, name, row[name], before, numbers)
+        row[name], moved[name] = angle_by_turn(model, name, row[name], before)
         last[name] = last[name] + moved[name]
     for name in names.now:
         if name in SIGNALS and SIGNALS[name].angle:
@@ -85,7 +85,7 @@ def keep_function(model: ExportModel) -> ca.Function:
     if model.vessel is not None and names.reached:
         equations = Equations(model.vessel)
         orders = column_of_entries(last, equations.model.commands)
-        reached = equations.advance(reached, orders, symbols["parameters"], dt)
+        reached = equations.advance(reached, orders, equations.values, dt)
     results = {"kept": kept, "moved": ca.if_else(anew, 0, shift)}
     results["after"] = ca.if_else(anew, column_of_entries(row, names.reached), reached)
     return function_by_names("keep", symbols, results)
@@ -141,7 +141,7 @@ def begin_function(model: ExportModel, filters: FilterBank) -> ca.Function:
 
 
 def observer_step(model: ExportModel, filters: FilterBank, seen: bool) -> ca.Function:
-    """(states, last, row, moved, parameters, dt) -> states and, where the new row is seen, estimates after dt [s].
+    """(states, last, row, moved, dt) -> states and, where the new row is seen, estimates after dt [s].
 
     last, row : kept rows. moved : what was added to the rows before. Where the filters divide the time between two
     rows, the last part alone sees the new row.
@@ -149,7 +149,7 @@ def observer_step(model: ExportModel, filters: FilterBank, seen: bool) -> ca.Fun
     every, count, inner = kept_names(model), filters.num_filters, filters.model
     size, places = sum(filter_state_sizes(inner)), np.cumsum([0, *filter_state_sizes(inner)])
     sizes = {"states": size * count, **dict.fromkeys(("last", "row", "moved"), len(every))}
-    symbols = symbols_of(sizes | {"parameters": len(model.layout.parameters), "dt": 1})
+    symbols = symbols_of(sizes | {"dt": 1})
     last, row = (split_by_name(every, symbols[key]) for key in ("last", "row"))
     turns = ca.DM(size, len(every))  # which orders and positions in a state move with the angles of the past
     for first, group in ((places[2], tuple(inner.memory)), (places[4], inner.commands)):
@@ -162,7 +162,7 @@ def observer_step(model: ExportModel, filters: FilterBank, seen: bool) -> ca.Fun
             ca.reshape(symbols["states"], size, count) + moved,
             column_of_entries(last, inner.commands),
             column_of_entries(last, inner.environment),
-            symbols["parameters"][[model.layout.parameters.index(key) for key in inner.parameters]],
+            Equations(filters.vessel).values,
             ca.vertcat(*(row[key] if key in measured else MX(np.nan) for key in MEASURED_MOTION)),
             MX(filters.noise),
             MX(filters.numbers.T),
@@ -178,7 +178,7 @@ def nearest_turn(angle: MX, goal: Any) -> MX:
     return MX(angle + FULL_TURN * ca.floor(0.5 + (goal - angle) / FULL_TURN))
 
 
-def angle_by_turn(model: ExportModel, name: str, angle: MX, last: MX, numbers: Mapping[str, MX]) -> tuple[MX, MX]:
+def angle_by_turn(model: ExportModel, name: str, angle: MX, last: MX) -> tuple[MX, MX]:
     """An angle of a thruster or rudder, which may come by any turn, and by how much the past is to be moved to it.
 
     Between stops less than a turn apart, and of a rudder, the turn within them is taken, so a jump is real. A unit that
@@ -186,15 +186,15 @@ def angle_by_turn(model: ExportModel, name: str, angle: MX, last: MX, numbers: M
     back lies within them, the past is moved by that turn.
     """
     component, _, signal = name.rpartition(".")
-    path = f"thruster.{component}.actuator.{signal}"
-    low, high = numbers.get(f"{path}.low", MX(-np.inf)), numbers.get(f"{path}.high", MX(np.inf))
-    stopped = high - low < FULL_TURN
-    within = nearest_turn(angle, ca.if_else(stopped, (low + high) / 2, 0))
+    numbers = {} if model.vessel is None else model.vessel.parameters
+    stops = [numbers.get(f"thruster.{component}.actuator.{signal}.{end}", np.inf) for end in ("low", "high")]
+    if np.isfinite(stops).all() and stops[1] - stops[0] < FULL_TURN:
+        return nearest_turn(angle, sum(stops) / 2), MX(0)
     if not is_all_round(name):
-        return within, MX(0)
+        return nearest_turn(angle, 0), MX(0)
     least, most = model.limits.get(name, (-np.inf, np.inf))
     on = nearest_turn(angle, last)
     back = nearest_turn(on, (least + most) / 2) if np.isfinite(most - least) else on
     leaves = ca.logic_and(ca.fmax(least - on, on - most) > 0, ca.fmax(least - back, back - most) <= 0)
-    goes = ca.if_else(stopped, within, ca.if_else(leaves, back, on))
-    return goes, ca.if_else(stopped, 0, goes - on)
+    goes = ca.if_else(leaves, back, on)
+    return goes, goes - on

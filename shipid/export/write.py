@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import os
-import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,19 +10,17 @@ from typing import get_args
 
 from shipid.arguments import as_path, check_choice, check_class
 from shipid.engine.integrate import Method
-from shipid.errors import DocumentError, ShipidError, escape_unprintable, suggest_name
+from shipid.errors import DocumentError, suggest_name
 from shipid.export.c import SourceFiles, c_name
 from shipid.export.c_predictor import predictor_files
 from shipid.export.c_vessel import vessel_files
 from shipid.export.casadi import write_predictor_function, write_vessel_function
-from shipid.export.fmu import FmuParts, predictor_unit, vessel_unit, write_fmu
+from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import ExportModel, build_model
 from shipid.export.onnx import write_onnx
 from shipid.files import write_set
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.vessel.load import Vessel
-
-log = logging.getLogger(__name__)
 
 EXAMPLE_FILE = "main.c"
 
@@ -77,8 +73,8 @@ def export_vessel(
 
     Raises ShipidError as there, and for an unknown integrator.
     """
-    check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     target, file, title = _check_target(to, out, name)
+    check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
     check_choice("integrator", integrator, get_args(Method))
     if target.vessel is None:
         raise DocumentError(f"a vessel has no networks, and {to} takes nothing else: choose another", path="--to")
@@ -105,29 +101,14 @@ def _write_sources(files: SourceFiles, folder: Path) -> list[Path]:
     return write_set({file: text for file, text in texts.items() if file.name != EXAMPLE_FILE or not file.exists()})
 
 
-def _write_unit(unit: FmuParts, file: Path) -> list[Path]:
-    try:
-        platforms = write_fmu(unit, file)
-    except ShipidError as error:
-        raise ShipidError(error.message, file=file) from None
-    if not platforms:
-        here = f"{platform.system()} {platform.machine()}"
-        log.warning(
-            "%s has no binary for %s: the tool that imports it must compile its sources",
-            escape_unprintable(str(file)),
-            here,
-        )
-    return [file]
-
-
 EXPORT_TARGETS: dict[str, ExportTarget] = {
     "c": ExportTarget(
         lambda model, title, file: _write_sources(predictor_files(model, title), file),
         lambda ship, title, rule, file: _write_sources(vessel_files(ship, title, rule), file),
     ),
     "fmu": ExportTarget(
-        lambda model, title, file: _write_unit(predictor_unit(model, title), file),
-        lambda ship, title, rule, file: _write_unit(vessel_unit(ship, title, rule), file),
+        lambda model, title, file: write_fmu(predictor_unit(model, title), file),
+        lambda ship, title, rule, file: write_fmu(vessel_unit(ship, title, rule), file),
         ".fmu",
     ),
     "casadi": ExportTarget(write_predictor_function, write_vessel_function, ".casadi"),

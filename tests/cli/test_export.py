@@ -33,7 +33,7 @@ def test_a_cell_that_is_not_there_is_one_line(tmp_path):
 def test_a_function_is_not_written_to_a_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["export", "mariner", "--to", "casadi", "--out", "."])
-    assert "is a folder: the target casadi takes a file" in str(result.exception)
+    assert "the target casadi is a file that ends in .casadi" in str(result.exception)
 
 
 def test_a_folder_is_no_cell_but_has_some(tmp_path):

@@ -132,8 +132,8 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
     ),
     "export": (
         "shipid.export.write:export_vessel",
-        f"export {SHIP} --to c --out x --single --integrator euler --name other",
-        {"vessel": is_ship, "to": "c", "out": Path("x"), "single": True, "integrator": "euler", "name": "other"},
+        f"export {SHIP} --to c --out x --integrator euler --name other",
+        {"vessel": is_ship, "to": "c", "out": Path("x"), "integrator": "euler", "name": "other"},
     ),
     "export a predictor": (
         "shipid.export.write:export_predictor",

@@ -135,7 +135,6 @@ def inputs_of_model(model: ExportModel, instants: Instants) -> dict[str, np.ndar
         "past": [past[name][k] if name in past else zero for k in steps for name in names.past],
         "planned": [planned[name][k] for k in range(names.horizon) for name in names.planned],
         "estimates": [instants.estimates[name] for name in names.estimates],
-        "parameters": np.tile(model.parameters[:, None], (1, count)),
     }
     return {key: np.array(rows, dtype=float).reshape(-1, count).T.copy() for key, rows in groups.items()}
 

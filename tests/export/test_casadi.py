@@ -85,7 +85,6 @@ def test_an_observer_without_wind_and_current_has_derivatives(tmp_path):
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
     function, names = ca.Function.load(str(file)), build_model(predictor).layout
     given = {key: np.zeros(size) for key, size in names.sizes.items()}
-    given |= {"parameters": build_model(predictor).parameters}
     given["now"][names.now.index("u")] = given["estimates"][names.estimates.index("observer.u")] = 4.0
     orders = ca.MX.sym("orders", names.sizes["planned"])
     path = function(**{**given, "planned": orders})["path"]
