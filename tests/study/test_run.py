@@ -189,7 +189,7 @@ def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType
 def test_a_worker_of_a_cluster_without_the_term_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, plan = skeg_plan(tmp_path, monkeypatch)
     monkeypatch.delitem(TERMS, "hull.skeg")
-    with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': start them with --preload"):
+    with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': .* of Dask with --preload"):
         run._on_cluster((plan, None, "cpu", {}), (plan.units[0], b""), Silent())  # type: ignore[arg-type]
 
 
