@@ -165,7 +165,7 @@ def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
     """
     rows: list[tuple[Any, ...]] = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
-        A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), []
+        A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), list[tuple[Any, ...]]()
         for path in frame.columns.difference(list(ROW_COLUMNS), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
@@ -175,5 +175,5 @@ def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
         for (named, pair), least in zip(pairs.items(), corrected.min(axis=1), strict=True):
             if least <= 2 * SIGNIFICANT:  # of both sides
                 driving.append((name, named, *(rank_correlation(A, values.to_numpy()) for values in pair)))
-        rows += sorted(driving, key=lambda row: -max(map(abs, row[2:])))[:MOST_DRIVERS]
+        rows += sorted(driving, key=lambda row: -max(abs(row[2]), abs(row[3])))[:MOST_DRIVERS]
     return pd.DataFrame(rows, columns=["family", "paths", "factor", "away"])
