@@ -42,8 +42,9 @@ def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     drawn = [family for family in plan.families if any(block.drawn for block in family.perturb)]
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
-        hint = f" {name!r}: {suggest_name(name, [family.name for family in drawn])}" if name is not None else ""
-        raise DocumentError(f"no family draws a factor from a range{hint}", file=plan.file, path="family")
+        which = "no family draws a" if name is None else f"{name!r} draws no"
+        hint = suggest_name(name or "", [family.name for family in drawn])
+        raise DocumentError(f"{which} factor from a range: {hint}", file=plan.file, path="family")
     return chosen
 
 

@@ -115,7 +115,11 @@ def test_chance_drives_nothing(members: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "remedy"), [("wrnog", "'wrnog': did you mean 'wrong'"), ("right", "no family draws a factor from a range")]
+    ("name", "remedy"),
+    [
+        ("wrnog", "'wrnog' draws no factor from a range: did you mean 'wrong'"),
+        ("right", "'right' draws no factor from a range"),
+    ],
 )
 def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
     with pytest.raises(DocumentError, match=remedy) as caught:
