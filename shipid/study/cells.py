@@ -102,12 +102,9 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
     adapted = {one.name for one in prepared.foundations if one.fitted}
     wanted: dict[str, tuple[str, ...]] = {}
     for way in work.ways.values():
-        results = {name: fitted[way.name][name] for name in way.foundations}
-        names = [
-            n for n, one in results.items() if one.corrector is not None and (n in adapted or one.left_out is None)
-        ]
-        if names:
-            wanted[way.name] = tuple(names)
+        trained = [name for name in way.foundations if fitted[way.name][name].corrector is not None]
+        if names := tuple(one for one in trained if one in adapted or fitted[way.name][one].left_out is None):
+            wanted[way.name] = names
     refits = prepared.study.bands.refits
     if not refits or not wanted:
         return {}

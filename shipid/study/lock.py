@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import errno
 import logging
-import os
-import socket
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from datetime import UTC, datetime
+from contextlib import contextmanager
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -27,42 +24,29 @@ def sole_writer(folder: Path, name: str = WRITER, *, wait: bool = False) -> Iter
 
     Where the file system has no locks there is a warning, and nobody is kept out.
 
-    Raises ResultError, with the process, its host and since when it works, where another one is in the folder.
+    Raises ResultError where another process is in the folder.
     """
     lock = FileLock(folder / f".{name}.lock", blocking=wait, fallback_to_soft=False)
-    holder = folder / f".{name}.txt"
     try:
         lock.acquire()
     except Timeout:
-        message = f"{_holder_words(holder)} works in it: wait until it has ended, or end it"
-        raise ResultError(message, file=folder) from None
+        raise ResultError("another process works in it: wait until it has ended, or end it", file=folder) from None
     except OSError as error:
         if error.errno not in NO_LOCKS:
             raise
         log.warning("%s is on a file system without locks: let one process at a time work in it", folder)
     try:
-        with suppress(OSError):  # only to say who it is
-            since = datetime.now(UTC).isoformat(timespec="seconds")
-            holder.write_text(f"process {os.getpid()} on {socket.gethostname()}, since {since},", encoding="utf-8")
         yield
     finally:
-        holder.unlink(missing_ok=True)
         lock.release()
 
 
-def current_writer(folder: Path) -> str:
-    """The process that works in a folder, in words; empty if there is none, or where the folder cannot be locked."""
+def has_writer(folder: Path) -> bool:
+    """Whether a process works in a folder; False where the folder cannot be locked, such as one that is read only."""
     try:
         with FileLock(folder / f".{WRITER}.lock", blocking=False, fallback_to_soft=False):
-            return ""
+            return False
     except Timeout:
-        return _holder_words(folder / f".{WRITER}.txt")
-    except OSError:  # a folder that this user may only read
-        return ""
-
-
-def _holder_words(holder: Path) -> str:
-    try:
-        return holder.read_text(encoding="utf-8", errors="replace") or "another process"
+        return True
     except OSError:
-        return "another process"
+        return False

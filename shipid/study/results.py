@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections import UserDict
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -28,24 +29,15 @@ from shipid.study.plan import Plan, families_set_from, model_label, uncounted_fa
 MOST_KEPT = 1000  # predicted paths in memory, of about 1 MB each
 
 
-class StoredPaths(Mapping[str, np.ndarray]):
+class StoredPaths(UserDict[str, Any]):
     """Predicted test paths (T, S, 2) [m] by cell, read from their files when asked for; the latest are kept."""
 
     def __init__(self, files: Mapping[str, Path]) -> None:
-        self._files = files
-        self._read = lru_cache(MOST_KEPT)(lambda cell: read_arrays(files[cell])["paths"])
+        super().__init__(files)
+        self._read = lru_cache(MOST_KEPT)(lambda file: read_arrays(file)["paths"])
 
     def __getitem__(self, cell: str) -> np.ndarray:
-        return self._read(cell)
-
-    def __contains__(self, cell: object) -> bool:
-        return cell in self._files
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._files)
-
-    def __len__(self) -> int:
-        return len(self._files)
+        return self._read(self.data[cell])
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -18,7 +18,7 @@ from typing import Any
 
 from shipid.arguments import as_path, check_class, check_whole_number
 from shipid.capacity import usable_cores
-from shipid.data.dataset import Dataset, read_dataset, write_dataset
+from shipid.data.dataset import read_dataset, write_dataset
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine_description, noted_engine
 from shipid.files import make_folder, write_json
@@ -32,7 +32,7 @@ from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
 from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
-from shipid.study.sessions import Code, Sessions, check_workers, machine, session_at_worker, session_on
+from shipid.study.sessions import Code, Sessions, code_at_worker, machine, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
 
@@ -86,8 +86,8 @@ def run_study(
     shard : (i, n), i from 1: every n-th unit of the plan from the i-th on, into `shards/i-of-n` of a folder that
         `prepare_study` has made. The next run without a shard takes it in.
 
-    Raises ShipidError before any work for a plan that is none, for a number of workers below 1, where local workers
-    lack the code that a user wrote, such as that of a notebook, and where another process works in the folder.
+    Raises ShipidError before any work for a plan that is none, for a number of workers below 1, and where another
+    process works in the folder; later where workers lack the code that a user wrote, such as that of a notebook.
     """
     check_class("plan", plan, Plan, "as of `read_plan`")
     folder = as_path("folder", folder)
@@ -95,8 +95,6 @@ def run_study(
     check_device(device)
     if scheduler is None:
         import_for_workers()
-        if own_code(plan) and len(store.finished_units(folder, plan.units)) < len(plan.units):
-            check_workers(plan)
     means = Means(workers, scheduler, device, shard)
     yield from (_run_parts if plan.parts else _run_one)(plan, folder, means)
 
@@ -110,9 +108,7 @@ def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "
         if not plan.parts:
             sessions = Sessions(folder, session_on(device, own_code(plan)))
             sessions.note(sessions.now)
-            yield Event("note", _obtaining_words(plan))
-            prepared = prepare(plan, _dataset(plan, folder, sessions), device)
-            _write_common(plan, folder, prepared, sessions)
+            yield from _prepare_folder(plan, folder, sessions, device)
     yield Event("end", text=str(folder))
 
 
@@ -128,14 +124,7 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
         sessions = Sessions(place, session_on(means.device, own_code(plan)))
         if changed := sessions.note(sessions.now):
             yield Event("note", f"earlier results were computed otherwise: {'; '.join(changed)}")
-        if not seals.is_sealed(folder, DATA):
-            yield Event("note", _obtaining_words(plan))
-        dataset = _dataset(plan, folder, sessions)
-        yield Event("note", "rolling out the foundations")
-        prepared = prepare(plan, dataset, means.device)
-        _write_common(plan, folder, prepared, sessions)
-        for note in prepared.notes:
-            yield Event("note", note)
+        prepared = yield from _prepare_folder(plan, folder, sessions, means.device)
         mine, left = _units(plan, folder, shard)
         total, done = _cells(mine), _cells(mine) - _cells(left)
         yield Event("start", done=done, total=total)
@@ -163,15 +152,21 @@ def run_unit(
     return [evaluate_cell(work, pair, fitted, left_out, origin) for pair in unit.pairs]
 
 
-def _dataset(plan: Plan, folder: Path, sessions: Sessions) -> Dataset:
-    """The runs of a study as they are stored, obtained before where they are not."""
+def _prepare_folder(plan: Plan, folder: Path, sessions: Sessions, device: str) -> Generator[Event, None, PreparedStudy]:
+    """Make what all units share, from the runs of a study, which are obtained where they are not stored."""
     if not seals.is_sealed(folder, DATA):
+        yield Event("note", _obtaining_words(plan))
         dataset = obtain_runs(plan)
         store.check_place(folder, plan.digest)
         sessions.note_engine(noted_engine())
         write_dataset(dataset, folder / store.DATASET)
         seals.write_seal(folder, DATA, [folder / store.DATASET])
-    return read_dataset(folder / store.DATASET)
+    yield Event("note", "rolling out the foundations")
+    prepared = prepare(plan, read_dataset(folder / store.DATASET), device)
+    _write_common(plan, folder, prepared, sessions)
+    for note in prepared.notes:
+        yield Event("note", note)
+    return prepared
 
 
 def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy, sessions: Sessions) -> None:
@@ -198,9 +193,9 @@ def _compute(
     journals = partial(open_journal, place.absolute() / store.JOURNALS, plan.digest)
     make_folder(place / store.JOURNALS)
     if means.scheduler is None:
-        work = partial(_on_pool, plan, prepared, journals, means.device)
-        for unit, (now, results) in on_workers(work, units, means.workers or usable_cores()):
-            sessions.note_engine(now)
+        work = partial(_on_pool, plan, prepared, journals, sessions.now)
+        for unit, (noted, results) in on_workers(work, units, means.workers or usable_cores()):
+            sessions.note_others(*noted)
             yield unit, results
         return
     writer, kept = cache(journals), {file.stem: file.read_bytes() for file in (place / store.JOURNALS).glob("*.log")}
@@ -221,11 +216,12 @@ def open_journal(folder: Path, digest: str, unit: str) -> Journal:
 
 
 def _on_pool(
-    plan: Plan, prepared: PreparedStudy, journals: Callable[[str], Journal], device: str, unit: Unit
-) -> tuple[str | None, list[store.Cell]]:
-    """A unit on a worker of this machine: the engine that the worker has by now, and the results."""
-    results = run_unit(plan, prepared, unit, device, journals(unit.key))
-    return noted_engine(), results
+    plan: Plan, prepared: PreparedStudy, journals: Callable[[str], Journal], now: dict[str, Any], unit: Unit
+) -> tuple[list[dict[str, Any]], list[store.Cell]]:
+    """A unit on a worker of this machine: what it was computed with, and the results."""
+    session = {**now, **code_at_worker(plan, {})}
+    results = run_unit(plan, prepared, unit, now["device"], journals(unit.key))
+    return [{**session, "engine": noted_engine() or now["engine"]}], results
 
 
 def _on_cluster(
@@ -233,7 +229,7 @@ def _on_cluster(
 ) -> tuple[list[dict[str, Any]], list[store.Cell]]:
     """A unit on a worker of a cluster: what it was computed with, before and after, and the results."""
     (plan, prepared, device, code), (unit, journal) = shared, task
-    session = session_at_worker(plan, device, code)
+    session = session_on(device, code_at_worker(plan, code))
     with TemporaryDirectory() as folder:
         sent = SentJournal(Path(folder) / f"{unit.key}.log", journal, plan.digest, line)
         results = run_unit(plan, prepared, unit, device, sent)
@@ -243,10 +239,10 @@ def _on_cluster(
 def _finish(plan: Plan, folder: Path, prepared: PreparedStudy, device: str, begun: float) -> None:
     """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
     record = store.provenance(folder)
-    if seals.is_sealed(folder, store.RESULTS) and "wall_seconds" in record:
+    if seals.is_sealed(folder, store.RESULTS) and record["wall_seconds"]:
         return
     record |= {"notes": list(prepared.notes), "machine": {**machine(), "device": device}}
-    record["wall_seconds"] = record.get("wall_seconds", 0.0) + time.perf_counter() - begun
+    record["wall_seconds"] += time.perf_counter() - begun
     write_json(folder / store.PROVENANCE, record)
     with sole_writer(folder, PAGES, wait=True):
         store.write_results(folder, plan, store.read_rows(folder, plan))

@@ -42,8 +42,9 @@ def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     drawn = [family for family in plan.families if any(block.drawn for block in family.perturb)]
     chosen = [family for family in drawn if name in (None, family.name)]
     if not chosen:
-        hint = f" {name!r}: {suggest_name(name, [family.name for family in drawn])}" if name is not None else ""
-        raise DocumentError(f"no family draws a factor from a range{hint}", file=plan.file, path="family")
+        which = "no family draws a" if name is None else f"{name!r} draws no"
+        hint = suggest_name(name or "", [family.name for family in drawn])
+        raise DocumentError(f"{which} factor from a range: {hint}", file=plan.file, path="family")
     return chosen
 
 
@@ -165,7 +166,7 @@ def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
     """
     rows: list[tuple[Any, ...]] = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
-        A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), []
+        A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), list[tuple[Any, ...]]()
         for path in frame.columns.difference(list(ROW_COLUMNS), sort=False):
             if part[path].nunique() > 1:
                 alike.setdefault(part[path].to_numpy().tobytes(), []).append(path)
@@ -175,5 +176,5 @@ def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
         for (named, pair), least in zip(pairs.items(), corrected.min(axis=1), strict=True):
             if least <= 2 * SIGNIFICANT:  # of both sides
                 driving.append((name, named, *(rank_correlation(A, values.to_numpy()) for values in pair)))
-        rows += sorted(driving, key=lambda row: -max(map(abs, row[2:])))[:MOST_DRIVERS]
+        rows += sorted(driving, key=lambda row: -max(abs(row[2]), abs(row[3])))[:MOST_DRIVERS]
     return pd.DataFrame(rows, columns=["family", "paths", "factor", "away"])

@@ -8,20 +8,17 @@ import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from shipid.capacity import processor_name, usable_cores
 from shipid.engine.native import engine_description
-from shipid.errors import ShipidError, shorten_line
+from shipid.errors import ShipidError
 from shipid.hybrid.device import vector_instructions
 from shipid.study import store
 from shipid.study.code import code_digest
 from shipid.study.plan import USER_SCRIPT, Plan, own_code
-from shipid.study.workers import on_workers
-from shipid.units import join_names
 from shipid.version import __version__
 
 PACKAGES = (
@@ -96,40 +93,16 @@ def machine() -> dict[str, Any]:
     }
 
 
-def session_at_worker(plan: Plan, device: str, code: Code) -> dict[str, Any]:
-    """The session of a worker on another machine; `code` is that of the process that gave the work.
+def code_at_worker(plan: Plan, code: Code) -> dict[str, dict[str, str]]:
+    """What the user wrote as a worker has it; `code` is that of the process that gave the work.
 
-    A method of that process's script has no file there.
+    A method of that process's script has no file on another machine. Raises ShipidError where the worker lacks a term.
     """
     imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != MAIN))
     try:
         here = own_code(imported)
     except KeyError as unknown:
-        words = f"its workers lack the term {unknown}: start them with --preload and your file that puts it into TERMS"
-        raise ShipidError(words) from None
-    return session_on(device, {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}})
-
-
-def check_workers(plan: Plan) -> None:
-    """Raise ShipidError where a local worker lacks the code that a user wrote, or has another one."""
-    here, there, why = _digests(plan), dict[str, str](), ""
-    try:
-        ((_, there),) = on_workers(partial(_digests, plan), [None], 1)
-    except ShipidError:
-        raise
-    except Exception as error:  # of a module as it is imported, of a class or of a name in TERMS that is not there
-        why = f" ({shorten_line(f'{type(error).__name__}: {error}')})"
-    if lacking := [what for what, digest in here.items() if there.get(what) != digest]:
-        words = f"workers import your files anew, and there the {join_names(lacking)} is none, or another"
-        remedy = (
-            "start this process again if a file has changed; else write it into a file to be imported, and a line "
-            f'TERMS[...] = ..., as {USER_SCRIPT} in docs/extending.md, above its line `if __name__ == "__main__":`'
-        )
-        raise ShipidError(f"{words}{why}: {remedy}", file=getattr(sys.modules[MAIN], "__file__", None))
-
-
-def _digests(plan: Plan, _: None = None) -> dict[str, str]:
-    """What the user wrote, in words, as this process or a worker has it -> digest."""
-    return {
-        f"{what.split()[-1]} {name!r}": digest for what, held in own_code(plan).items() for name, digest in held.items()
-    }
+        words = f"workers lack the term {unknown}: write its line TERMS[...] = ... into a script, as {USER_SCRIPT} in"
+        more = 'docs/extending.md, above its line `if __name__ == "__main__":`; start those of Dask with --preload'
+        raise ShipidError(f"{words} {more}") from None
+    return {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}}

@@ -110,7 +110,11 @@ def _end_with_parent() -> None:
 def _answer(task: Any) -> bytes:
     """What the work makes of a task; ShipidError where a user's own method makes what cannot be sent."""
     if isinstance(_WORK[0], bytes):
-        _WORK[0] = pickle.loads(_WORK[0])  # here its errors are those of a task
+        try:
+            _WORK[0] = pickle.loads(_WORK[0])
+        except Exception as error:  # of a module as it is imported, or of a class that is not there
+            words = f"workers import your files anew, and there it does not go ({type(error).__name__}: {error})"
+            raise ShipidError(f"{words}: write methods and terms into a file that can be imported") from None
     result = _WORK[0](task)
     try:
         return pickle.dumps(result)

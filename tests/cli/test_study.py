@@ -124,7 +124,7 @@ def test_check_ends_with_1_where_a_file_is_wrong(tmp_path: Path, tiny_run: Path)
     next((folder / "cells").iterdir()).unlink()
     result = CliRunner().invoke(app, ["study", "check", str(folder)])
     assert result.exit_code == 1
-    assert "missing or damaged: continue with `shipid study resume`" in result.output
+    assert "missing: `shipid study resume` computes it again" in result.output
 
 
 def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(

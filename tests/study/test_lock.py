@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -16,18 +15,17 @@ from filelock import FileLock
 
 from shipid.errors import ResultError
 from shipid.study.check import check_folder
-from shipid.study.lock import current_writer, sole_writer
+from shipid.study.lock import has_writer, sole_writer
 from tests.study.tiny import events_here, make_run, run_here, tiny_plan
 
 
-def test_a_second_writer_is_refused_in_one_line_that_says_who_is_there(tmp_path: Path) -> None:
+def test_a_second_writer_is_refused_in_one_line(tmp_path: Path) -> None:
     with sole_writer(tmp_path):
         with pytest.raises(ResultError, match="works in it: wait until it has ended, or end it") as caught:
             sole_writer(tmp_path).__enter__()
-        assert f"process {os.getpid()} on {socket.gethostname()}, since " in str(caught.value)
         assert "\n" not in str(caught.value)
-        assert current_writer(tmp_path).startswith("process ")
-    assert not current_writer(tmp_path)
+        assert has_writer(tmp_path)
+    assert not has_writer(tmp_path)
 
 
 def test_a_kill_frees_the_folder(tmp_path: Path) -> None:
@@ -37,7 +35,7 @@ def test_a_kill_frees_the_folder(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "in\n"
-        assert f"process {process.pid} " in current_writer(tmp_path)
+        assert has_writer(tmp_path)
         process.send_signal(signal.SIGKILL)
         process.wait()
     with sole_writer(tmp_path):
@@ -48,19 +46,18 @@ def test_a_run_keeps_a_second_start_out_and_a_check_names_it(tmp_path: Path) -> 
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     events = events_here(plan, folder)
     assert next(events).kind == "note"
-    with pytest.raises(ResultError, match=f"process {os.getpid()} on .* works in it"):
+    with pytest.raises(ResultError, match="another process works in it"):
         run_here(plan, folder)
-    assert any(line.startswith("at work: process ") for line in check_folder(folder).lines)
+    assert any(line == "a process works in it" for line in check_folder(folder).lines)
     events.close()  # type: ignore[attr-defined]
     make_run(folder, plan)
 
 
-@pytest.mark.parametrize("number", [errno.ENOSYS, errno.ENOTSUP, errno.ENOLCK])
 def test_a_file_system_without_locks_is_a_warning(
-    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     def refused(*_: Any, **__: Any) -> None:
-        raise OSError(number, os.strerror(number))
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 
     monkeypatch.setattr(FileLock, "acquire", refused)
     with sole_writer(tmp_path):
@@ -77,4 +74,4 @@ def test_nobody_is_said_to_work_in_a_folder_that_may_only_be_read(
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
     monkeypatch.setattr(FileLock, "acquire", refused)
-    assert current_writer(tmp_path) == ""
+    assert not has_writer(tmp_path)

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from shipid.data.dataset import read_dataset
 from shipid.engine import native
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.files import read_json
+from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
@@ -29,13 +30,12 @@ from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error, summarise_errors
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
-from shipid.study import cells, run, seals, sessions, store
+from shipid.study import run, seals, sessions, store
 from shipid.study.check import check_folder
 from shipid.study.plan import Plan, whole_unit
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.results import read_results
 from shipid.study.run import run_study, run_unit
-from shipid.version import __version__
 from shipid.vessel.load import load_vessel
 from tests.documented import code
 from tests.study.tiny import events_here, make_run, mixed_plan, run_here, tiny_plan
@@ -80,28 +80,18 @@ def test_interrupted_on_workers_and_resumed_here_gives_the_same_numbers(tmp_path
     assert read_results(folder).complete
 
 
-@pytest.mark.parametrize(
-    ("name", "other", "words"),
-    [("__version__", "9.8.7", "now 9.8.7, code"), ("code_digest", lambda: "12345678", "code 12345678")],
-)
-def test_another_shipid_that_goes_on_is_noted(
-    name: str, other: Any, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another version, which the metadata of an editable install do not know, or another commit of one version."""
+def test_another_code_that_goes_on_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another commit of one version."""
     plan, folder = tiny_plan(tmp_path), tmp_path / "run"
     for event in events_here(plan, folder):
         if event.kind == "cell":
             break
-    for module in (sessions, cells):
-        monkeypatch.setattr(module, name, other, raising=False)
+    words = "code 12345678"
+    monkeypatch.setattr(sessions, "code_digest", lambda: "12345678")
     notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
     assert any("computed otherwise: shipid was" in note and words in note for note in notes)
     assert any(words in line for line in check_folder(folder).lines)
     assert words in provenance_words(read_results(folder))["computed in parts"]
-    if name == "__version__":
-        assert read_json(folder / store.PROVENANCE)["machine"]["packages"]["shipid"] == other
-        stored = [Predictor.load(file).provenance["shipid"] for file in (folder / "cells").glob("*.npz")]
-        assert set(stored) == {__version__, other}
 
 
 @pytest.mark.parametrize(
@@ -185,7 +175,7 @@ def skeg_plan(folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[ModuleType
 def test_a_worker_of_a_cluster_without_the_term_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _, plan = skeg_plan(tmp_path, monkeypatch)
     monkeypatch.delitem(TERMS, "hull.skeg")
-    with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': start them with --preload"):
+    with pytest.raises(ShipidError, match=r"lack the term 'hull\.skeg': .* of Dask with --preload"):
         run._on_cluster((plan, None, "cpu", {}), (plan.units[0], b""), Silent())  # type: ignore[arg-type]
 
 
@@ -263,7 +253,7 @@ def test_a_training_that_fails_is_a_value(tmp_path: Path, monkeypatch: pytest.Mo
     assert len(read_results(tmp_path / "run").paths) == 6
 
 
-@pytest.mark.parametrize("factor", [1e200, 1e5, np.nan])
+@pytest.mark.parametrize("factor", [1e5, np.nan])
 def test_a_path_that_no_ship_can_follow_is_a_cell_without_a_result(
     factor: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -321,7 +311,7 @@ def test_a_folder_of_before_a_vessel_changed_says_so(tmp_path: Path) -> None:
     make_run(folder, store.stored_plan(folder))
 
 
-@pytest.mark.parametrize("at", ["note", "start", "cell"])
+@pytest.mark.parametrize("at", ["note", "cell"])
 @pytest.mark.parametrize("replaced", [False, True])
 def test_a_folder_that_is_moved_or_replaced_gets_nothing_more(
     replaced: bool, at: str, tmp_path: Path, tiny_run: Path
@@ -413,28 +403,13 @@ MISTAKE = ""  # of `Faulty` and `Moved`
 
 
 @dataclass(frozen=True)
-class Moved:
+class Moved(UnchangedPath):
     """A corrector that a user wrote, with a mistake."""
-
-    hyperparameters: Any
-    past: float = 0.0
 
     def predict(self, physics: Any, instants: Any, paths: Any) -> Any:  # noqa: ARG002
         if MISTAKE == "raises":
             raise ValueError("first\nsecond")
-        if MISTAKE == "adds":
-            paths += 1.0
         return paths
-
-    def header(self) -> dict[str, Any]:
-        return {}
-
-    def arrays(self) -> dict[str, Any]:
-        return {}
-
-    @classmethod
-    def from_arrays(cls, header: Any, arrays: Any) -> Any:  # noqa: ARG003
-        return None if MISTAKE == "returns nothing" else cls({})
 
 
 class Faulty(Method):
@@ -445,9 +420,7 @@ class Faulty(Method):
     def fit(self, task: Task) -> dict[str, FitResult]:
         if MISTAKE == "few runs":
             raise DataError("too few runs:\nmake more")
-        given = SimpleNamespace(**vars(Moved({})), predict=None) if MISTAKE == "lacks" else Moved({})
-        rows = {"no trial": [], "NaN": [trial_row(0, {}, 1.0, 0.0) | {"value": np.nan}]}
-        return dict.fromkeys(task.cases, FitResult(given, rows.get(MISTAKE, [trial_row(0, {}, 1.0, 0.0)]), 0.0))
+        return dict.fromkeys(task.cases, FitResult(Moved({}), [trial_row(0, {}, 1.0, 0.0)], 0.0))
 
 
 def faulty_plan(folder: Path, monkeypatch: pytest.MonkeyPatch, mistake: str) -> Plan:
@@ -460,26 +433,13 @@ def faulty_plan(folder: Path, monkeypatch: pytest.MonkeyPatch, mistake: str) -> 
     return tiny_plan(folder, {"method": methods, "claims": {"method": "mine"}, "grid.N_D": [4]})
 
 
-@pytest.mark.parametrize(
-    ("mistake", "message"),
-    [
-        ("raises", r"Moved\.predict: ValueError: first second in FILE, line \d+"),
-        (
-            "adds",
-            r"Moved\.predict: ValueError: .* read-only in FILE, line \d+: .* make a new array: `paths \+ shift`, .*",
-        ),
-        ("returns nothing", "`from_arrays` of Moved in FILE must return a corrector: NoneType lacks `predict`"),
-        ("lacks", r"Faulty\.fit: SimpleNamespace in .* lacks `header`"),
-    ],
-)
-def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(
-    mistake: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The run ends; when the mistake is mended it goes on in the same folder."""
-    plan, folder = faulty_plan(tmp_path, monkeypatch, mistake), tmp_path / "run"
+    plan, folder = faulty_plan(tmp_path, monkeypatch, "raises"), tmp_path / "run"
     with pytest.raises(ShipidError) as caught:
         run_here(plan, folder)
-    assert re.fullmatch(message.replace("FILE", re.escape(__file__)), str(caught.value))
+    message = rf"Moved\.predict: ValueError: first second in {re.escape(__file__)}, line \d+"
+    assert re.fullmatch(message, str(caught.value))
     finished = {file: file.read_bytes() for file in (folder / "cells").iterdir()}
     assert len(finished) == len(plan.foundations)  # those of `drawn`
     monkeypatch.setattr(sys.modules[__name__], "MISTAKE", "")
@@ -488,24 +448,14 @@ def test_a_mistake_of_a_user_is_one_line_and_loses_no_cell(
     assert set(store.read_rows(folder)["status"]) == {"ok"}
 
 
-@pytest.mark.parametrize(
-    ("mistake", "sentence"),
-    [
-        ("few runs", "too few runs: make more"),
-        ("no trial", "Faulty.fit: a corrector needs a trial that is complete"),
-        ("NaN", "Faulty.fit: trial 0: value must be finite, not nan, unless the state is 'diverged'"),
-    ],
-)
 def test_what_a_method_gives_and_no_study_can_store_is_a_cell_without_a_result(
-    mistake: str, sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Cells without a trial that has a value had an H, and the answer said that there was none."""
-    plan = faulty_plan(tmp_path, monkeypatch, mistake)
-    run_here(plan, tmp_path / "run")
+    run_here(faulty_plan(tmp_path, monkeypatch, "few runs"), tmp_path / "run")
     rows = store.read_rows(tmp_path / "run").set_index("method")
     assert set(rows.loc["drawn", "status"]) == {"ok"}
     assert set(rows.loc["mine", "status"]) == {"failed"}
-    assert all(said.startswith(sentence) and "\n" not in said for said in rows.loc["mine", "sentence"])
+    assert all(said == "too few runs: make more" for said in rows.loc["mine", "sentence"])
 
 
 def test_a_method_in_the_script_itself_has_the_code_of_the_script_on_a_cluster(

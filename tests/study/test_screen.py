@@ -67,18 +67,6 @@ def test_numbers_are_those_of_the_paths(plan: Plan, compiled: bool, monkeypatch:
         assert row["factors"] == {path: screened_row[path] for path in row["factors"]}
 
 
-@pytest.mark.skipif(native.find_compiler() is None, reason="no C compiler on this machine")
-def test_single_precision_gives_six_digits(plan: Plan) -> None:
-    double, single = (
-        join_blocks(list(screen(plan, obtain_runs(plan), drawn_families(plan, "wrong"), 5, engine=engine)))
-        for engine in ("repeated", "single")
-    )
-    assert not np.array_equal(double["A"], single["A"])
-    np.testing.assert_allclose(single["A"], double["A"], rtol=1e-5)
-    np.testing.assert_allclose(single["A_90"], double["A_90"], rtol=0.005)
-    pd.testing.assert_frame_equal(single.drop(columns=["A", "A_90"]), double.drop(columns=["A", "A_90"]))
-
-
 def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = screened(plan, 7)
     monkeypatch.setattr(module, "MEMBERS_OF_BLOCK", 3)
@@ -127,7 +115,11 @@ def test_chance_drives_nothing(members: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "remedy"), [("wrnog", "'wrnog': did you mean 'wrong'"), ("right", "no family draws a factor from a range")]
+    ("name", "remedy"),
+    [
+        ("wrnog", "'wrnog' draws no factor from a range: did you mean 'wrong'"),
+        ("right", "'right' draws no factor from a range"),
+    ],
 )
 def test_families_that_cannot_be_screened(plan: Plan, name: str, remedy: str) -> None:
     with pytest.raises(DocumentError, match=remedy) as caught:

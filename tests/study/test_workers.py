@@ -99,8 +99,8 @@ class Gone:
         return task
 
 
-def test_work_that_cannot_be_received_is_its_error() -> None:
-    with pytest.raises(ModuleNotFoundError, match="my module is gone"):
+def test_work_that_cannot_be_received_is_one_line() -> None:
+    with pytest.raises(ShipidError, match=r"my module is gone.: write methods and terms into a file"):
         list(on_workers(Gone(), [1.0, 2.0], 2))
     assert not multiprocessing.active_children()
 

@@ -14,7 +14,7 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.report import page
 from shipid.report.sections import SECTIONS
-from shipid.study import run, sessions, store
+from shipid.study import run, store
 from shipid.study.plan import Plan, Unit, build_plan, read_plan
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
@@ -88,7 +88,7 @@ def without_workers() -> Iterator[None]:
     def in_turn(work: Callable[[Unit], Any], units: Iterable[Unit], _: int) -> Iterator[Any]:
         return ((unit, work(unit)) for unit in units)
 
-    with patch.object(run, "on_workers", in_turn), patch.object(sessions, "on_workers", in_turn):
+    with patch.object(run, "on_workers", in_turn):
         yield
 
 
