@@ -19,7 +19,7 @@ from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale
+from shipid.hybrid.search import Scale
 
 Array = NDArray[np.float64]
 TRAJECTORY_SIGNALS = ("x", "y", "u", "v", "r")

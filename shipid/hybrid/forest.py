@@ -21,8 +21,7 @@ from shipid.hybrid.compensator import flatten_paths, smooth_basis, unflatten_pat
 from shipid.hybrid.features import Inputs, Memory, select_inputs
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone
-from shipid.hybrid.settings import Point, seed_of
+from shipid.hybrid.search import LearningProblem, Point, SearchedAlone, seed_of
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 

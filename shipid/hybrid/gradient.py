@@ -15,10 +15,9 @@ from optuna.trial import TrialState
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
 from shipid.hybrid.features import Inputs, choose_features
-from shipid.hybrid.journal import distributions, frozen_trial
+from shipid.hybrid.journal import frozen_trial
 from shipid.hybrid.method import FitResult, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.search import Search, best_trials, trial_row
-from shipid.hybrid.settings import SearchMethod, seed_of
+from shipid.hybrid.search import Search, SearchMethod, best_trials, seed_of, trial_row
 from shipid.hybrid.training import Length, StackSettings, train_stack
 
 Stack = Mapping[str, Mapping[str, float]]
@@ -33,7 +32,7 @@ def tune_gradient(task: Task, method: SearchMethod, inputs: Inputs, length: Leng
     a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
     """
     trainer, search = _StackTrainer(task, method, inputs, length), Search(task, task.cases, method)
-    space = distributions(method.space())
+    space = method.space()
     studies = {key: _memory_study(rows, space) for key, rows in search.rows.items()}
     best = {key: (inf, _TrialOutcome(-1)) for key in studies}  # of the trials that were trained here
     for number, _ in search.left(count()):

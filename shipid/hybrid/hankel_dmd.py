@@ -24,8 +24,7 @@ from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import MOTIONS, count_steps, feature_table
 from shipid.hybrid.method import Index
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem
-from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.search import LearningProblem, Point, Scale
 from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs, apply_blocks, solve_ridges

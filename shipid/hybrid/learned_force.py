@@ -22,8 +22,7 @@ from shipid.document import LEAST_NUMBER
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_values
-from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, ridge_values, seed_of
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import solve_ridges

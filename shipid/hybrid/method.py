@@ -161,8 +161,6 @@ class FitResult:
 class Traits:
     """What sentences, comparisons and findings of a study know of a method; no number depends on it.
 
-    Those of a `Searched` method follow from its settings called `mirror`, `memory` and `terms`.
-
     mirror : whether it may use that port and starboard are mirror images; None where it has no such choice. One that
         may not, on no physics alone, is the plain rival of the others.
     memory : what its inputs hold of the past. Methods of a kind that differ in it are compared.
@@ -205,8 +203,13 @@ class Method(CheckedModel, BaseModel, ABC):
 
     @property
     def traits(self) -> Traits:
-        """What a study says of this method and compares it by."""
-        return Traits()
+        """What a study compares this method by: its settings `mirror`, `memory` and `terms`, where it has such."""
+        mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
+        return Traits(
+            mirror > 0 if isinstance(mirror, bool | float) else None,
+            memory if isinstance(memory, Memory) else NO_MEMORY,
+            terms if isinstance(terms, int) else None,
+        )
 
     def unfit(self, vessel: Vessel) -> str:
         """Why this method cannot work with a vessel, and what to do, in words; empty where it can."""

@@ -26,8 +26,7 @@ from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem
-from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.search import LearningProblem, Point, Scale, seed_of
 from shipid.hybrid.stepping import StepMethod, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import Units, VaryingInputs, apply_blocks, solve_ridges

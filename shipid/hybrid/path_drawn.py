@@ -16,8 +16,7 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import FitResult, Task
-from shipid.hybrid.search import ridge_values, setting_at_share
-from shipid.hybrid.settings import Probability, Scale, SearchMethod, spread_points
+from shipid.hybrid.search import Probability, Scale, SearchMethod, ridge_values, setting_at_share, spread_points
 
 RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory

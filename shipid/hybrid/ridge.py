@@ -30,8 +30,16 @@ from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.products import gram_matrix, hidden_layer, matrix_product, sums_of_squares
-from shipid.hybrid.search import CLOSING_TRIALS, Search, diverged_result, trial_row, windows_of_folds
-from shipid.hybrid.settings import Point, SearchMethod, seed_of
+from shipid.hybrid.search import (
+    CLOSING_TRIALS,
+    Point,
+    Search,
+    SearchMethod,
+    diverged_result,
+    seed_of,
+    trial_row,
+    windows_of_folds,
+)
 from shipid.hybrid.units import Units, VaryingInputs
 
 Mask = NDArray[np.bool_]

@@ -24,8 +24,7 @@ from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_trial, ridge_values
-from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, ridge_trial, ridge_values
 from shipid.physics.signals import measurable_signals
 
 Array = NDArray[np.float64]

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import optuna
 import pytest
+from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 
 from shipid.errors import ResultError
 from shipid.hybrid.journal import Journal, merge_journals
-from shipid.hybrid.settings import SearchSpan
 
 SPACE: dict[str, Any] = {
-    "scale": SearchSpan(1.0, 16.0),
-    "layers": SearchSpan(1, 3, log=False, whole=True),
-    "mirror": (0.0, 1.0),
+    "scale": FloatDistribution(1.0, 16.0, log=True),
+    "layers": IntDistribution(1, 3),
+    "mirror": CategoricalDistribution((0.0, 1.0)),
 }
 
 

@@ -108,7 +108,7 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
             weights = np.linalg.solve(gram, seen[training].T @ made[training])
             expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
     parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
-    sums, others, errors = _left_out_errors(parts, [ridge], _fold_blocks(folds, ALL, "cpu"), 2)
+    sums, others, errors = _left_out_errors(parts, [ridge], _fold_blocks(folds, ALL), 2)
     np.testing.assert_allclose(sums[0], expected, rtol=rtol)
     np.testing.assert_allclose(others[0].sum(axis=0), (len(folds) - 1) * expected, rtol=rtol)
     judged = np.unique(np.concatenate([part for _, part in folds]))
@@ -146,7 +146,7 @@ def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, mos
     for seed in (*range(12), 3026):
         parts, runs, windows = drawn_parts(seed)
         folds = [(np.setdiff1d(windows, run), run[: len(run) // 2] if part_judged else run) for run in runs]
-        blocks = _fold_blocks(folds, windows, "cpu")
+        blocks = _fold_blocks(folds, windows)
         sums, others, errors = _left_out_errors(parts, ridges, blocks, 2, np.ones((9, 1), dtype=bool))
         one_by_one, but_one = one_by_one_ridge(parts, ridges, blocks)
         passed = np.isinf(sums).any(axis=1)
@@ -180,7 +180,7 @@ def test_each_model_takes_the_ridge_to_which_it_descends_from_the_middle():
     ridges, asked, alike, curves_of_all = list(np.geomspace(1e-4, 1e4, 9)), 0, 0, 0
     for seed in range(15):
         parts, runs, windows = drawn_parts(seed, models=3)
-        blocks = _fold_blocks([(np.setdiff1d(windows, run), run) for run in runs], windows, "cpu")
+        blocks = _fold_blocks([(np.setdiff1d(windows, run), run) for run in runs], windows)
         sums, others, _ = _left_out_errors(parts, ridges, blocks, 2)
         every, but_one = one_by_one_ridge(parts, ridges, blocks)
         for model in range(3):
@@ -250,7 +250,7 @@ def test_a_run_has_no_part_in_the_choice_of_the_ridge_that_judges_it():
     """The first ridge is best for fold 0 and the second for fold 1, so each judges the other fold."""
     errors = _LeftOutErrors(4, 2, 2)
     folds = [(np.array([2, 3]), np.array([0, 1])), (np.array([0, 1]), np.array([2, 3]))]
-    (block,) = _fold_blocks(folds, np.arange(4), "cpu")
+    (block,) = _fold_blocks(folds, np.arange(4))
     piece = _SidePiece((0, 1), slice(0, 2), block, None)
     for ridge in (0, 1):
         errors.keep(ridge, piece, [0], torch.full((2, 2, 4), float(ridge)))

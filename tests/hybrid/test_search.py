@@ -14,8 +14,14 @@ from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS, method_of
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, SearchedAlone, affordable_trials
-from shipid.hybrid.settings import SearchMethod
+from shipid.hybrid.search import (
+    CLOSING_TRIALS,
+    TIMED_TRIALS,
+    LearningProblem,
+    SearchedAlone,
+    SearchMethod,
+    affordable_trials,
+)
 from shipid.hybrid.stored import StoredData
 from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, ship, world

@@ -4,7 +4,7 @@ import pytest
 from shipid.errors import DocumentError
 from shipid.hybrid.methods import method_of
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.settings import spread_points
+from shipid.hybrid.search import spread_points
 
 
 @pytest.mark.parametrize(

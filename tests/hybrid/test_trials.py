@@ -8,12 +8,13 @@ from pydantic import PositiveInt
 
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.search import (
+    Scale,
+    SearchMethod,
     diverged_result,
     ridge_trial,
     trial_points,
     trial_row,
 )
-from shipid.hybrid.settings import Scale, SearchMethod
 from tests.hybrid.tasks import task_of
 
 RUNS = {"u": np.arange(12.0)}

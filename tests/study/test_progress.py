@@ -7,15 +7,16 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from optuna.distributions import FloatDistribution
+
 from shipid.files import write_json
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.settings import SearchSpan
 from shipid.study import seals
 from shipid.study.progress import SearchProgress, Watch
 from shipid.study.store import JOURNALS, TRIALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
-SPACE = {"units": SearchSpan(1, 100)}
+SPACE = {"units": FloatDistribution(1, 100, log=True)}
 
 
 def row(number: int, value: float) -> dict[str, Any]:
