@@ -31,9 +31,8 @@ from shipid.hybrid.bands import (
     split_along_track,
     track_directions,
 )
-from shipid.metrics import vector_lengths
+from shipid.metrics import Array, vector_lengths
 
-Array = NDArray[np.float64]
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 WINDOWS = 60  # of a run that calibrate, at most
@@ -169,8 +168,7 @@ def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
     weights = runs.weight[order]
     at = np.cumsum(weights) - weights / 2
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
-    rising: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
-    return rising
+    return np.asarray(np.maximum.accumulate(np.interp(wanted, at, scores[order])))
 
 
 def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
@@ -182,8 +180,7 @@ def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     mine = np.empty(len(order))
     mine[by_run] = (np.arange(len(order)) - starts[runs.place[by_run]]) / sizes[runs.place[by_run]]
-    shares: Array = np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0)
-    return shares
+    return np.asarray(np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0))
 
 
 def _intraclass_correlation(ranks: Array, runs: _RunShares) -> float:

@@ -15,20 +15,17 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser, flatten_paths, smooth_basis, unflatten_paths
 from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
-from shipid.hybrid.method import Index, Row, Task
+from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, mean_squared_error, seed_of
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -102,8 +99,7 @@ class GatedNetwork(StoredData):
             gate = _logistic(update + update_h)
             hidden = (1 - gate) * np.tanh(fresh + _logistic(reset + reset_h) * fresh_h) + gate * hidden
         full = np.concatenate([hidden, seen.now], axis=1)
-        outputs: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
-        return outputs
+        return np.asarray(np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"])
 
 
 def _logistic(values: Array) -> Array:

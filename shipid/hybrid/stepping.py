@@ -15,19 +15,17 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Array, Index, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, ridge_trial, ridge_values
 from shipid.physics.signals import measurable_signals
 
-Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
 STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
 VELOCITY_LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from torch import Tensor
 
-Array = NDArray[np.float64]
+from shipid.hybrid.method import Array
+
 Layers = tuple[tuple[Array, Array], ...]
 Stack = Sequence[tuple[Tensor, Tensor]]
 Masks = Sequence[Tensor | None]
