@@ -62,11 +62,6 @@ class _RunShares:
         """Windows sorted by their run, (S,)."""
         return np.argsort(self.place, kind="stable")
 
-    def by_run(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Sort windows in some order by their run, and within a run in that order."""
-        few = self.place.astype(np.uint16 if self.count < 2**16 else np.int64)  # short numbers are sorted by radix
-        return order[np.argsort(few[order], kind="stable")]
-
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
         sums: Array = np.add.reduceat(values[self.order], np.cumsum(self.sizes) - self.sizes, axis=0)
@@ -175,11 +170,10 @@ def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
     """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
     below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
-    by_run = runs.by_run(order)
-    sizes = runs.sizes
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    mine = np.empty(len(order))
-    mine[by_run] = (np.arange(len(order)) - starts[runs.place[by_run]]) / sizes[runs.place[by_run]]
+    by_run = order[np.argsort(runs.place[order], kind="stable")]
+    sizes, mine = runs.sizes[runs.place], np.empty(len(order))
+    starts = (np.cumsum(runs.sizes) - runs.sizes)[runs.place]
+    mine[by_run] = (np.arange(len(order)) - starts[by_run]) / sizes[by_run]
     return np.asarray(np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0))
 
 

@@ -8,7 +8,7 @@ ones; the number is written down before it is used, and read back.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count, islice
 from math import ceil, exp, floor, log
@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from pydantic import model_validator as validator
 
-from shipid.hybrid.method import Array, Corrector, FitResult, Index, Method, Row, Task
+from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
@@ -242,25 +242,6 @@ def diverged_result(method: SearchMethod, points: Iterable[Mapping[str, float]])
     return FitResult(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
 
 
-def ridge_trial(
-    task: Task, name: str, ridges: Sequence[float], samples: int, solve: Callable[[Index, Sequence[float]], Corrector]
-) -> tuple[float, float]:
-    """The ridge with the least mean squared error [m^2] of the path per coordinate, over all folds, and that error.
-
-    solve : (indices of training windows, R ridges) -> R correctors in one, which takes R S instants in R blocks.
-    samples : validation windows of a fold that are judged, at most.
-    """
-    errors, physics = np.zeros(len(ridges)), task.cases[name].physics
-    for fold, (training, validation) in enumerate(task.folds):
-        corrector = solve(training, ridges)
-        judged = draw_windows(validation, samples, seed_of(task.seed, fold))
-        instants = task.instants(name).select(np.tile(judged, len(ridges)))
-        paths = np.split(corrector.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
-        errors += [mean_squared_error(path, task.windows.future[:, judged]) for path in paths]
-    best = int(errors.argmin())
-    return ridges[best], float(errors[best]) / len(task.folds)
-
-
 def trial_row(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
     """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
     complete = bool(np.isfinite(value))
@@ -282,13 +263,6 @@ def best_trials(rows: Iterable[Row]) -> list[Row]:
 def windows_of_folds(task: Task) -> Index:
     """Indices of the windows that train or validate in any fold."""
     return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
-
-
-def draw_windows(windows: Index, most: int, seed: int) -> Index:
-    """At most so many of the windows, drawn without replacement, in order."""
-    if len(windows) <= most:
-        return windows
-    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
 
 
 def mean_squared_error(paths: Array, future: Array) -> float:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,7 +22,16 @@ from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.method import Array, Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, ridge_trial, ridge_values
+from shipid.hybrid.search import (
+    LearningProblem,
+    Point,
+    Scale,
+    SearchedAlone,
+    TrialWorth,
+    mean_squared_error,
+    ridge_values,
+    seed_of,
+)
 from shipid.physics.signals import measurable_signals
 
 Acceleration = Callable[[Instants, int, Array], Array]
@@ -196,10 +204,18 @@ class StepProblem(LearningProblem):
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the least error over the ridges, on `samples` of the validation windows of each fold at most."""
-        method, solve = self.method, partial(self.solve_ridges, number, point)
+        method, task, errors = self.method, self.task, np.zeros(())
         ridges = ridge_values(method.ridge, method.RIDGES)
-        ridge, value = ridge_trial(self.task, self.name, ridges, method.samples, solve)
-        return TrialWorth(value, {**point, "ridge": ridge})
+        for fold, (training, judged) in enumerate(task.folds):
+            corrector = self.solve_ridges(number, point, training, ridges)
+            if len(judged) > method.samples:
+                generator = np.random.default_rng(seed_of(task.seed, fold))
+                judged = np.sort(generator.choice(judged, method.samples, replace=False))
+            instants = self.instants.select(np.tile(judged, len(ridges)))
+            paths = np.split(corrector.predict(self.case.physics, instants, np.empty(0)), len(ridges), axis=1)
+            errors = errors + [mean_squared_error(path, self.future[:, judged]) for path in paths]
+        best = int(errors.argmin())
+        return TrialWorth(float(errors[best]) / len(task.folds), {**point, "ridge": ridges[best]})
 
 
 class StepMethod(SearchedAlone):

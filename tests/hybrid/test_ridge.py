@@ -136,29 +136,6 @@ def drawn_parts(seed, models=1):
     return parts, runs, windows
 
 
-@pytest.mark.parametrize(("part_judged", "least", "most"), [(False, 10, 120), (True, 0, 0)])
-def test_a_ridge_that_is_passed_over_would_not_be_chosen(part_judged, least, most):
-    """Not by all folds, nor by all but one; of windows that are judged in part no such bound is known.
-
-    In draw 3026 the ridge that is best over both folds is best over neither of them.
-    """
-    ridges, passed_over = list(np.geomspace(1e-4, 1e4, 9)), 0
-    for seed in (*range(12), 3026):
-        parts, runs, windows = drawn_parts(seed)
-        folds = [(np.setdiff1d(windows, run), run[: len(run) // 2] if part_judged else run) for run in runs]
-        blocks = _fold_blocks(folds, windows)
-        sums, others, errors = _left_out_errors(parts, ridges, blocks, 2, np.ones((9, 1), dtype=bool))
-        one_by_one, but_one = one_by_one_ridge(parts, ridges, blocks)
-        passed = np.isinf(sums).any(axis=1)
-        passed_over += int(passed.sum())
-        np.testing.assert_array_equal(sums[~passed], one_by_one[~passed])
-        np.testing.assert_array_equal(sums.argmin(axis=0), one_by_one.argmin(axis=0))
-        np.testing.assert_array_equal(others.argmin(axis=0), but_one.argmin(axis=0))
-        kept = errors.of(others[:, :, 0].argmin(axis=0), 0)
-        assert np.isfinite(kept[:, np.concatenate([judged for _, judged in folds])].numpy()).all()
-    assert least <= passed_over <= most
-
-
 def one_by_one_ridge(parts, ridges, blocks):
     """Sums of squares over all folds, (ridges, K), and over all but one, (ridges, F, K), of each ridge alone."""
     alone = [_left_out_errors(parts, [ridge], blocks, 2) for ridge in ridges]
@@ -289,17 +266,6 @@ def wind(columns):
         "u_rw": columns["u"] - columns["V_w"] * np.cos(angle),
         "v_rw": columns["v"] - columns["V_w"] * np.sin(angle),
     }
-
-
-@pytest.mark.parametrize("mirror", [0.0, 1.0])
-@pytest.mark.parametrize("pairs", [FOLDS, FOLDS[:1]])
-def test_the_value_of_a_trial_is_the_error_on_windows_it_did_not_see(columns, targets, mirror, pairs):
-    setup = recipe(trials=1, mirror=mirror, ridge=0.01)
-    for key, one in tuned(columns, targets, setup, folds=pairs).items():
-        (row,), (network,) = one.trials, one.corrector.networks
-        assert row["params"]["mirror"] == mirror
-        expected = refitted(network, mirror, 0.01, columns, targets[key], pairs)
-        assert row["value"] == pytest.approx(expected, rel=1e-5)
 
 
 def test_the_compensator_is_the_mean_of_the_best_trials(columns, targets):
