@@ -109,7 +109,7 @@ def calibrate_bands(
     best = None
     for circle in (True, False):
         fitted = _fit_scores(runs, apart, normal, circle)
-        whole = _radii_of_runs(fitted.scores.max(axis=0), runs)
+        whole = band_radii(fitted.scores.max(axis=0), runs)
         size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[judged]
         if best is None or size < TIGHTER * best[0]:
             best = size, fitted, whole
@@ -119,7 +119,7 @@ def calibrate_bands(
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
     by_kind = [  # of too few runs no band is promised, whatever is here
-        band_radii(reach[of == kind], runs.place[of == kind]) if count >= FEWEST else whole
+        band_radii(reach[of == kind], _shares_of_runs(runs.place[of == kind])) if count >= FEWEST else whole
         for kind, count in known.items()
     ]
     return Bands(
@@ -127,7 +127,7 @@ def calibrate_bands(
         along=fitted.scale[:, 0],
         across=fitted.scale[:, 1],
         whole=whole,
-        steps=np.stack([_radii_of_runs(row, runs) for row in fitted.scores], axis=1),
+        steps=np.stack([band_radii(row, runs) for row in fitted.scores], axis=1),
         names=tuple(names),
         centres=centres,
         spread=spread,
@@ -143,16 +143,11 @@ def calibrate_bands(
     )
 
 
-def band_radii(scores: Array, place: NDArray[np.int64]) -> Array:
+def band_radii(scores: Array, runs: _RunShares) -> Array:
     """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
 
-    place : number of the run of each window, (S,). The result depends on the scores by run alone, and not on the
-    order of the runs.
+    The result depends on the scores by run alone, and not on the order of the runs.
     """
-    return _radii_of_runs(scores, _shares_of_runs(place))
-
-
-def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
     order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")

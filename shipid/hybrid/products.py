@@ -18,12 +18,6 @@ def matrix_product(left: Tensor, right: Tensor) -> Tensor:
     return torch.from_numpy(np.matmul(left.numpy(), right.numpy()))
 
 
-def gram_matrix(values: Tensor) -> Tensor:
-    """Return values.T @ values of (S, M), at half of the price of a product."""
-    array = values.numpy()
-    return torch.from_numpy(array.T @ array)  # NumPy sees that one is the other's transpose
-
-
 def hidden_layer(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
     """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
     units = np.matmul(values.numpy(), weight.numpy())
@@ -37,9 +31,3 @@ def _tanh_by_torch() -> bool:
     functions = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")  # empty on some processors
     used = [kind["current"] for kinds in functions.values() for kind in kinds.values()]
     return any(name in ("X86_V3", "FMA3__AVX2") for name in used)  # as NumPy 2.4 calls AVX2, and as 2.3 does
-
-
-def sums_of_squares(values: Tensor) -> Tensor:
-    """Return the sums of squares (F, C) of values (F, b, C) over their rows."""
-    array = values.numpy()
-    return torch.from_numpy(np.einsum("fbc,fbc->fc", array, array))

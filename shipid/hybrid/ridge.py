@@ -29,7 +29,7 @@ from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Compensator, Network, smooth_basis
 from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.products import gram_matrix, hidden_layer, matrix_product, sums_of_squares
+from shipid.hybrid.products import hidden_layer, matrix_product
 from shipid.hybrid.search import (
     CLOSING_TRIALS,
     Point,
@@ -451,7 +451,7 @@ def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor
 
 def _coordinates_with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Coordinate]:
     """Coordinates that are made of the same features."""
-    eigenvalues, axes = torch.linalg.eigh(gram_matrix(features))
+    eigenvalues, axes = torch.linalg.eigh(matrix_product(features.T, features))
     eigenvalues = eigenvalues.clamp(min=0.0)  # rounding makes none negative
     return [
         _Coordinate(features, eigenvalues, axes, side, matrix_product(axes.T, matrix_product(features.T, side)))
@@ -532,8 +532,9 @@ def _left_out_errors(
         for piece in pieces:
             without = piece.solver.without(ridges[i], piece.columns(columns, targets.shape[1]))
             made = piece.block.of_judged(without)
-            squares = sums_of_squares(made).reshape(len(made), len(piece.sides), len(models), terms)
-            by_fold[piece.folds] += squares.sum(dim=(1, 3))
+            squares = np.einsum("fbc,fbc->fc", made.numpy(), made.numpy())
+            shares = torch.from_numpy(squares).reshape(len(made), len(piece.sides), len(models), terms)
+            by_fold[piece.folds] += shares.sum(dim=(1, 3))
             errors.keep(i, piece, models, made)
         sums[i, models] = by_fold.sum(dim=0)
         others[i][:, models] = by_fold.sum(dim=0) - by_fold

@@ -25,19 +25,6 @@ def test_products_are_sums_of_products(dtype: torch.dtype) -> None:
     assert products.matrix_product(left, right.mT).dtype == dtype
 
 
-def test_a_gram_matrix_is_one_of_products() -> None:
-    values = torch.randn(40, 7, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
-    torch.testing.assert_close(
-        products.gram_matrix(values), torch.einsum("si,sj->ij", values, values), rtol=1e-13, atol=1e-13
-    )
-
-
-def test_squares_are_summed_over_rows() -> None:
-    values = torch.randn(3, 4, 5, generator=torch.Generator().manual_seed(4), dtype=torch.float64)
-    for one in (values, values.mT):
-        torch.testing.assert_close(products.sums_of_squares(one), (one**2).sum(1), rtol=1e-13, atol=1e-13)
-
-
 @pytest.mark.parametrize("by_torch", [False, True])
 def test_a_layer_is_the_tanh_of_its_sums(by_torch: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(products, "_tanh_by_torch", lambda: by_torch)
