@@ -152,10 +152,6 @@ class PathDrawn(SearchMethod):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
+        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
 
-        inputs, ridges = self.inputs(task.commands), self.path()
-        recipe = Recipe(
-            self.corrector, inputs, self.units, self.terms, ridges, self.search_windows, self.points, self.left_out
-        )
-        return tune_ridge(task, self, recipe)
+        return tune_ridge(task, self)
