@@ -173,7 +173,9 @@ class Bands(StoredData):
         if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {suggest_name(kind, self.kinds)}")
         if not self.promises(level, kind):
-            raise DataError(sentence_of_few_runs(level, self.runs if kind is None else self.kinds[kind], kind))
+            of, runs = ("", self.runs) if kind is None else (f" of the kind {kind!r}", self.kinds[kind])
+            need = f"a band of {100 * level:g} % needs {runs_needed(level)} runs or more{of} to calibrate it"
+            raise DataError(f"{need}: there are {runs}")
 
     def promises(self, level: float, kind: str | None = None) -> bool:
         """Whether there were enough runs for a level, or enough runs of a kind of manoeuvre."""
@@ -188,12 +190,6 @@ def runs_needed(level: float) -> int:
     G / (G + 1).
     """
     return max(FEWEST, math.ceil(level / (1 - level) - 1e-9))
-
-
-def sentence_of_few_runs(level: float, runs: int, kind: str | None = None) -> str:
-    """One sentence where there are too few runs for a level, or too few of a kind of manoeuvre."""
-    of = "" if kind is None else f" of the kind {kind!r}"
-    return f"a band of {100 * level:g} % needs {runs_needed(level)} runs or more{of} to calibrate it: there are {runs}"
 
 
 def radius_at_level(table: Array, level: float) -> Array:

@@ -115,11 +115,11 @@ def train_stack(
         loss=loss,
         watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
     )
-    layers = [
+    arrays = [
         (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _layer_views(best.kept, widths)
     ]
     losses = torch.where(best.finite & best.best.isfinite(), best.best, torch.nan).cpu().numpy().astype(float)
-    kept = tuple(tuple((w[k], b[k]) for w, b in layers) for k in range(len(members)))
+    kept = tuple(tuple((w[k], b[k]) for w, b in arrays) for k in range(len(members)))
     return TrainedStack(kept, losses, best.epochs.cpu().numpy())
 
 
