@@ -203,13 +203,8 @@ class Method(CheckedModel, BaseModel, ABC):
 
     @property
     def traits(self) -> Traits:
-        """What a study compares this method by: its settings `mirror`, `memory` and `terms`, where it has such."""
-        mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
-        return Traits(
-            mirror > 0 if isinstance(mirror, bool | float) else None,
-            memory if isinstance(memory, Memory) else NO_MEMORY,
-            terms if isinstance(terms, int) else None,
-        )
+        """What a study says of this method and compares it by."""
+        return Traits()
 
     def unfit(self, vessel: Vessel) -> str:
         """Why this method cannot work with a vessel, and what to do, in words; empty where it can."""

@@ -20,7 +20,8 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from pydantic import model_validator as validator
 
-from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task
+from shipid.hybrid.features import NO_MEMORY, Memory
+from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task, Traits
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
@@ -57,6 +58,16 @@ class SearchMethod(Method):
             if low >= high:
                 raise ValueError(f"{name}: a range goes from low to high, got [{low}, {high}]")
         return self
+
+    @property
+    def traits(self) -> Traits:
+        """What a study compares this method by: its settings `mirror`, `memory` and `terms`, where it has such."""
+        mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
+        return Traits(
+            mirror > 0 if isinstance(mirror, bool | float) else None,
+            memory if isinstance(memory, Memory) else NO_MEMORY,
+            terms if isinstance(terms, int) else None,
+        )
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high)."""

@@ -32,7 +32,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "forest": {"trials": 3, "trees": 3},
     "hankel-dmd": {"delays": (2.0, 3.0, 4.0)},
     "learned-force": {"trials": 3, "units": 3, "iterations": 2},
-    "modules": {"trials": 3, "units": 4, "centres": 16},
+    "modules": {"trials": 3, "units": 4, "centres": 16, "ridge": 1e-3},
     "one-step": {"trials": 3, "units": 8, "averaged": 2},
     "path-drawn": {"trials": 3, "units": 8, "averaged": 2},
     "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12), "layers": 1},
