@@ -6,15 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from shipid.data.windows import Instants
-from shipid.hybrid.method import FitResult, Method, Task
+from shipid.hybrid.method import Array, FitResult, Method, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stored import StoredData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

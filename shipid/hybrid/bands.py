@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from shipid.errors import DataError, suggest_name
 from shipid.hybrid.stored import StoredData
-from shipid.metrics import vector_lengths
+from shipid.metrics import Array, vector_lengths
 
-Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 LEVELS = np.arange(1, 100) / 100
 """Levels that the tables of a band hold; between them it interpolates."""
@@ -48,8 +47,7 @@ class Region:
     @property
     def radius(self) -> Array:
         """Radius (T, S) [m] of the circle with the area of the region: the width of a band in one number."""
-        radius: Array = np.sqrt(self.along * self.across)
-        return radius
+        return np.asarray(np.sqrt(self.along * self.across))
 
     def reach(self, errors: Array) -> Array:
         """How far errors (T, S, 2) [m] from the predicted path reach, (T, S): 1 at the border of the region.
@@ -162,8 +160,9 @@ class Bands(StoredData):
         seen = np.clip(
             prediction_traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high
         )
-        size: Array = np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
-        return size
+        return np.asarray(
+            np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
+        )
 
     def check(self, level: float, kind: str | None = None) -> None:
         """Raise DataError, one sentence, where no band of this level can be promised."""
@@ -174,7 +173,9 @@ class Bands(StoredData):
         if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {suggest_name(kind, self.kinds)}")
         if not self.promises(level, kind):
-            raise DataError(sentence_of_few_runs(level, self.runs if kind is None else self.kinds[kind], kind))
+            of, runs = ("", self.runs) if kind is None else (f" of the kind {kind!r}", self.kinds[kind])
+            need = f"a band of {100 * level:g} % needs {runs_needed(level)} runs or more{of} to calibrate it"
+            raise DataError(f"{need}: there are {runs}")
 
     def promises(self, level: float, kind: str | None = None) -> bool:
         """Whether there were enough runs for a level, or enough runs of a kind of manoeuvre."""
@@ -191,23 +192,15 @@ def runs_needed(level: float) -> int:
     return max(FEWEST, math.ceil(level / (1 - level) - 1e-9))
 
 
-def sentence_of_few_runs(level: float, runs: int, kind: str | None = None) -> str:
-    """One sentence where there are too few runs for a level, or too few of a kind of manoeuvre."""
-    of = "" if kind is None else f" of the kind {kind!r}"
-    return f"a band of {100 * level:g} % needs {runs_needed(level)} runs or more{of} to calibrate it: there are {runs}"
-
-
 def radius_at_level(table: Array, level: float) -> Array:
     """Radius for a level from a table (99, ...) for `LEVELS`; below the first level it goes to 0."""
     place = level * 100 - 1
     if place < 0:
-        lowest: Array = np.asarray(table[0] * (place + 1))
-        return lowest
+        return np.asarray(table[0] * (place + 1))
     lower = min(int(place + 1e-9), len(table) - 1)
     share = max(place - lower, 0.0)
     upper = min(lower + 1, len(table) - 1)
-    radius: Array = np.asarray(table[lower] + share * (table[upper] - table[lower]))
-    return radius
+    return np.asarray(table[lower] + share * (table[upper] - table[lower]))
 
 
 def track_directions(paths: Array) -> Array:
@@ -216,8 +209,7 @@ def track_directions(paths: Array) -> Array:
     chords = np.concatenate([paths[1:] - first[:-1], paths[-1:] - first[-1:]])
     size = vector_lengths(chords)
     moves = size > 1e-12 * np.max(size, axis=0, initial=0.0)
-    ahead: Array = np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0])
-    return ahead
+    return np.asarray(np.where(moves[..., None], chords / np.where(moves, size, 1.0)[..., None], [1.0, 0.0]))
 
 
 def split_along_track(errors: Array, ahead: Array) -> tuple[Array, Array]:
@@ -279,8 +271,7 @@ def nearest_distances(
         squares[run_of_centre[:, None] == run] = np.inf
     which = squares.argmin(axis=0)
     away = points - centres[which]  # anew: sums of squares leave half the digits
-    distances: Array = np.sqrt((away**2).mean(axis=1))
-    return distances
+    return np.asarray(np.sqrt((away**2).mean(axis=1)))
 
 
 class AdaptiveState(NamedTuple):

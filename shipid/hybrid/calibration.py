@@ -31,9 +31,8 @@ from shipid.hybrid.bands import (
     split_along_track,
     track_directions,
 )
-from shipid.metrics import vector_lengths
+from shipid.metrics import Array, vector_lengths
 
-Array = NDArray[np.float64]
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 WINDOWS = 60  # of a run that calibrate, at most
@@ -62,11 +61,6 @@ class _RunShares:
     def order(self) -> NDArray[np.int64]:
         """Windows sorted by their run, (S,)."""
         return np.argsort(self.place, kind="stable")
-
-    def by_run(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Sort windows in some order by their run, and within a run in that order."""
-        few = self.place.astype(np.uint16 if self.count < 2**16 else np.int64)  # short numbers are sorted by radix
-        return order[np.argsort(few[order], kind="stable")]
 
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
@@ -115,7 +109,7 @@ def calibrate_bands(
     best = None
     for circle in (True, False):
         fitted = _fit_scores(runs, apart, normal, circle)
-        whole = _radii_of_runs(fitted.scores.max(axis=0), runs)
+        whole = band_radii(fitted.scores.max(axis=0), runs)
         size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[judged]
         if best is None or size < TIGHTER * best[0]:
             best = size, fitted, whole
@@ -125,7 +119,7 @@ def calibrate_bands(
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
     by_kind = [  # of too few runs no band is promised, whatever is here
-        band_radii(reach[of == kind], runs.place[of == kind]) if count >= FEWEST else whole
+        band_radii(reach[of == kind], _shares_of_runs(runs.place[of == kind])) if count >= FEWEST else whole
         for kind, count in known.items()
     ]
     return Bands(
@@ -133,7 +127,7 @@ def calibrate_bands(
         along=fitted.scale[:, 0],
         across=fitted.scale[:, 1],
         whole=whole,
-        steps=np.stack([_radii_of_runs(row, runs) for row in fitted.scores], axis=1),
+        steps=np.stack([band_radii(row, runs) for row in fitted.scores], axis=1),
         names=tuple(names),
         centres=centres,
         spread=spread,
@@ -149,16 +143,11 @@ def calibrate_bands(
     )
 
 
-def band_radii(scores: Array, place: NDArray[np.int64]) -> Array:
+def band_radii(scores: Array, runs: _RunShares) -> Array:
     """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
 
-    place : number of the run of each window, (S,). The result depends on the scores by run alone, and not on the
-    order of the runs.
+    The result depends on the scores by run alone, and not on the order of the runs.
     """
-    return _radii_of_runs(scores, _shares_of_runs(place))
-
-
-def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
     order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")
@@ -169,21 +158,18 @@ def _radii_of_runs(scores: Array, runs: _RunShares) -> Array:
     weights = runs.weight[order]
     at = np.cumsum(weights) - weights / 2
     at = (at - at[0]) / (at[-1] - at[0]) if at[-1] > at[0] else at
-    rising: Array = np.maximum.accumulate(np.interp(wanted, at, scores[order]))
-    return rising
+    return np.asarray(np.maximum.accumulate(np.interp(wanted, at, scores[order])))
 
 
 def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
     """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
     below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
-    by_run = runs.by_run(order)
-    sizes = runs.sizes
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    mine = np.empty(len(order))
-    mine[by_run] = (np.arange(len(order)) - starts[runs.place[by_run]]) / sizes[runs.place[by_run]]
-    shares: Array = np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0)
-    return shares
+    by_run = order[np.argsort(runs.place[order], kind="stable")]
+    sizes, mine = runs.sizes[runs.place], np.empty(len(order))
+    starts = (np.cumsum(runs.sizes) - runs.sizes)[runs.place]
+    mine[by_run] = (np.arange(len(order)) - starts[by_run]) / sizes[by_run]
+    return np.asarray(np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0))
 
 
 def _intraclass_correlation(ranks: Array, runs: _RunShares) -> float:

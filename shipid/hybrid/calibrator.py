@@ -11,17 +11,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs
+from shipid.hybrid.method import Array
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.settings import Scale
+from shipid.hybrid.search import Scale
 
-Array = NDArray[np.float64]
 TRAJECTORY_SIGNALS = ("x", "y", "u", "v", "r")
 
 

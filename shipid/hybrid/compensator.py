@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.hybrid.features import Inputs, select_inputs
+from shipid.hybrid.features import Array, Inputs, select_inputs
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stored import StoredData
 
-Array = NDArray[np.float64]
 Layers = tuple[tuple[Array, Array], ...]
 
 
@@ -117,5 +115,4 @@ def smooth_basis(horizon: int, terms: int) -> Array:
     """Orthonormal polynomials (T, r) of time without a constant: an error starts from 0. r is at most T."""
     time_ = np.arange(1, horizon + 1) / horizon
     powers = np.polynomial.chebyshev.chebvander(2 * time_ - 1, min(terms, horizon) - 1) * time_[:, None]
-    basis: Array = np.linalg.qr(powers)[0]
-    return basis
+    return np.asarray(np.linalg.qr(powers)[0])

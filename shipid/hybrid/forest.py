@@ -19,14 +19,12 @@ from shipid.data.windows import Instants
 from shipid.errors import ShipidError
 from shipid.hybrid.compensator import flatten_paths, smooth_basis, unflatten_paths
 from shipid.hybrid.features import Inputs, Memory, select_inputs
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Array, Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone
-from shipid.hybrid.settings import Point, seed_of
+from shipid.hybrid.search import LearningProblem, Point, SearchedAlone, seed_of
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 
-Array = NDArray[np.float64]
 Leaf = Annotated[float, Field(ge=1.0)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
 LEAF = -1  # the child of a node that has none

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 from pydantic import model_validator as validator
 
@@ -22,15 +21,13 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import MOTIONS, count_steps, feature_table
-from shipid.hybrid.method import Index
+from shipid.hybrid.method import Array, Index
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem
-from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.search import LearningProblem, Point, Scale
 from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs, apply_blocks, solve_ridges
 
-Array = NDArray[np.float64]
 MISSED_NAMES = ("missed.u", "missed.v", "missed.r")
 
 

@@ -11,13 +11,11 @@ import json
 import os
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
-from math import nan
 from pathlib import Path
 from typing import Any
 
 import optuna
-from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState, create_trial
@@ -28,8 +26,7 @@ from shipid.hybrid.method import Row, Space
 
 COUNT = "trials"  # attribute of a study: how many it will have
 DIGEST = "digest"  # attribute of a study: of the plan that it belongs to
-FIXED, NUMBER = "fixed", "number"  # attributes of a trial: all settings in order, null if searched; its place
-CHECKSUM = "crc32"  # attribute of a trial: of its cell and row
+ROW, CHECKSUM = "row", "crc32"  # attributes of a trial: its row as it was added; of its cell and row
 REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
@@ -64,17 +61,12 @@ class Journal:
             raise ResultError(f"the trials of {cell} are of another study; {REMEDY}", file=self.file)
         rows: list[Row] = []
         for trial in study.trials:
-            if trial.user_attrs.get(NUMBER) == len(rows):  # neither one of a dashboard, nor one that came twice
-                rows.append(self._checked_row(cell, len(rows), trial))
+            row, checksum = (trial.user_attrs.get(name) for name in (ROW, CHECKSUM))
+            if trial.state.is_finished() and checksum != _row_checksum(cell, row):
+                raise ResultError(f"damaged: trial {len(rows)} of {cell} is not as written; {REMEDY}", file=self.file)
+            if row is not None and row["number"] == len(rows):  # not one that came twice
+                rows.append(row)
         return rows
-
-    def _checked_row(self, cell: str, number: int, trial: FrozenTrial) -> Row:
-        """A trial as it was added; ResultError if it is damaged."""
-        with suppress(KeyError, TypeError):  # an attribute is missing or is another's
-            row = _row_of_trial(number, trial)
-            if trial.user_attrs[CHECKSUM] == _row_checksum(cell, row):
-                return row
-        raise ResultError(f"damaged: trial {number} of {cell} is not as written; {REMEDY}", file=self.file)
 
     def count(self, cell: str) -> int | None:
         """Return how many trials the budget of a search allowed; None before that is decided."""
@@ -87,9 +79,8 @@ class Journal:
 
     def add(self, rows: Mapping[str, Sequence[Row]], space: Space) -> None:
         """Append trials to searches: cell -> rows, each with the next number."""
-        where = distributions(space)
         for cell, mine in rows.items():
-            self._study(cell).add_trials([frozen_trial(row, where, cell) for row in mine])
+            self._study(cell).add_trials([frozen_trial(row, space, cell) for row in mine])
 
     def _study(self, cell: str) -> optuna.Study:
         """The study of a cell to be written to, made where there is none."""
@@ -118,42 +109,22 @@ def _read_whole_lines(file: Path) -> list[bytes]:
     return lines
 
 
-def distributions(space: Space) -> dict[str, BaseDistribution]:
-    """What Optuna calls the spans and the choices of a method."""
-    drawn: dict[str, BaseDistribution] = {}
-    for name, where in space.items():
-        if isinstance(where, tuple):
-            drawn[name] = CategoricalDistribution(where)
-        elif where.whole:
-            drawn[name] = IntDistribution(int(where.low), int(where.high))
-        else:
-            drawn[name] = FloatDistribution(where.low, where.high, log=where.log)
-    return drawn
-
-
-def frozen_trial(row: Row, where: Mapping[str, BaseDistribution], cell: str = "") -> FrozenTrial:
-    """A trial of a cell that ended, as Optuna keeps it; attributes hold what is not searched, and the order of all."""
-    searched = {name: value for name, value in row["params"].items() if name in where}
+def frozen_trial(row: Row, space: Space, cell: str = "") -> FrozenTrial:
+    """A trial of a cell that ended, as Optuna keeps it; what is not searched stands in its row alone."""
+    searched = {name: value for name, value in row["params"].items() if name in space}
     complete = row["state"] == "complete"
-    fixed = {name: None if name in where else value for name, value in row["params"].items()}
     return create_trial(
         state=TrialState.COMPLETE if complete else TrialState.FAIL,
         value=row["value"] if complete else None,
         params=searched,
-        distributions={name: _widen_distribution(where[name], value) for name, value in searched.items()},
-        user_attrs={
-            "seconds": row["seconds"],
-            "epochs": row["epochs"],
-            FIXED: fixed,
-            NUMBER: row["number"],
-            CHECKSUM: _row_checksum(cell, row),
-        },
+        distributions={name: _widen_distribution(space[name], value) for name, value in searched.items()},
+        user_attrs={ROW: row, CHECKSUM: _row_checksum(cell, row)},
     )
 
 
-def _row_checksum(cell: str, row: Row) -> int:
+def _row_checksum(cell: str, row: Row | None) -> int:
     """CRC-32 of a row of a search."""
-    return zlib.crc32(json.dumps([cell, sorted(row.items())]).encode())
+    return zlib.crc32(json.dumps([cell, row]).encode())
 
 
 def _widen_distribution(where: BaseDistribution, value: float) -> BaseDistribution:
@@ -161,18 +132,6 @@ def _widen_distribution(where: BaseDistribution, value: float) -> BaseDistributi
     if isinstance(where, FloatDistribution) and not where.low <= value <= where.high:
         return FloatDistribution(min(where.low, value), max(where.high, value), log=where.log)
     return where
-
-
-def _row_of_trial(number: int, trial: FrozenTrial) -> Row:
-    complete, known = trial.state == TrialState.COMPLETE, trial.user_attrs
-    return {
-        "number": number,
-        "params": {**known[FIXED], **trial.params},
-        "value": trial.value if complete else nan,
-        "seconds": known["seconds"],
-        "epochs": known["epochs"],
-        "state": "complete" if complete else "diverged",
-    }
 
 
 def merge_journals(files: Iterable[Path], target: Path) -> None:

@@ -14,23 +14,20 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.document import LEAST_NUMBER
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Array, Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_values
-from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, ridge_values, seed_of
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import solve_ridges
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 BLOCK = "hull.learned"
 SCALES = ("u_scale", "v_scale", "r_scale")
 LIMITS = ("X_max", "Y_max", "N_max")

@@ -161,8 +161,6 @@ class FitResult:
 class Traits:
     """What sentences, comparisons and findings of a study know of a method; no number depends on it.
 
-    Those of a `Searched` method follow from its settings called `mirror`, `memory` and `terms`.
-
     mirror : whether it may use that port and starboard are mirror images; None where it has no such choice. One that
         may not, on no physics alone, is the plain rival of the others.
     memory : what its inputs hold of the past. Methods of a kind that differ in it are compared.

@@ -24,10 +24,9 @@ from shipid.errors import ResultError
 from shipid.hybrid.bands import nearest_distances
 from shipid.hybrid.compensator import Normaliser
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Array, Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem
-from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.search import LearningProblem, Point, Scale, seed_of
 from shipid.hybrid.stepping import StepMethod, StepProblem, step_alone, stepped_paths
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import Units, VaryingInputs, apply_blocks, solve_ridges
@@ -35,7 +34,6 @@ from shipid.physics import TERMS
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import term_blocks, upstream_signals
 
-Array = NDArray[np.float64]
 ALARM_MOMENTS = 2000  # moments from which the radius of the alarm is taken, about
 MODULE_ORDER = "rudders", "thrusters", "hull"  # in which they are switched off: a rudder needs its propeller's wash
 
@@ -105,8 +103,7 @@ class Alarm(StoredData):
 
 def _distance_to_centres(z: Array, centres: Array) -> Array:
     """Distance of each point (S, d) to the nearest of the centres (C, d), (S,)."""
-    distances: Array = np.sqrt(z.shape[1]) * nearest_distances(z, centres)
-    return distances
+    return np.asarray(np.sqrt(z.shape[1]) * nearest_distances(z, centres))
 
 
 @dataclass(frozen=True)
@@ -146,8 +143,7 @@ class ModulesCorrector(StoredData):
         table = feature_table(at.columns, self.commands)
         even, _ = self.units.parts(table)
         raw = apply_blocks(even, self.weights.swapaxes(-1, -2))
-        scale: Array = 1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit)
-        return scale
+        return np.asarray(1 + self.alarm.weight(table, self.fade)[:, None] * np.clip(raw, -self.limit, self.limit))
 
 
 class ModulesProblem(StepProblem):

@@ -12,20 +12,16 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.hybrid.features import feature_table
-from shipid.hybrid.method import Index, Row, Task
+from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, windows_of_folds
-from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.search import LearningProblem, Point, Scale, seed_of, windows_of_folds
 from shipid.hybrid.stepping import StepMethod, StepProblem, stepped_paths
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import Units, VaryingInputs, apply_blocks, solve_ridges
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

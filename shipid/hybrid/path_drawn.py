@@ -16,8 +16,7 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import FitResult, Task
-from shipid.hybrid.search import ridge_values, setting_at_share
-from shipid.hybrid.settings import Probability, Scale, SearchMethod, spread_points
+from shipid.hybrid.search import Probability, Scale, SearchMethod, ridge_values, setting_at_share, spread_points
 
 RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory
@@ -153,10 +152,6 @@ class PathDrawn(SearchMethod):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
+        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
 
-        inputs, ridges = self.inputs(task.commands), self.path()
-        recipe = Recipe(
-            self.corrector, inputs, self.units, self.terms, ridges, self.search_windows, self.points, self.left_out
-        )
-        return tune_ridge(task, self, recipe)
+        return tune_ridge(task, self)

@@ -13,7 +13,7 @@ from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveIn
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import FitResult, Task
-from shipid.hybrid.settings import Probability, Scale, SearchMethod
+from shipid.hybrid.search import Probability, Scale, SearchMethod
 
 
 class PathTrained(SearchMethod):

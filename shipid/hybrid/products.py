@@ -1,8 +1,7 @@
-"""Products of matrices for tensors of PyTorch: by NumPy on the processor, by PyTorch on every other device.
+"""Products of matrices for tensors of PyTorch on the processor, by NumPy: both share their memory.
 
-A tensor on the processor is also an array of NumPy, at the same place in memory. On AMD products and functions of NumPy
-take a third to nine tenths of the time of those of PyTorch, except tanh with AVX2 only: docs/performance.md, "Where the
-time goes". Tensors have no gradients here.
+On AMD products and functions of NumPy take a third to nine tenths of the time of those of PyTorch, except tanh with
+AVX2 only: docs/performance.md, "Where the time goes". Tensors have no gradients here.
 """
 
 from __future__ import annotations
@@ -14,30 +13,13 @@ import torch
 from torch import Tensor
 
 
-def is_numpy_tensor(values: Tensor) -> bool:
-    """Whether NumPy computes with a tensor: it is on the processor."""
-    return values.device.type == "cpu"
-
-
 def matrix_product(left: Tensor, right: Tensor) -> Tensor:
     """Return left @ right, of matrices or stacks of them."""
-    if not is_numpy_tensor(left):
-        return left @ right
     return torch.from_numpy(np.matmul(left.numpy(), right.numpy()))
-
-
-def gram_matrix(values: Tensor) -> Tensor:
-    """Return values.T @ values of (S, M), at half of the price of a product."""
-    if not is_numpy_tensor(values):
-        return values.T @ values
-    array = values.numpy()
-    return torch.from_numpy(array.T @ array)  # NumPy sees that one is the other's transpose
 
 
 def hidden_layer(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
     """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
-    if not is_numpy_tensor(values):
-        return torch.addmm(offset, values, weight).tanh_()
     units = np.matmul(values.numpy(), weight.numpy())
     units += offset.numpy()
     return torch.from_numpy(units).tanh_() if _tanh_by_torch() else torch.from_numpy(np.tanh(units, out=units))
@@ -49,11 +31,3 @@ def _tanh_by_torch() -> bool:
     functions = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")  # empty on some processors
     used = [kind["current"] for kinds in functions.values() for kind in kinds.values()]
     return any(name in ("X86_V3", "FMA3__AVX2") for name in used)  # as NumPy 2.4 calls AVX2, and as 2.3 does
-
-
-def sums_of_squares(values: Tensor) -> Tensor:
-    """Return the sums of squares (F, C) of values (F, b, C) over their rows."""
-    if not is_numpy_tensor(values):
-        return values.square().sum(dim=1)
-    array = values.numpy()
-    return torch.from_numpy(np.einsum("fbc,fbc->fc", array, array))

@@ -15,29 +15,20 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
 from shipid.hybrid.compensator import Normaliser, flatten_paths, smooth_basis, unflatten_paths
 from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
-from shipid.hybrid.method import Index, Row, Task
+from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, mean_squared_error
-from shipid.hybrid.settings import Point, Scale, seed_of
+from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, mean_squared_error, seed_of
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Sequences:
-    """What a network reads, normalised: the past with the instant (P + 1, S, d), and inputs at the instant (S, e)."""
-
-    past: Array
-    now: Array
+Sequences = tuple[Array, Array]
+"""What a network reads, normalised: the past with the instant (P + 1, S, d), and inputs at the instant (S, e)."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +48,12 @@ class SequenceReader(StoredData):
     def read(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Sequences:
         """Read instants, with their inputs (S,) as `Inputs.table` gives them."""
         rows = [self.past.apply(signals) for signals in past_signals(instants, self.steps, commands)]
-        return Sequences(np.stack(rows), self.now.apply(table))
+        return np.stack(rows), self.now.apply(table)
 
     def mirrored(self, seen: Sequences) -> Sequences:
         """The image of port and starboard."""
         assert self.mirrors is not None
-        along, at = self.mirrors
-        return Sequences(seen.past @ along, seen.now @ at)
+        return seen[0] @ self.mirrors[0], seen[1] @ self.mirrors[1]
 
 
 def past_signals(instants: Instants, steps: int, commands: tuple[str, ...]) -> list[dict[str, Array]]:
@@ -93,18 +83,17 @@ class GatedNetwork(StoredData):
         return np.tensordot(self.basis, unflatten_paths(outputs), 1)
 
     def _outputs(self, seen: Sequences) -> Array:
-        layers = self.layers
-        hidden = np.zeros((len(seen.now), layers["W_h"].shape[1]))
-        for row in seen.past:
+        layers, (past, now) = self.layers, seen
+        hidden = np.zeros((len(now), layers["W_h"].shape[1]))
+        for row in past:
             a = row @ layers["W_i"].T + layers["b_i"]
             b = hidden @ layers["W_h"].T + layers["b_h"]
             reset, update, fresh = np.split(a, 3, axis=1)
             reset_h, update_h, fresh_h = np.split(b, 3, axis=1)
             gate = _logistic(update + update_h)
             hidden = (1 - gate) * np.tanh(fresh + _logistic(reset + reset_h) * fresh_h) + gate * hidden
-        full = np.concatenate([hidden, seen.now], axis=1)
-        outputs: Array = np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
-        return outputs
+        full = np.concatenate([hidden, now], axis=1)
+        return np.asarray(np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"])
 
 
 def _logistic(values: Array) -> Array:
@@ -180,7 +169,7 @@ class RecurrentProblem(LearningProblem):
         for windows in self.task.folds[fold]:
             seen = reader.read(self._rows(windows), self.instants.select(windows), self.task.commands)
             both = [seen] if reader.mirrors is None else [seen, reader.mirrored(seen)]
-            parts.append(([(one.past, one.now) for one in both], flatten_paths(self.weights[:, windows]) / scale))
+            parts.append((both, flatten_paths(self.weights[:, windows]) / scale))
         seed = seed_of(self.task.seed, self.name, number, fold)
         length = Length(method.epochs, method.batch, method.patience)
         layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)

@@ -15,7 +15,7 @@ The best ones are judged once more, and solved, with all of them: successive hal
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -26,12 +26,20 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from shipid.data.windows import choose_evenly
-from shipid.hybrid.compensator import Compensator, Network, smooth_basis
-from shipid.hybrid.features import Inputs, input_group
+from shipid.hybrid.compensator import Network, smooth_basis
+from shipid.hybrid.features import input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.products import gram_matrix, hidden_layer, matrix_product, sums_of_squares
-from shipid.hybrid.search import CLOSING_TRIALS, Search, diverged_result, trial_row, windows_of_folds
-from shipid.hybrid.settings import Point, SearchMethod, seed_of
+from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.products import hidden_layer, matrix_product
+from shipid.hybrid.search import (
+    CLOSING_TRIALS,
+    Point,
+    Search,
+    diverged_result,
+    seed_of,
+    trial_row,
+    windows_of_folds,
+)
 from shipid.hybrid.units import Units, VaryingInputs
 
 Mask = NDArray[np.bool_]
@@ -42,30 +50,9 @@ GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
 SPARE_TRIALS = 4  # further trials whose errors without each run are kept
 LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
-ROUNDING = 1e-3  # by which a sum of squares must be greater for sure: a hundred times what `LEAST_PIVOT` leaves
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """How networks are drawn and solved.
-
-    corrector : the class of what they make. inputs : which quantities they may take. units : hidden units drawn.
-    terms : polynomials of time.
-    ridges : those of which a trial takes one for each model, rising. search_windows : how many judge all trials, about.
-    points : gives the trials anew. left_out : trial -> kinds of memory that it does without.
-    """
-
-    corrector: type[Compensator]
-    inputs: Inputs
-    units: int
-    terms: int
-    ridges: Sequence[float]
-    search_windows: int
-    points: Callable[[], Iterable[Point]]
-    left_out: Callable[[Point], frozenset[str]]
-
-
-def tune_ridge(task: Task, method: SearchMethod, recipe: Recipe) -> dict[str, FitResult]:
+def tune_ridge(task: Task, method: PathDrawn) -> dict[str, FitResult]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -73,7 +60,7 @@ def tune_ridge(task: Task, method: SearchMethod, recipe: Recipe) -> dict[str, Fi
     of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
     chooses the trials that are judged by all, and of these the best make the compensator.
     """
-    tuning = _RidgeTuning(task, method, recipe)
+    tuning = _RidgeTuning(task, method)
     tuning.search()
     return {key: tuning.fitted(key) for key in task.cases}
 
@@ -94,8 +81,8 @@ class _Coordinate:
 
     def rotated(self, windows: Tensor) -> Tensor:
         """Features of some windows (...) on the axes, (..., M)."""
-        every = torch.arange(len(self.features), device=windows.device)
-        return matrix_product(self.features if torch.equal(windows, every) else self.features[windows], self.axes)
+        every = torch.equal(windows, torch.arange(len(self.features)))
+        return matrix_product(self.features if every else self.features[windows], self.axes)
 
     def weights(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """Weights (M, C) of the axes, fitted to all windows, for some columns of the targets."""
@@ -151,7 +138,7 @@ class _JudgingWindows:
         ]
         judged = np.concatenate([validation for _, validation in folds])
         faster = {key: _unfollowed_squares(paths[:, judged], basis) for key, paths in targets.items()}
-        return cls(rows, len(rows) / len(windows), _fold_blocks(folds, taken, task.device), faster, len(judged))
+        return cls(rows, len(rows) / len(windows), _fold_blocks(folds, taken), faster, len(judged))
 
 
 @dataclass(frozen=True)
@@ -211,16 +198,16 @@ class _RidgeTuning:
     windows as judges; first : those that judge all trials. rows : of each foundation, its trials.
     """
 
-    def __init__(self, task: Task, method: SearchMethod, recipe: Recipe) -> None:
-        self.task, self.method, self.recipe = task, method, recipe
+    def __init__(self, task: Task, method: PathDrawn) -> None:
+        self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
         self.windows, self.targets = windows_of_folds(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
-        tables = _tables_of_windows(shared_tables(task, recipe.inputs), self.windows)
+        tables = _tables_of_windows(shared_tables(task, self.inputs), self.windows)
         self.tables = {key: tables[key] for key in sound}
-        self.basis = smooth_basis(task.windows.horizon, recipe.terms)
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
         self.every = _JudgingWindows.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
-        rows = part_of_runs(task.windows.run[self.windows], recipe.search_windows)
+        rows = part_of_runs(task.windows.run[self.windows], method.search_windows)
         lacks = any(not np.isin(part, self.windows[rows]).any() for fold in task.folds for part in fold)
         self.whole = len(rows) == len(self.windows) or lacks  # no fold may lose all windows of a part
         self.first = self.every if self.whole else _JudgingWindows.of(task, self.windows, rows, sound, self.basis)
@@ -236,7 +223,7 @@ class _RidgeTuning:
         closing = CLOSING_TRIALS if self.whole else FINAL_PRICE * self.finalists
         search = Search(self.task, self.paths, self.method, again=True, closing=closing)
         promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.paths}
-        for number, point in search.left(self.recipe.points() if self.paths else ()):
+        for number, point in search.left(self.method.points() if self.paths else ()):
             self.points[number] = point
             made: dict[str, Row] = {}
             for group in self._groups(number):
@@ -281,39 +268,37 @@ class _RidgeTuning:
         With a single fold there are none: nothing but that fold can choose the trials that judge it.
         """
         if key not in self.best:
-            return diverged_result(self.method, self.recipe.points())
+            return diverged_result(self.method, self.method.points())
         best, errors = self.best[key], None
-        folds = [row.cpu().numpy() for block in self.every.blocks for row in block.rows]
+        folds = [row.numpy() for block in self.every.blocks for row in block.rows]
         if len(folds) > 1:
             missed = np.tensordot(self.basis, best.without(folds), (1, 2)).transpose(0, 2, 1)
             errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
             errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
         params, networks = zip(*(kept for _, kept in best.networks), strict=True)
-        corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
+        corrector, rows = self.method.corrector(self.inputs, networks, params[0]), self.rows[key]
         return FitResult(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
     def _groups(self, number: int, *, whole: bool = False) -> list[_FoundationGroup]:
         """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""
-        left_out = self.recipe.left_out(self.points[number])
+        left_out = self.method.left_out(self.points[number])
         if left_out not in self.groups:
-            self.groups[left_out] = _group_foundations(
-                self.tables, self.paths, left_out, len(self.windows), self.task.device
-            )
+            self.groups[left_out] = _group_foundations(self.tables, self.paths, left_out)
         if whole or self.whole:
             return self.groups[left_out]
-        rows = torch.as_tensor(self.first.rows, device=self.task.device)
+        rows = torch.as_tensor(self.first.rows)
         return [group.of_rows(rows) for group in self.groups[left_out]]
 
     def _judge(
         self, group: _FoundationGroup, number: int, judges: _JudgingWindows, wanted: Mapping[str, Index] | None = None
     ) -> dict[str, _TrialVerdict]:
         """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
-        point, terms, ridges = self.points[number], self.basis.shape[1], self.recipe.ridges
+        point, terms, ridges = self.points[number], self.basis.shape[1], self.method.path()
         mirrored = bool(point["mirror"]) and group.mirrored is not None
         seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
-        units = seen.draw(point, self.recipe.units, seed_of(self.task.seed, number))
+        units = seen.draw(point, self.method.units, seed_of(self.task.seed, number))
         layer = _hidden_weights(units)  # the same array for all foundations
-        parts = _coordinates_of_trial(values, units, group.outputs, self.task.device)
+        parts = _coordinates_of_trial(values, units, group.outputs)
         asked = None
         if wanted is not None:
             asked = np.stack([np.isin(range(len(ridges)), wanted[key]) for key in group.names], axis=1)
@@ -370,23 +355,17 @@ def _tables_of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index
 
 
 def _group_foundations(
-    tables: Mapping[str, Mapping[str, Array]],
-    paths: Mapping[str, Array],
-    left_out: frozenset[str],
-    num_windows: int,
-    device: str,
+    tables: Mapping[str, Mapping[str, Array]], paths: Mapping[str, Array], left_out: frozenset[str]
 ) -> list[_FoundationGroup]:
     """Foundations with the same inputs together; `left_out` names kinds of memory that the trial does not take."""
-    alike: dict[Any, list[str]] = {}
-    seen: dict[Any, dict[str, Array]] = {}
+    alike: dict[Any, tuple[dict[str, Array], list[str]]] = {}
     for key, table in tables.items():
         taken = {name: values for name, values in table.items() if input_group(name) not in left_out}
-        alike.setdefault(input_table_key(taken), []).append(key)
-        seen[input_table_key(taken)] = taken
+        alike.setdefault(input_table_key(taken), (taken, []))[1].append(key)
     groups = []
-    for table_key, keys in alike.items():
-        outputs = [_stacked_side([paths[key] for key in keys], axis, num_windows, device) for axis in (0, 1)]
-        plain, mirrored = (_normalised_inputs(seen[table_key], device, mirror=mirror) for mirror in (False, True))
+    for table, keys in alike.values():
+        outputs = [_double_tensor(np.concatenate([paths[key][..., axis].T for key in keys], axis=1)) for axis in (0, 1)]
+        plain, mirrored = (_normalised_inputs(table, mirror) for mirror in (False, True))
         groups.append(
             _FoundationGroup(tuple(keys), outputs, plain, mirrored if mirrored[0].reflection is not None else None)
         )
@@ -413,43 +392,38 @@ class _FoldBlock:
     def rows(self) -> Tensor:
         return self.out.take_along_dim(self.judged, dim=1)
 
-    @property
-    def all_judged(self) -> bool:
-        return self.judged.shape == self.out.shape
-
     def of_judged(self, errors: Tensor) -> Tensor:
         """Those of errors (folds, b, K r) of what is left out that are judged, (folds, j, K r)."""
-        return errors if self.all_judged else errors.take_along_dim(self.judged[:, :, None], dim=1)
+        every = self.judged.shape == self.out.shape
+        return errors if every else errors.take_along_dim(self.judged[:, :, None], dim=1)
 
 
-def _fold_blocks(folds: Sequence[tuple[Index, Index]], windows: Index, device: str) -> list[_FoldBlock]:
+def _fold_blocks(folds: Sequence[tuple[Index, Index]], windows: Index) -> list[_FoldBlock]:
     """What each fold leaves out, and which of it is judged, equal sizes together."""
     pairs: dict[tuple[int, int], list[tuple[Index, Index]]] = {}
     for training, validation in folds:
         out = np.flatnonzero(~np.isin(windows, training))
         judged = np.flatnonzero(np.isin(windows[out], validation))
         pairs.setdefault((len(out), len(judged)), []).append((out, judged))
-    stacked = [tuple(np.stack(parts) for parts in zip(*same, strict=True)) for same in pairs.values()]
     return [
-        _FoldBlock(torch.as_tensor(out, device=device), torch.as_tensor(judged, device=device))
-        for out, judged in stacked
+        _FoldBlock(*(torch.as_tensor(np.stack(part)) for part in zip(*same, strict=True))) for same in pairs.values()
     ]
 
 
-def _normalised_inputs(table: Mapping[str, Array], device: str, *, mirror: bool) -> Seeing:
+def _normalised_inputs(table: Mapping[str, Array], mirror: bool) -> Seeing:
     """Choose and normalise the inputs; with a mirror, by the windows and their images."""
     seen = VaryingInputs.of(table, mirror)
-    return seen, _double_tensor(seen.normaliser.apply(table), device)
+    return seen, _double_tensor(seen.normaliser.apply(table))
 
 
-def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor], device: str) -> list[_Coordinate]:
+def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor]) -> list[_Coordinate]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
-    weight, offset = (_double_tensor(part, device) for part in (units.weight, units.offset))
+    weight, offset = (_double_tensor(part) for part in (units.weight, units.offset))
     size = len(offset) ** 0.5
     features = hidden_layer(values, weight, offset)
     if units.reflection is None:
         return _coordinates_with_axes(features.div_(size), outputs)
-    image = hidden_layer(values, _double_tensor(units.reflection, device) @ weight, offset)
+    image = hidden_layer(values, _double_tensor(units.reflection) @ weight, offset)
     even = (features + image).div_(2**0.5 * size)
     odd = features.sub_(image).div_(2**0.5 * size)
     return _coordinates_with_axes(even, outputs[:1]) + _coordinates_with_axes(odd, outputs[1:])
@@ -457,7 +431,7 @@ def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor
 
 def _coordinates_with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Coordinate]:
     """Coordinates that are made of the same features."""
-    eigenvalues, axes = torch.linalg.eigh(gram_matrix(features))
+    eigenvalues, axes = torch.linalg.eigh(matrix_product(features.T, features))
     eigenvalues = eigenvalues.clamp(min=0.0)  # rounding makes none negative
     return [
         _Coordinate(features, eigenvalues, axes, side, matrix_product(axes.T, matrix_product(features.T, side)))
@@ -481,10 +455,10 @@ class _LeftOutErrors:
         selected = torch.full((2, self.num_windows, self.terms), torch.nan, dtype=torch.float32)
         for ridge in np.unique(ridges):
             for piece, models, errors in self.blocks[ridge]:
-                mine = torch.as_tensor(ridges[piece.folds] == ridge, device=errors.device)
-                rows, first = piece.block.rows[mine].cpu(), models.index(model) * self.terms
+                mine = torch.as_tensor(ridges[piece.folds] == ridge)
+                rows, first = piece.block.rows[mine], models.index(model) * self.terms
                 for side, of_side in zip(piece.sides, errors.chunk(len(piece.sides), dim=2), strict=True):
-                    selected[side, rows] = of_side[mine, :, first : first + self.terms].cpu()
+                    selected[side, rows] = of_side[mine, :, first : first + self.terms]
         return selected
 
 
@@ -501,11 +475,8 @@ def _left_out_errors(
     descends from the middle of the ridges: those on either side are taken one by one, as long as the last one is the
     best so far by all folds, or by all but one of them.
 
-    A run left out is never predicted better than with itself in the fit. So a ridge whose fit already misses more than
-    other ridges do on runs left out is passed over: it would not be chosen, neither by all folds nor by all but one.
-
     Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
-    errors. The sums of a ridge that is passed over, or not asked, are infinite.
+    errors. The sums of a ridge that is not asked are infinite.
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
     pieces = []
@@ -517,15 +488,6 @@ def _left_out_errors(
     sums = targets.new_full((len(ridges), num_models), torch.inf)
     others = targets.new_full((len(ridges), ends[-1], num_models), torch.inf)
     errors = _LeftOutErrors(len(targets), terms, len(ridges))
-    bounded = all(block.all_judged for block in blocks)  # what is left out is, not every part of it
-
-    def but_one(made: Sequence[Tensor], count: int) -> tuple[Tensor, Tensor]:
-        """Sums of squares over all folds, (count,), and over all but one, (F, count), of so many models."""
-        by_fold = targets.new_zeros((ends[-1], count))
-        for piece, one in zip(pieces, made, strict=True):
-            squares = sums_of_squares(one).reshape(len(one), len(piece.sides), count, terms)
-            by_fold[piece.folds] += squares.sum(dim=(1, 3))
-        return by_fold.sum(dim=0), by_fold.sum(dim=0) - by_fold
 
     def best_at(i: int) -> list[int]:
         """Models for which ridge i is the best so far, by all folds or by all but one."""
@@ -546,20 +508,17 @@ def _left_out_errors(
         if not models:
             continue
         columns = None if len(models) == num_models else [k * terms + term for k in models for term in range(terms)]
-        missed = [piece.solver.missed(ridges[i], piece.columns(columns, targets.shape[1])) for piece in pieces]
-        if bounded and all(
-            (least > (1 + ROUNDING) * known[..., models].amin(dim=0)).all()
-            for least, known in zip(but_one(missed, len(models)), (sums, others), strict=True)
-        ):
-            continue
-        made = [
-            piece.block.of_judged(piece.solver.without(ridges[i], one, piece.columns(columns, targets.shape[1])))
-            for piece, one in zip(pieces, missed, strict=True)
-        ]
-        sums[i, models], others[i][:, models] = but_one(made, len(models))
-        for piece, one in zip(pieces, made, strict=True):
-            errors.keep(i, piece, models, one)
-    return sums.cpu().numpy(), others.cpu().numpy(), errors
+        by_fold = targets.new_zeros((ends[-1], len(models)))
+        for piece in pieces:
+            without = piece.solver.without(ridges[i], piece.columns(columns, targets.shape[1]))
+            made = piece.block.of_judged(without)
+            squares = np.einsum("fbc,fbc->fc", made.numpy(), made.numpy())
+            shares = torch.from_numpy(squares).reshape(len(made), len(piece.sides), len(models), terms)
+            by_fold[piece.folds] += shares.sum(dim=(1, 3))
+            errors.keep(i, piece, models, made)
+        sums[i, models] = by_fold.sum(dim=0)
+        others[i][:, models] = by_fold.sum(dim=0) - by_fold
+    return sums.numpy(), others.numpy(), errors
 
 
 def _join_alike_sides(parts: Sequence[_Coordinate]) -> Iterator[tuple[tuple[int, ...], _Coordinate]]:
@@ -606,18 +565,15 @@ class _FewRows:
         self.flat, self.targets = self.exact.float(), part.targets[out].float()
         self.rows = self.flat.view(*self.shape, -1)
         self.columns = self.rows.mT.contiguous()
-        self.unit = torch.eye(self.shape[1], device=out.device)
+        self.unit = torch.eye(self.shape[1])
 
-    def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
-        """What the fit of all windows misses of some columns of the targets, (folds, b, C), in single precision."""
-        fitted = matrix_product(self.flat, self.part.weights(ridge, columns).float())
-        return torch.sub(self.targets[:, columns], fitted, out=fitted).view(*self.shape, -1)
-
-    def without(self, ridge: float, missed: Tensor, columns: list[int] | slice) -> Tensor:
-        """What a fit without each block misses of it; by Cholesky's factors of I - H_bb.
+    def without(self, ridge: float, columns: list[int] | slice) -> Tensor:
+        """What a fit without each block misses of some columns of the targets; by Cholesky's factors of I - H_bb.
 
         In double precision for blocks with a squared pivot below `LEAST_PIVOT`, which limits the digits.
         """
+        fitted = matrix_product(self.flat, self.part.weights(ridge, columns).float())
+        missed = torch.sub(self.targets[:, columns], fitted, out=fitted).view(*self.shape, -1)
         diagonal = self.part.eigenvalues + ridge
         hat = matrix_product(self.rows, self.columns * (1 / diagonal).float()[:, None])
         lower, failed = torch.linalg.cholesky_ex(torch.sub(self.unit, hat, out=hat))
@@ -633,11 +589,9 @@ class _FewRows:
         """Errors of some of the blocks without themselves, (folds, b, C), in double precision."""
         rows = self.exact.view(*self.shape, -1)[folds]
         weighted = rows / diagonal
-        remainder = self.unit.double() - matrix_product(weighted, rows.mT)
-        missed = self.part.targets[:, columns][self.block.out[folds]] - matrix_product(
-            weighted, self.part.product[:, columns]
-        )
-        solved: Tensor = torch.linalg.solve(remainder, missed)
+        fitted = matrix_product(weighted, self.part.product[:, columns])
+        missed = self.part.targets[:, columns][self.block.out[folds]] - fitted
+        solved: Tensor = torch.linalg.solve(self.unit.double() - matrix_product(weighted, rows.mT), missed)
         return solved
 
 
@@ -650,11 +604,7 @@ class _ManyRows:
         self.within = matrix_product(self.rows.mT, self.rows)
         self.other = part.product - matrix_product(self.rows.mT, self.targets)
 
-    def missed(self, ridge: float, columns: list[int] | slice) -> Tensor:
-        """What the fit of all windows misses of some columns of the targets, (folds, b, C)."""
-        return self.targets[..., columns] - matrix_product(self.rows, self.part.weights(ridge, columns))
-
-    def without(self, ridge: float, _: Tensor, columns: list[int] | slice) -> Tensor:
+    def without(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """What a fit without each block misses of it."""
         remainder = torch.diag(self.part.eigenvalues + ridge) - self.within
         solved = torch.linalg.solve(remainder, self.other[..., columns])
@@ -678,19 +628,12 @@ def _solved_network(
     basis: Array,
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
-    x, y = ((part.axes @ part.weights(ridge, columns)).cpu().numpy() / part.features.shape[1] ** 0.5 for part in parts)
+    x, y = ((part.axes @ part.weights(ridge, columns)).numpy() / part.features.shape[1] ** 0.5 for part in parts)
     if seen.reflection is not None:
         x, y = np.concatenate([x, x]) / 2**0.5, np.concatenate([y, -y]) / 2**0.5
     output = np.concatenate([x, y], axis=1)
     return Network(seen.features, seen.normaliser, basis, (layer, (output, np.zeros(output.shape[1]))))
 
 
-def _stacked_side(paths: Sequence[Array], axis: int, num_windows: int, device: str) -> Tensor:
-    """One coordinate of the paths (r, S, 2) of all models, (S, K r)."""
-    return _double_tensor(
-        np.concatenate([np.zeros((num_windows, 0)), *(path[..., axis].T for path in paths)], axis=1), device
-    )
-
-
-def _double_tensor(values: Array, device: str) -> Tensor:
-    return torch.as_tensor(values, dtype=torch.float64, device=device)
+def _double_tensor(values: Array) -> Tensor:
+    return torch.as_tensor(values, dtype=torch.float64)

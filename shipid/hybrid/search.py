@@ -8,23 +8,113 @@ ones; the number is written down before it is used, and read back.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice
 from math import ceil, exp, floor, log
 from statistics import fmean
-from typing import Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
+from zlib import crc32
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import model_validator as validator
 
-from shipid.hybrid.method import Corrector, FitResult, Index, Row, Task
-from shipid.hybrid.settings import Point, SearchMethod, seed_of, spread_points
+from shipid.hybrid.features import NO_MEMORY, Memory
+from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task, Traits
 
-Array = NDArray[np.float64]
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
+Point = Mapping[str, float]
+"""A trial: values of hyperparameters by name."""
 Any_ = TypeVar("Any_")
 TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
 CLOSING_TRIALS = 1  # trials that the last fit costs, about
+
+
+class SearchMethod(Method):
+    """A method that tries sets of hyperparameters and keeps the best by validation.
+
+    SEARCHED : names of the settings that may be ranges, searched by their logarithm. LINEAR : those of them that are
+        not, such as a share from 0 to 1. COUNTS : those that are whole numbers.
+
+    Parameters
+    ----------
+    trials : sets of hyperparameters tried per foundation.
+    budget : core-seconds [s] per foundation for the whole fit, in place of `trials`: as many trials are made as fit,
+        by the time that the first ones take (`shipid.hybrid.search`), one at least.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ()
+    COUNTS: ClassVar[tuple[str, ...]] = ()
+    LINEAR: ClassVar[tuple[str, ...]] = ()
+
+    trials: PositiveInt = 50
+    budget: PositiveFloat | None = None
+
+    @validator(mode="after")
+    def _ranges_rise(self) -> Self:
+        for name, (low, high) in self.ranges().items():
+            if low >= high:
+                raise ValueError(f"{name}: a range goes from low to high, got [{low}, {high}]")
+        return self
+
+    @property
+    def traits(self) -> Traits:
+        """What a study compares this method by: its settings `mirror`, `memory` and `terms`, where it has such."""
+        mirror, memory, terms = (getattr(self, name, None) for name in ("mirror", "memory", "terms"))
+        return Traits(
+            mirror > 0 if isinstance(mirror, bool | float) else None,
+            memory if isinstance(memory, Memory) else NO_MEMORY,
+            terms if isinstance(terms, int) else None,
+        )
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return what is to be searched: name -> (low, high)."""
+        return {name: value for name in self.SEARCHED if isinstance(value := getattr(self, name), tuple)}
+
+    def varied(self) -> tuple[str, ...]:
+        """Return the names of the hyperparameters that differ between trials."""
+        return tuple(self.ranges())
+
+    def num_trials(self) -> int | None:
+        """Return how many sets of hyperparameters are tried per foundation; None where the budget decides it."""
+        return None if self.budget else self.trials
+
+    def choices(self) -> dict[str, tuple[float, ...]]:
+        """Return what is searched among some values: name -> values."""
+        return {}
+
+    def space(self) -> dict[str, Any]:
+        """Return where each hyperparameter that differs between trials is searched, as Optuna's distributions."""
+        from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution  # slow to import
+
+        space: dict[str, Any] = {}
+        for name, (low, high) in self.ranges().items():
+            log = name not in self.LINEAR
+            space[name] = (
+                IntDistribution(int(low), int(high)) if name in self.COUNTS else FloatDistribution(low, high, log=log)
+            )
+        return space | {name: CategoricalDistribution(values) for name, values in self.choices().items()}
+
+
+def spread_points(num_dims: int, num_points: int | None = None) -> Iterator[list[float]]:
+    """Spread points evenly over the unit cube, any number of them, the first in the middle: an additive recurrence.
+
+    Point k is frac(1/2 + k / phi^j) in dimension j = 1 ... d with phi^(d+1) = phi + 1 (Roberts, "The unreasonable
+    effectiveness of quasirandom sequences", 2018). Without a number of points it never ends.
+    """
+    phi = 2.0
+    for _ in range(60):  # the fixed point phi = (1 + phi)^(1 / (d + 1)) contracts by at least a half
+        phi = (1.0 + phi) ** (1.0 / (num_dims + 1))
+    for k in count() if num_points is None else range(num_points):
+        yield [(0.5 + k / phi**j) % 1.0 for j in range(1, num_dims + 1)]
+
+
+def seed_of(*entropy: int | str) -> int:
+    """Draw a seed from numbers and names, the same on every machine."""
+    words = [crc32(part.encode()) if isinstance(part, str) else part for part in entropy]
+    return int(np.random.SeedSequence(words).generate_state(1)[0])
 
 
 def affordable_trials(
@@ -163,25 +253,6 @@ def diverged_result(method: SearchMethod, points: Iterable[Mapping[str, float]])
     return FitResult(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
 
 
-def ridge_trial(
-    task: Task, name: str, ridges: Sequence[float], samples: int, solve: Callable[[Index, Sequence[float]], Corrector]
-) -> tuple[float, float]:
-    """The ridge with the least mean squared error [m^2] of the path per coordinate, over all folds, and that error.
-
-    solve : (indices of training windows, R ridges) -> R correctors in one, which takes R S instants in R blocks.
-    samples : validation windows of a fold that are judged, at most.
-    """
-    errors, physics = np.zeros(len(ridges)), task.cases[name].physics
-    for fold, (training, validation) in enumerate(task.folds):
-        corrector = solve(training, ridges)
-        judged = draw_windows(validation, samples, seed_of(task.seed, fold))
-        instants = task.instants(name).select(np.tile(judged, len(ridges)))
-        paths = np.split(corrector.predict(physics, instants, np.empty(0)), len(ridges), axis=1)
-        errors += [mean_squared_error(path, task.windows.future[:, judged]) for path in paths]
-    best = int(errors.argmin())
-    return ridges[best], float(errors[best]) / len(task.folds)
-
-
 def trial_row(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
     """The row of a trial that began at `start` by `time.process_time`; not a number where it diverged."""
     complete = bool(np.isfinite(value))
@@ -203,13 +274,6 @@ def best_trials(rows: Iterable[Row]) -> list[Row]:
 def windows_of_folds(task: Task) -> Index:
     """Indices of the windows that train or validate in any fold."""
     return np.unique(np.concatenate([part for fold in task.folds for part in fold]))
-
-
-def draw_windows(windows: Index, most: int, seed: int) -> Index:
-    """At most so many of the windows, drawn without replacement, in order."""
-    if len(windows) <= most:
-        return windows
-    return np.sort(np.random.default_rng(seed).choice(windows, most, replace=False))
 
 
 def mean_squared_error(paths: Array, future: Array) -> float:

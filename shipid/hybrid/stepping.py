@@ -11,24 +11,29 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveInt
 
 from shipid.data.windows import Instants, Windows
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.errors import DataError
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.method import Index, Task
+from shipid.hybrid.method import Array, Index, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, SearchedAlone, TrialWorth, ridge_trial, ridge_values
-from shipid.hybrid.settings import Point, Scale
+from shipid.hybrid.search import (
+    LearningProblem,
+    Point,
+    Scale,
+    SearchedAlone,
+    TrialWorth,
+    mean_squared_error,
+    ridge_values,
+    seed_of,
+)
 from shipid.physics.signals import measurable_signals
 
-Array = NDArray[np.float64]
 Acceleration = Callable[[Instants, int, Array], Array]
 STEPWISE_FROM = 2000  # steps of paths, asked for one by one: below it compiling C costs more than it saves
 VELOCITY_LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
@@ -199,10 +204,18 @@ class StepProblem(LearningProblem):
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the least error over the ridges, on `samples` of the validation windows of each fold at most."""
-        method, solve = self.method, partial(self.solve_ridges, number, point)
+        method, task, errors = self.method, self.task, np.zeros(())
         ridges = ridge_values(method.ridge, method.RIDGES)
-        ridge, value = ridge_trial(self.task, self.name, ridges, method.samples, solve)
-        return TrialWorth(value, {**point, "ridge": ridge})
+        for fold, (training, judged) in enumerate(task.folds):
+            corrector = self.solve_ridges(number, point, training, ridges)
+            if len(judged) > method.samples:
+                generator = np.random.default_rng(seed_of(task.seed, fold))
+                judged = np.sort(generator.choice(judged, method.samples, replace=False))
+            instants = self.instants.select(np.tile(judged, len(ridges)))
+            paths = np.split(corrector.predict(self.case.physics, instants, np.empty(0)), len(ridges), axis=1)
+            errors = errors + [mean_squared_error(path, self.future[:, judged]) for path in paths]
+        best = int(errors.argmin())
+        return TrialWorth(float(errors[best]) / len(task.folds), {**point, "ridge": ridges[best]})
 
 
 class StepMethod(SearchedAlone):

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from torch import Tensor
 
-Array = NDArray[np.float64]
+from shipid.hybrid.method import Array
+
 Layers = tuple[tuple[Array, Array], ...]
 Stack = Sequence[tuple[Tensor, Tensor]]
 Masks = Sequence[Tensor | None]
@@ -47,43 +48,16 @@ class Length:
 
 
 @dataclass(frozen=True)
-class StackSettings:
-    """Structure and length shared by a stack, and the hyperparameters of each of its K members.
-
-    Parameters
-    ----------
-    layers, units : hidden layers of tanh, and the one width of all of them.
-    learning_rate : (K,) rate of each member.
-    weight_decay : (K,) decoupled decay (AdamW); 0 is Adam.
-    input_dropout, hidden_dropout : (K,) probability in [0, 1] that an input or a hidden unit is dropped.
-    length : of the training.
-    """
-
-    layers: int
-    units: int
-    learning_rate: tuple[float, ...]
-    weight_decay: tuple[float, ...]
-    input_dropout: tuple[float, ...]
-    hidden_dropout: tuple[float, ...]
-    length: Length
-
-
-@dataclass(frozen=True)
 class TrainedStack:
     """What a stack of K members learned: the weights of its best epoch.
 
-    Parameters
-    ----------
-    layers : K tuples of (weight (i, o), bias (o,)) per layer.
-    loss : (K,) best validation loss [m^2], per coordinate; NaN where it never was a number.
-    epochs : (K,) epochs until the member stopped.
-    status : K times `ok`, or `diverged` where a loss stopped being a number.
+    layers : K tuples of (weight (i, o), bias (o,)) per layer. epochs : (K,) until the member stopped.
+    loss : (K,) best validation loss [m^2], per coordinate; NaN where a loss stopped being a number.
     """
 
     layers: tuple[Layers, ...]
     loss: Array
     epochs: NDArray[np.int64]
-    status: tuple[str, ...]
 
 
 def train_stack(
@@ -91,7 +65,8 @@ def train_stack(
     targets: Array,
     train_idx: NDArray[np.int64],
     val_idx: NDArray[np.int64],
-    settings: StackSettings,
+    members: Sequence[Mapping[str, float]],
+    length: Length,
     seeds: Sequence[int],
     *,
     order_seed: int = 0,
@@ -101,21 +76,21 @@ def train_stack(
 
     Parameters
     ----------
-    inputs : (n, d), normalised; the same for all members.
-    targets : (K, n, m) [m].
+    inputs : (n, d), normalised; the same for all members. targets : (K, n, m) [m].
     train_idx, val_idx : samples to learn from, and to watch.
-    settings : structure and hyperparameters.
+    members : hyperparameters of each: `layers` hidden layers of `units` tanh, alike for all, `learning_rate`,
+        `weight_decay` (AdamW; 0 is Adam), and `input_dropout` and `hidden_dropout`, the probabilities to be dropped.
     seeds : (K,) of the initial weights and drop-out of each member.
     order_seed : of the order of the samples in batches, the same for all members.
     device : a PyTorch device; random numbers are drawn on the CPU, hence the same everywhere.
 
-    Returns
-    -------
-    Trained : a member whose loss stopped being a number is `diverged`, with its best weights before
-        that, which are no numbers where there are none; others go on.
+    A member that diverges keeps its best weights before that, no numbers where there are none; others go on.
     """
     num_samples = len(train_idx)
-    widths = [inputs.shape[1], *[settings.units] * settings.layers, targets.shape[2]]
+    num_layers, units = int(members[0]["layers"]), int(members[0]["units"])
+    widths = [inputs.shape[1], *[units] * num_layers, targets.shape[2]]
+    rates = _single_tensor([one["learning_rate"] for one in members], device)[:, None]
+    dropout = [[one[name] for one in members] for name in ("input_dropout", *["hidden_dropout"] * num_layers)]
     x, y = _single_tensor(inputs[train_idx], device), _single_tensor(targets[:, train_idx], device)
     x_val, y_val = _single_tensor(inputs[val_idx], device), _single_tensor(targets[:, val_idx], device)
 
@@ -123,25 +98,29 @@ def train_stack(
     order = torch.Generator().manual_seed(order_seed)
     weights = initial_weights(widths, generators).to(device)
     layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, widths)]  # leaves, same memory
-    rates = _single_tensor(settings.learning_rate, device)[:, None]
 
     def loss(rows: Tensor | slice) -> Tensor:
         x_batch, y_batch = x[rows], y[:, rows]
-        masks = _dropout_masks(len(x_batch), widths, settings, generators, device)
+        masks = _dropout_masks(len(x_batch), widths, dropout, generators, device)
         return (stack_outputs(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
 
-    batch = min(settings.length.batch or num_samples, num_samples)
+    batch = min(length.batch or num_samples, num_samples)
     best = minimise_losses(
         weights,
         [leaf for layer in layers for leaf in layer],
-        settings.weight_decay,
-        settings.length,
+        [one["weight_decay"] for one in members],
+        length,
         batches=lambda: _epoch_batches(num_samples, batch, order),
         rate=lambda _: rates,
         loss=loss,
         watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
     )
-    return _trained_stack(best, widths)
+    arrays = [
+        (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _layer_views(best.kept, widths)
+    ]
+    losses = torch.where(best.finite & best.best.isfinite(), best.best, torch.nan).cpu().numpy().astype(float)
+    kept = tuple(tuple((w[k], b[k]) for w, b in arrays) for k in range(len(members)))
+    return TrainedStack(kept, losses, best.epochs.cpu().numpy())
 
 
 def minimise_losses(
@@ -253,20 +232,6 @@ class BestEpochs:
             self.running &= self.waited < self.patience
 
 
-def _trained_stack(best: BestEpochs, widths: Sequence[int]) -> TrainedStack:
-    """What was kept, as arrays."""
-    layers = [
-        (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _layer_views(best.kept, widths)
-    ]
-    losses = best.best.cpu().numpy().astype(float)
-    return TrainedStack(
-        layers=tuple(tuple((w[k], b[k]) for w, b in layers) for k in range(len(losses))),
-        loss=np.where(np.isfinite(losses), losses, np.nan),
-        epochs=best.epochs.cpu().numpy(),
-        status=tuple("ok" if finite else "diverged" for finite in best.finite.tolist()),
-    )
-
-
 def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
     """Split flat weights (K, P) into views: weights (K, i, o) and biases (K, 1, o) of each layer."""
     views, start = [], 0
@@ -278,13 +243,16 @@ def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tens
 
 
 def _dropout_masks(
-    num_samples: int, widths: Sequence[int], settings: StackSettings, generators: Sequence[torch.Generator], device: str
+    num_samples: int,
+    widths: Sequence[int],
+    dropout: Sequence[Sequence[float]],
+    generators: Sequence[torch.Generator],
+    device: str,
 ) -> Masks:
     """Draw a mask (K, n, i) for the input of each layer, or None where no member drops any."""
-    rates = [settings.input_dropout] + [settings.hidden_dropout] * settings.layers
     return [
-        draw_dropout(per_member, (num_samples, width), generators).to(device) if any(per_member) else None
-        for per_member, width in zip(rates, widths[:-1], strict=True)
+        draw_dropout(rates, (num_samples, width), generators).to(device) if any(rates) else None
+        for rates, width in zip(dropout, widths[:-1], strict=True)
     ]
 
 

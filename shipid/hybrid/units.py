@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.features import choose_features, input_group, select_inputs
+from shipid.hybrid.features import Array, choose_features, input_group, select_inputs
 from shipid.hybrid.mirror import mirror_matrix as mirror_of
 from shipid.hybrid.stored import StoredData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,16 +17,11 @@ from shipid.hybrid.bands import (
     nearest_distances,
     prediction_traits,
     radius_at_level,
-    runs_needed,
     start_adaptation,
 )
 from tests.hybrid.runs import HORIZON, made
 
 STRANGE = [made(seed) for seed in range(4)]
-
-
-def test_fewest_runs() -> None:
-    assert [runs_needed(level) for level in (0.5, 0.8, 0.9, 0.95, 0.99)] == [3, 4, 9, 19, 99]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -125,26 +120,6 @@ def test_an_adaptive_band_keeps_its_long_run_rate(level: float, drift: float) ->
     assert np.mean(misses) == pytest.approx(1 - level, abs=0.012)
     if drift > 0:
         assert np.mean(fixed) > 1 - level + 0.05
-
-
-def test_the_factor_of_an_adaptive_band_grows_with_misses_and_begins_at_one() -> None:
-    table = -np.log1p(-LEVELS)
-    state = start_adaptation(0.9, 0.1)
-    assert adaptive_factor(state, table) == pytest.approx(1.0)
-    for level in (0.2, 0.905, 0.98):
-        between = adaptive_factor(state._replace(miss=1 - level), table)
-        assert between == pytest.approx(radius_at_level(table, level) / radius_at_level(table, 0.9))
-    assert adapt_band(state, True).miss == pytest.approx(0.1 - 0.1 * 0.9)
-    assert adapt_band(state, False, 4).miss == pytest.approx(0.1 + 0.1 * 0.1 / 4)
-    factors = []
-    for _ in range(20):
-        state = adapt_band(state, True)
-        factors.append(adaptive_factor(state, table))
-    assert factors == sorted(factors)
-    assert factors[-1] > 1e6  # it goes on where the table ends
-    for _ in range(2000):
-        state = adapt_band(state, False)
-    assert adaptive_factor(state, table) == 0.0
 
 
 @pytest.mark.parametrize("step", [0.25, 2.0])

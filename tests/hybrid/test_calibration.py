@@ -29,7 +29,7 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
     for _ in range(rounds):
         shared, single = rng.standard_normal((count + 20, 1)), rng.standard_normal((count + 20, windows))
         scores = np.exp(np.sqrt(alike) * shared + np.sqrt(1 - alike) * single)
-        radius = band_radii(scores[:count].ravel(), place)[AT]
+        radius = band_radii(scores[:count].ravel(), _shares_of_runs(place))[AT]
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
@@ -50,7 +50,7 @@ def test_how_alike_windows_are_is_the_intraclass_correlation(count: int, windows
 
 def test_one_window_a_run_is_the_order_statistic() -> None:
     scores = np.arange(1.0, 20.0)  # 19 runs: the 18th of 19 holds a share of 18 / 20 of new ones
-    radius = band_radii(scores, np.arange(19))
+    radius = band_radii(scores, _shares_of_runs(np.arange(19)))
     assert 17.5 <= radius[89] <= 18.5
     assert radius[94] == pytest.approx(19.0, abs=0.5)
     assert (np.diff(radius) >= 0).all()

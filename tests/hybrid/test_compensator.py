@@ -41,15 +41,6 @@ def test_a_compensator_trained_with_wind_asks_for_wind(compensator, columns):
         compensation(compensator, columns)
 
 
-def test_the_normaliser_centres_and_scales_by_name(columns):
-    table = feature_table(columns, COMMANDS)
-    normaliser = Normaliser.fit(table, ("r", "port.n"))
-    inputs = normaliser.apply(table)
-    np.testing.assert_allclose(inputs.mean(axis=0), 0.0, atol=1e-12)
-    np.testing.assert_allclose(inputs.std(axis=0), 1.0)
-    np.testing.assert_allclose(inputs[:, 1] * table["port.n"].std() + table["port.n"].mean(), table["port.n"])
-
-
 def test_prediction_is_the_mean_of_pytorch_networks(compensator, columns):
     table = feature_table(columns, COMMANDS)
     expected = []

@@ -12,7 +12,7 @@ from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.contract import fault_of_corrector
 from shipid.hybrid.method import FitResult, Method, Task
 from shipid.hybrid.methods import METHODS, method_kind, method_of
-from shipid.hybrid.settings import SearchMethod
+from shipid.hybrid.search import SearchMethod
 
 
 class Bare(Method):

@@ -12,7 +12,6 @@ from shipid.hybrid.features import (
     Memory,
     choose_features,
     feature_table,
-    input_group,
     observer_inputs,
     past_error,
     planned_means,
@@ -130,12 +129,6 @@ def test_estimates_are_inputs_where_method_and_physics_both_have_the_observer(co
         Inputs(COMMANDS, Memory(observer=True)).of_physics(observed, instants).keys()
         == observer_inputs(instants).keys()
     )
-
-
-def test_groups_follow_from_names():
-    names = {"u": "motion", "v_rw": "wind", "port.n": "command", "port.planned-1.n": "command"}
-    names |= {"past-4.u": "history", "port.past-4.n": "history", "turned-8.psi": "history", "error-8.x": "error"}
-    assert {name: input_group(name) for name in names} == names
 
 
 def test_planned_means_by_hand() -> None:

@@ -33,12 +33,6 @@ def task(**options: object) -> Task:
     return Task(cases, windows, options.pop("folds", folds), commands, **options)  # type: ignore[arg-type]
 
 
-def test_targets_are_what_the_physics_misses() -> None:
-    given = task()
-    np.testing.assert_array_equal(given.targets["none"], given.windows.future)
-    np.testing.assert_allclose(given.targets["wrong"] + given.cases["wrong"].paths, given.windows.future, atol=1e-12)
-
-
 def test_instants_hold_what_belongs_to_the_foundation() -> None:
     count = len(task().windows)
     given = task(estimates={"wrong": {"observer.u": np.ones(count)}}, hidden={"right": {"port.n": np.zeros(count)}})

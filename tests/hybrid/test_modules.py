@@ -61,14 +61,6 @@ def test_factors_stay_in_their_limits_and_fade_to_one_off_the_data(here, correct
     np.testing.assert_array_equal(wild.factors(Instants(far)), 1.0)
 
 
-def test_far_from_the_data_the_path_is_that_of_the_physics(here, corrector):
-    far = Instants({**here.test.columns, "u": here.test.columns["u"] + 20.0})
-    nobody = replace(corrector, weights=0 * corrector.weights)
-    for one in (corrector, nobody):
-        first = one.predict(here.physics, far, np.empty(0))[0]
-        np.testing.assert_array_equal(first, nobody.predict(here.physics, far, np.empty(0))[0])
-
-
 def test_another_ship_is_refused(here, corrector):
     with pytest.raises(ResultError, match="other modules"):
         corrector.predict(replace(here.physics, vessel=load_vessel("kvlcc2-l7")), here.test.instants(), np.empty(0))

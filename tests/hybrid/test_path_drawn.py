@@ -121,13 +121,3 @@ def test_a_mirrored_trial_with_a_memory_answers_mirrored_runs_with_mirrored_path
         instants: Instants = given.instants("one")
         paths.append(corrector.predict(foundation, instants, given.cases["one"].paths))
     np.testing.assert_allclose(paths[1], paths[0] * [1.0, -1.0], rtol=0.0, atol=1e-5)
-
-
-def test_scales_of_a_memory_that_is_not_taken_are_no_hyperparameters() -> None:
-    assert not {"history_scale", "error_scale", "observer_scale"} & set(PathDrawn().ranges())
-    assert {"history_scale", "error_scale", "observer_scale"} <= set(PathDrawn(memory=EVERYTHING).ranges())
-    assert "error_scale" not in PathDrawn(memory=Memory(history=(2.0,))).ranges()
-    assert PathDrawn(memory=EVERYTHING).past == 6.0
-    assert PathDrawn().past == 0.0
-    assert "memory" in PathDrawn(choose=True, memory=EVERYTHING).varied()
-    assert "memory" not in PathDrawn().varied()

@@ -42,14 +42,6 @@ def test_paths_are_the_rollout_seen_from_the_instant(windows: Windows) -> None:
     np.testing.assert_allclose(RIGHT.paths(windows.instants()), np.stack([x, y], axis=-1), atol=1e-9)
 
 
-def test_states_are_those_of_the_paths(windows: Windows) -> None:
-    states = RIGHT.states(windows.instants())
-    assert set(states) == {"x", "y", "u", "v", "r", "psi"}
-    np.testing.assert_allclose(
-        np.stack([states["x"], states["y"]], axis=-1), RIGHT.paths(windows.instants()), atol=1e-9
-    )
-
-
 @pytest.mark.parametrize("kind", ["roll", "six"])
 def test_a_ship_that_heels_leads_along_her_horizontal_log(kind: str) -> None:
     """A log's u, v and r are horizontal, the states of a ship with 4 or 6 degrees of freedom are along her axes."""
@@ -62,12 +54,6 @@ def test_a_ship_that_heels_leads_along_her_horizontal_log(kind: str) -> None:
     states = physics.states(instants)
     for name in ("u", "v", "r", "psi"):
         np.testing.assert_allclose(states[name], windows.states[name], atol=1e-9)
-
-
-def test_no_physics_stays_where_it_is(windows: Windows) -> None:
-    none = Physics(None, 5, 1.0)
-    np.testing.assert_array_equal(none.paths(windows.instants()), np.zeros((5, len(windows), 2)))
-    assert none.with_values({"inertia.m": 1.0}) is none
 
 
 @pytest.mark.parametrize("seen", [False, True])

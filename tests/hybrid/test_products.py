@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 import torch
 
 from shipid.hybrid import products
-
-
-@pytest.fixture(params=["NumPy", "PyTorch"], autouse=True)
-def library(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(products, "is_numpy_tensor", lambda _: request.param == "NumPy")
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
@@ -29,36 +23,6 @@ def test_products_are_sums_of_products(dtype: torch.dtype) -> None:
         products.matrix_product(left, right[0].mT), torch.einsum("fij,kj->fik", left, right[0]), **tight
     )
     assert products.matrix_product(left, right.mT).dtype == dtype
-
-
-def test_a_gram_matrix_is_one_of_products() -> None:
-    values = torch.randn(40, 7, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
-    torch.testing.assert_close(
-        products.gram_matrix(values), torch.einsum("si,sj->ij", values, values), rtol=1e-13, atol=1e-13
-    )
-
-
-def test_squares_are_summed_over_rows() -> None:
-    values = torch.randn(3, 4, 5, generator=torch.Generator().manual_seed(4), dtype=torch.float64)
-    for one in (values, values.mT):
-        torch.testing.assert_close(products.sums_of_squares(one), (one**2).sum(1), rtol=1e-13, atol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("functions", "expected"),
-    [
-        ({}, False),
-        ({"tanh": {"dd": {"current": "baseline(NEON)"}}}, False),
-        ({"tanh": {"dd": {"current": "X86_V4"}}}, False),
-        ({"tanh": {"dd": {"current": "AVX512_SKX"}}}, False),
-        ({"tanh": {"dd": {"current": "X86_V3"}}}, True),
-        ({"tanh": {"dd": {"current": "FMA3__AVX2"}}}, True),
-    ],
-)
-def test_the_quicker_tanh_is_taken(functions: dict, expected: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """NumPy names what it uses; where it names nothing, its tanh is taken."""
-    monkeypatch.setattr(np.lib.introspect, "opt_func_info", lambda **_: functions)
-    assert products._tanh_by_torch.__wrapped__() is expected
 
 
 @pytest.mark.parametrize("by_torch", [False, True])

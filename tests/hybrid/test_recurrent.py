@@ -6,7 +6,7 @@ import torch
 
 from shipid.data.windows import Instants
 from shipid.hybrid.compensator import Normaliser
-from shipid.hybrid.recurrent import GatedNetwork, Recurrent, SequenceReader, Sequences
+from shipid.hybrid.recurrent import GatedNetwork, Recurrent, SequenceReader
 from tests.hybrid.worlds import FINE, fitted, ship, world
 
 MEMORY = 8.0  # s
@@ -36,7 +36,7 @@ def test_the_arrays_say_what_pytorch_says():
     plain = Normaliser(("u", "v"), np.zeros(2), np.ones(2))
     network = GatedNetwork(SequenceReader(plain, plain, None, 6), layers, np.ones((3, 2)))
     expected = np.tanh(gru(torch.tensor(past))[1][0].detach().numpy())
-    np.testing.assert_allclose(network._outputs(Sequences(past, now)), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(network._outputs((past, now)), expected, rtol=0, atol=1e-12)
 
 
 def test_x_is_even_and_y_odd_in_the_mirror():

@@ -14,8 +14,14 @@ from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Task
 from shipid.hybrid.methods import METHODS, method_of
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import CLOSING_TRIALS, TIMED_TRIALS, LearningProblem, SearchedAlone, affordable_trials
-from shipid.hybrid.settings import SearchMethod
+from shipid.hybrid.search import (
+    CLOSING_TRIALS,
+    TIMED_TRIALS,
+    LearningProblem,
+    SearchedAlone,
+    SearchMethod,
+    affordable_trials,
+)
 from shipid.hybrid.stored import StoredData
 from tests.documented import module
 from tests.hybrid.worlds import HORIZON, World, ship, world
@@ -26,7 +32,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "forest": {"trials": 3, "trees": 3},
     "hankel-dmd": {"delays": (2.0, 3.0, 4.0)},
     "learned-force": {"trials": 3, "units": 3, "iterations": 2},
-    "modules": {"trials": 3, "units": 4, "centres": 16},
+    "modules": {"trials": 3, "units": 4, "centres": 16, "ridge": 1e-3},
     "one-step": {"trials": 3, "units": 8, "averaged": 2},
     "path-drawn": {"trials": 3, "units": 8, "averaged": 2},
     "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12), "layers": 1},

@@ -4,7 +4,7 @@ import pytest
 from shipid.errors import DocumentError
 from shipid.hybrid.methods import method_of
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.settings import spread_points
+from shipid.hybrid.search import spread_points
 
 
 @pytest.mark.parametrize(
@@ -45,12 +45,6 @@ def test_points_spread_evenly_and_keep_their_start():
         assert (abs(share.sum(axis=0) - 16) <= 4).all()
 
 
-def test_one_dimension_is_the_golden_ratio():
-    assert np.ravel(list(spread_points(1, 3))) == pytest.approx(
-        [0.5, 0.5 + 0.6180339887 - 1, 0.5 + 2 * 0.6180339887 - 1]
-    )
-
-
 def test_trials_fill_their_ranges_by_the_logarithm():
     method = PathDrawn(trials=64, offset=1.5)
     points = list(method.points())
@@ -66,10 +60,3 @@ def test_trials_fill_their_ranges_by_the_logarithm():
     assert {point["offset"] for point in points} == {1.5}
     assert np.mean([point["mirror"] for point in points]) == pytest.approx(0.75, abs=0.05)
     assert points[:5] == list(PathDrawn(trials=5, offset=1.5).points())
-
-
-def test_ridges_go_from_low_to_high_by_one_factor():
-    path = np.array(PathDrawn(ridge=[1e-4, 1e4]).path())
-    assert path[[0, -1]] == pytest.approx([1e-4, 1e4])
-    assert path[1:] / path[:-1] == pytest.approx(10.0)
-    assert PathDrawn(ridge=2).path() == [2.0]

@@ -8,22 +8,15 @@ from pydantic import PositiveInt
 
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.search import (
+    Scale,
+    SearchMethod,
     diverged_result,
-    ridge_trial,
     trial_points,
     trial_row,
 )
-from shipid.hybrid.settings import Scale, SearchMethod
-from tests.hybrid.tasks import task_of
 
 RUNS = {"u": np.arange(12.0)}
 FOLDS = [(np.arange(0, 6), np.arange(6, 9)), (np.arange(3, 9), np.arange(0, 3))]
-
-
-def task(**options):
-    rng = np.random.default_rng(4)
-    targets = {name: rng.normal(size=(5, 12, 2)) for name in ("one", "other")}
-    return task_of(RUNS, (), targets, FOLDS, 0, **options)
 
 
 class Counting(SearchMethod):
@@ -55,32 +48,6 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
     kept = Journal(tmp_path / "trials.log").rows("a")
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
-
-
-def test_the_ridge_of_a_trial_is_the_best_on_the_validation_windows():
-    """Three correctors in one that miss the true path by 2, 1 and 3 m; of two folds the mean is taken."""
-    here, seen = task(), []
-    missed = (2.0, 1.0, 3.0)
-
-    class Off:
-        def predict(self, _physics, instants, _paths):
-            seen.append(np.split(instants.columns["u"], 3))
-            count = len(instants) // 3
-            return np.concatenate([np.full((5, count, 2), value) for value in missed], axis=1)
-
-    trained = []
-
-    def solve(training, ridges):
-        assert ridges == [0.1, 1.0, 10.0]
-        trained.append(training)
-        return Off()
-
-    assert ridge_trial(here, "one", [0.1, 1.0, 10.0], 2, solve) == (1.0, 1.0)  # the true path is 0: 1 m^2
-    assert [list(part) for part in trained] == [list(training) for training, _ in FOLDS]
-    for (first, *others), (_, validation) in zip(seen, FOLDS, strict=True):
-        assert len(first) == 2
-        assert set(first) <= set(validation)
-        assert all(np.array_equal(first, other) for other in others)
 
 
 @pytest.mark.parametrize(("value", "state"), [(2.0, "complete"), (np.inf, "diverged"), (np.nan, "diverged")])

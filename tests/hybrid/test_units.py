@@ -44,13 +44,6 @@ def test_weights_and_offsets_are_drawn_apart_with_the_scales_of_their_inputs(tab
     np.testing.assert_allclose(np.corrcoef(drawn), np.eye(len(drawn)), atol=0.06)
 
 
-def test_without_a_mirror_there_is_one_kind_of_unit(table):
-    units = VaryingInputs.of(side(table), mirror=False).draw(POINT, 12, 0)
-    even, odd = units.parts(side(table))
-    np.testing.assert_array_equal(even, odd)
-    assert units.reflection is None
-
-
 def test_a_ridge_regression_is_the_normal_equations():
     rng = np.random.default_rng(1)
     features, targets, penalty = rng.normal(size=(40, 4)), rng.normal(size=(40, 2)), np.array([1.0, 2.0, 0.5, 1.0])

@@ -5,16 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from optuna.distributions import FloatDistribution
+
 from shipid.files import write_json
 from shipid.hybrid.journal import Journal
-from shipid.hybrid.settings import SearchSpan
 from shipid.study import seals
 from shipid.study.progress import search_words
 from shipid.study.store import JOURNALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
+<<<<<<< HEAD
 SPACE = {"units": SearchSpan(1, 100)}
 ONE, OTHER = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
+=======
+SPACE = {"units": FloatDistribution(1, 100, log=True)}
+>>>>>>> r3hybrid
 
 
 def row(number: int, value: float) -> dict[str, Any]:
