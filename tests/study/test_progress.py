@@ -14,12 +14,8 @@ from shipid.study.progress import search_words
 from shipid.study.store import JOURNALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 
-<<<<<<< HEAD
-SPACE = {"units": SearchSpan(1, 100)}
-ONE, OTHER = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
-=======
 SPACE = {"units": FloatDistribution(1, 100, log=True)}
->>>>>>> r3hybrid
+ONE, OTHER = "right+drawn-N0004-s0", "wrong-1+drawn-N0004-s0"
 
 
 def row(number: int, value: float) -> dict[str, Any]:
