@@ -249,10 +249,11 @@ def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[
     from shipid.identification.outcome import pick_runs, without_shared
     from shipid.study.first_look import first_look
     from shipid.study.new import proposed_horizon
+    from shipid.study.survey import survey_dataset
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     with suppress(DataError), show_steps("comparing the vessel as it is with the runs, before the fit"):
-        ahead, step = proposed_horizon(ship, log)  # where it cannot, the fit says what is missing
+        ahead, step, _ = proposed_horizon(ship, survey_dataset(log))  # where it cannot, the fit says what is missing
         look = first_look(ship, log, fitted, ahead=ahead, step=step)
         if look.wrong:
             typer.echo(f"warning: {look.sentence}", err=True)

@@ -250,7 +250,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         test_paths={name: pair[1] for name, pair in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
         estimates=estimates,
-        kinds=kinds_of_runs(dataset, test=test.spans),
+        kinds=kinds_of_runs(dataset),
     )
 
 

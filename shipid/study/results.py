@@ -83,8 +83,8 @@ class Results:
 
     @cached_property
     def kinds(self) -> dict[str, str]:
-        """Test run -> kind of manoeuvre; the usual speeds come from the other runs."""
-        return kinds_of_runs(self.dataset, self.test.spans, test=self.test.spans)
+        """Test run -> kind of manoeuvre."""
+        return kinds_of_runs(self.dataset, self.test.spans)
 
     @property
     def aside(self) -> set[str]:

@@ -265,11 +265,3 @@ def check_version(document: Document, file: Path) -> None:
     old = [DocumentError(OLD_KEYS[key], file=file, path=key) for key in found]
     if old:
         raise DocumentError(old[0].message, file=file, path=old[0].path, others=old[1:])
-
-
-def separate_family(name: str, block: str) -> str:
-    """What to write instead of a block `identify` or `observer` in a family that is more than an extension."""
-    return (
-        "an identified or observed family must be a separate family: remove the block here and add "
-        f'[[family]] name = "{name}-new", extends = "{name}" with the block [family.{block}]'
-    )

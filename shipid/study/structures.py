@@ -44,6 +44,7 @@ from shipid.identification.structures import PRESENT, STRUCTURES, check_structur
 from shipid.report.structures import StructuresContent
 from shipid.simulation.measured import MeasuredManoeuvre, measure_all
 from shipid.study.new import proposed_horizon
+from shipid.study.survey import survey_dataset
 from shipid.version import __version__
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.ranges import UNUSUAL, find_contradictions
@@ -189,7 +190,7 @@ def compare_structures(
     dataset, fitted, tested, shared = check_comparison(
         dataset, settings, names, runs, held_out, ahead=ahead, folds=folds
     )
-    length = proposed_horizon(vessel, dataset)[0] if ahead is None else ahead
+    length = proposed_horizon(vessel, survey_dataset(dataset))[0] if ahead is None else ahead
     check_length(settings, length)
     report = say or (lambda _: None)
     parts = [fitted[number :: min(folds, len(fitted))] for number in range(min(folds, len(fitted)))]

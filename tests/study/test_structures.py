@@ -183,12 +183,12 @@ def table_of(position: np.ndarray) -> pd.DataFrame:
 def test_of_many_structures_that_are_equally_good_none_is_called_worse() -> None:
     """Each is compared with the one that chance made the least; one that is plainly worse is called so all the same."""
     rng, called = np.random.default_rng(0), 0
-    for _ in range(30):
+    for _ in range(10):
         errors = rng.lognormal(0, 0.4, 10) * rng.lognormal(0, 0.15, (8, 10))
         called += not table_of(errors)["equal"].all()
         bad = table_of(np.vstack([errors, 3 * errors.max(axis=0)]))
         assert not bad.set_index("structure").loc["s8", "equal"]
-    assert called <= 7  # 6 %, but for 1 in 1,000
+    assert called <= 3  # 6 %, but for 2 in 1,000
 
 
 @pytest.mark.slow
