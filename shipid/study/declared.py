@@ -13,7 +13,7 @@ from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
-from shipid.study.schema import ROLES, Study, separate_family
+from shipid.study.schema import ROLES, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, draw_members, resolve_families
 
@@ -136,7 +136,12 @@ def _root(families: Sequence[Family], index: int, file: Path) -> int:
     while families[index].identify is not None or families[index].observer is not None:
         one, block = families[index], "identify" if families[index].identify is not None else "observer"
         if one.extends is None or one.perturb or "members" in one.model_fields_set:
-            raise DocumentError(separate_family(one.name, block), file=file, path=f"family.{index}.{block}")
+            raise DocumentError(
+                "an identified or observed family must be a separate family: remove the block here and add "
+                f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]',
+                file=file,
+                path=f"family.{index}.{block}",
+            )
         index = by_name[one.extends]
     return index
 

@@ -5,20 +5,15 @@ A study that is meant so names the number in `unusual`, a list of dotted paths a
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from shipid import document as documents
-from shipid.capacity import excess_memory_words
 from shipid.document import Document
 from shipid.errors import DocumentError
 from shipid.simulation.truth import LONGEST
-from shipid.study.schema import Prediction, Study
 
 UNUSUAL_KEY = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
-MOST_SEED = 2**32 - 1  # of the generators of several libraries
-LONGEST_NAME = 200  # characters of the file of a cell: file systems allow 255
 
 RANGES: dict[str, tuple[float, float, str]] = {
     "truth.duration": (0.0, LONGEST, "s"),
@@ -64,28 +59,3 @@ def check_ranges(document: Document, file: Path | str) -> None:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
             remedy = f'if it is meant, write {UNUSUAL_KEY} = ["{named}"] at the top of the study'
             raise DocumentError(f"{message}; {remedy}", file=file, path=path)
-
-
-def check_seeds(study: Study, file: Path | str) -> None:
-    """Raise DocumentError for seeds, in the world of the study, that generators of random numbers do not take."""
-    seeds = {"split.seed": study.split.seed, "grid.seeds": max(study.grid.seeds, default=0)}
-    for path, seed in seeds.items():
-        if seed > MOST_SEED:
-            raise DocumentError(f"{seed}: seeds, with 1000 times `seed`, are at most {MOST_SEED}", file=file, path=path)
-
-
-def window_numbers(prediction: Prediction, past: int, columns: int, foundations: int, length: float) -> float:
-    """How many numbers the windows of a run of a length [s] are, with the paths of the foundations.
-
-    past : steps before each instant. columns : of the dataset.
-    """
-    reach = (prediction.horizon + past) * prediction.step
-    count = math.floor(max(0.0, length - reach) / prediction.interval) + 1
-    each = (prediction.horizon + 1) * (columns + 6 + 2 * foundations) + past * columns
-    return float(count) * each
-
-
-def check_memory(numbers: float, words: str, path: str, file: Path | str) -> None:
-    """Raise DocumentError with the number that causes it where so many numbers exceed this machine's memory."""
-    if fault := excess_memory_words(numbers):
-        raise DocumentError(f"{words} {fault}", file=file, path=path)

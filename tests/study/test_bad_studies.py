@@ -55,12 +55,8 @@ BROKEN = {
     "empty-grid": ("grid.N_D", "must be a list of 1 or more entries (it has 0)"),
     "no-run-for-training": ("grid.N_D.0", "must be at least 1"),
     "negative-seed": ("grid.seeds.0", "must be at least 0"),
-    "all-runs-test": ("split.test", "of 12 manoeuvres at most 10 can test"),
     "no-test-run": ("split.test", "must be a list of 1 or more entries (it has 0)"),
     "named-test-of-a-truth": ("split.test", "give the number of test runs"),
-    "recipe-of-old": ("recipe", 'write [[method]] with kind = "path-drawn"'),
-    "horizon-of-old": ("prediction.horizon", "was a number of steps: write ahead = "),
-    "prediction-method-of-old": ("prediction.method", "is now called `integrator`"),
     "identify-inside-a-family": ("family.right.identify", 'add [[family]] name = "right-new", extends = "right"'),
     "identify-of-perturbed": ("family.wrong.identify", 'add [[family]] name = "wrong-new", extends = "wrong"'),
     "identify-of-members": ("family.fitted.identify", "an identified or observed family must be a separate family"),
@@ -131,12 +127,6 @@ def test_broken(name: str) -> None:
     assert line.startswith(str(FOLDER / f"{name}.toml") + ": ")
     assert (caught.value.path or "") == path
     assert remedy in line
-
-
-def test_of_two_manoeuvres_none_can_test() -> None:
-    with pytest.raises(DocumentError, match="2: a study needs 3 or more: 1 to test, 2 to train and validate") as caught:
-        read_plan(FOLDER / "plain.toml", {"truth.manoeuvres": 2, "split.test": 1, "grid.N_D": [1]})
-    assert caught.value.path == "truth.manoeuvres"
 
 
 @pytest.mark.parametrize("name", ["nowhere.toml", "./nowhere.toml", "quik"])
