@@ -6,7 +6,7 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -32,10 +32,10 @@ from shipid.study.declared import (
     Foundation,
     StudyMethod,
     check_claims,
+    check_file_names,
     foundations_of,
     methods_of,
     named_vessel,
-    names_of_one_file,
 )
 from shipid.study.ranges import check_ranges
 from shipid.study.schema import Data, Study
@@ -339,7 +339,7 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     file = documents.find_document(str(name), "studies")
     document = documents.read_document(file)
     try:
-        document = _changed_document(document, changes or {}, "", file, Study.model_fields)
+        document = _changed_document(document, changes or {}, "", Study.model_fields)
     except DocumentError as error:
         raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
     return build_plan(document, file, changes=changes)
@@ -356,16 +356,18 @@ def build_plan(
     try:
         return _check_and_expand(document, file, vessels, sources, changes)
     except DocumentError as error:
-        raise _error_by_name(error, document, tuple(changes or ())) from None
+        raise _error_by_name(error, document, tuple(changes or ()), str(file)) from None
 
 
-def _error_by_name(error: DocumentError, document: Document, changes: Sequence[str]) -> DocumentError:
+def _error_by_name(error: DocumentError, document: Document, changes: Sequence[str], file: str) -> DocumentError:
     """The error with paths by which a person finds the block, families and methods by name; whether --set made it."""
     path = error.path and documents.path_with_names(document, error.path)
-    others = [_error_by_name(other, document, changes) for other in error.others if isinstance(other, DocumentError)]
+    others = [
+        _error_by_name(other, document, changes, file) for other in error.others if isinstance(other, DocumentError)
+    ]
     changed = any(f"{place}.".startswith(f"{change}.") for place in (error.path, path) for change in changes)
     message = f"--set: {error.message}" if changed else error.message
-    return type(error)(message, file=error.file, path=path, others=others)
+    return type(error)(message, file=error.file or file, path=path, others=others)
 
 
 def _check_and_expand(
@@ -377,11 +379,11 @@ def _check_and_expand(
 ) -> Plan:
     documents.check_values(document, file)
     study = documents.parse_model(Study, document, file).in_its_world()
-    check_ranges(document, file)
+    check_ranges(document)
     known = dict(vessels or {})
     foundations = foundations_of(study, file, known)
-    methods = methods_of(study, foundations, file)
-    check_claims(study, foundations, file)
+    methods = methods_of(study, foundations)
+    check_claims(study, foundations)
     batches = tuple(
         Batch(amount, seed)
         for amount in sorted(set(study.grid.N_D), reverse=True)
@@ -389,14 +391,11 @@ def _check_and_expand(
     )
     truth = None
     if study.truth is not None:
-        _check_amounts_of_truth(study, study.truth, file)
+        _check_amounts_of_truth(study, study.truth)
         base = named_vessel(study.truth.vessel, file, "truth.vessel", known)
-        try:
-            truth = truth_vessel(study.truth, base)
-            check_truth(study.truth, truth)
-        except DocumentError as error:
-            raise DocumentError(error.message, file=file, path=error.path) from None
-        _check_memory(study.truth, truth, file)
+        truth = truth_vessel(study.truth, base)
+        check_truth(study.truth, truth)
+        _check_memory(study.truth, truth)
     digests = _sources(study.data, file) if sources is None else sources
     mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
     families = tuple(resolve_families(study.family, file))
@@ -420,10 +419,7 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
     repeat, conditions = plan.study.repeat, plan.study.condition
     if not repeat and not conditions:
         return {}
-    names = [condition.name for condition in conditions]
-    for place in range(len(names)):
-        if twice := names_of_one_file(names[: place + 1]):
-            raise DocumentError(f"two conditions are called {twice}", file=file, path=f"condition.{place}.name")
+    check_file_names([condition.name for condition in conditions], "condition.*.name", "conditions")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
     blocks = Study.model_fields.keys() - OF_PARTS
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
@@ -433,15 +429,15 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
             name = "-".join(words)
             mine: dict[str, Any] = {} if condition is None else condition.set
-            changed = _changed_document(bare, mine, f"condition.{place}.set.", file, blocks)
-            changed = _changed_document(changed, turn, "repeat.", file, blocks)
+            changed = _changed_document(bare, mine, f"condition.{place}.set.", blocks)
+            changed = _changed_document(changed, turn, "repeat.", blocks)
             part = build_plan(changed, file, known, plan.sources)
             if part.study.data != plan.study.data:
                 part = replace(part, sources=_of_part(name, part, sources))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
             if twin is not None:
                 message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
-                raise DocumentError(message, file=file, path=f"condition.{place}.set" if conditions else "repeat")
+                raise DocumentError(message, path=f"condition.{place}.set" if conditions else "repeat")
             whole: dict[str, Any] = {"repeat": {}, "condition": []}
             parts[name] = Part(
                 condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
@@ -457,9 +453,7 @@ def _of_part(name: str, part: Plan, stored: Mapping[str, str] | None) -> Mapping
     return {key.removeprefix(begins): digest for key, digest in stored.items() if key.startswith(begins)}
 
 
-def _changed_document(
-    document: Document, changes: Mapping[str, Any], where: str, file: Path, blocks: Iterable[str]
-) -> Document:
+def _changed_document(document: Document, changes: Mapping[str, Any], where: str, blocks: Collection[str]) -> Document:
     """A document with changes; DocumentError that names `where` and the path of a change that reaches nothing."""
     for path, value in changes.items():
         head = path.split(".", 1)[0]
@@ -468,7 +462,7 @@ def _changed_document(
                 raise DocumentError(f"no such block: {suggest_name(head, blocks)}")
             document = documents.replace_values(document, {path: value})
         except DocumentError as error:
-            raise DocumentError(error.message, file=file, path=where + path) from None
+            raise DocumentError(error.message, path=where + path) from None
     return document
 
 
@@ -499,24 +493,23 @@ def _sources(data: Data | None, file: Path) -> dict[str, str]:
     return digests
 
 
-def _check_amounts_of_truth(study: Study, truth: Truth, file: Path) -> None:
+def _check_amounts_of_truth(study: Study, truth: Truth) -> None:
     """Refuse a truth with too few manoeuvres for the grid, or too short ones for the horizon."""
     test, most, ahead = study.split.test, max(study.grid.N_D), study.prediction.horizon * study.prediction.step
     if not isinstance(test, int):
-        raise DocumentError("runs of a [truth] are drawn: give the number of test runs", file=file, path="split.test")
+        raise DocumentError("runs of a [truth] are drawn: give the number of test runs", path="split.test")
     pool = truth.manoeuvres - test
     if pool < max(most, 2):
         message = f"{most}: {truth.manoeuvres} manoeuvres less {test} test runs leave {pool}, and 2 are the fewest"
-        raise DocumentError(message, file=file, path="grid.N_D")
+        raise DocumentError(message, path="grid.N_D")
     if truth.duration < ahead:
-        message = f"{truth.duration:g} s: shorter than the horizon of {ahead:g} s"
-        raise DocumentError(message, file=file, path="truth.duration")
+        raise DocumentError(f"{truth.duration:g} s: shorter than the horizon of {ahead:g} s", path="truth.duration")
 
 
-def _check_memory(truth: Truth, vessel: Vessel, file: Path) -> None:
+def _check_memory(truth: Truth, vessel: Vessel) -> None:
     """Refuse a truth whose records exceed the memory of this machine, with the number that causes it."""
     commands = 2 * len(vessel.document.get("thruster", {}))
     for path, between, columns in (("step", truth.step, commands), ("interval", truth.interval, 8 + commands)):
         if fault := excess_memory_words(truth.manoeuvres * truth.length / between * columns):
             words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s {fault}"
-            raise DocumentError(words, file=file, path=f"truth.{path}")
+            raise DocumentError(words, path=f"truth.{path}")

@@ -5,8 +5,6 @@ A study that is meant so names the number in `unusual`, a list of dotted paths a
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from shipid import document as documents
 from shipid.document import Document
 from shipid.errors import DocumentError
@@ -44,7 +42,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
 """Dotted path with * for any characters -> least, greatest, unit."""
 
 
-def check_ranges(document: Document, file: Path | str) -> None:
+def check_ranges(document: Document) -> None:
     """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
     meant = document.get(UNUSUAL_KEY, [])
     for path, value in documents.document_leaves(document):
@@ -58,4 +56,4 @@ def check_ranges(document: Document, file: Path | str) -> None:
         if not least <= value <= most:
             message = f"{value:g}: expected {least:g} to {most:g} {unit}"
             remedy = f'if it is meant, write {UNUSUAL_KEY} = ["{named}"] at the top of the study'
-            raise DocumentError(f"{message}; {remedy}", file=file, path=path)
+            raise DocumentError(f"{message}; {remedy}", path=path)

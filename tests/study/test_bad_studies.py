@@ -47,7 +47,7 @@ BROKEN = {
     "parameters-without-factor": ("family.wrong.perturb.0", "are needed together"),
     "negative-mass": ("family.wrong", "inertia.m: -410931.81"),
     "family-called-none": ("family.none.name", "taken by the foundation without physics"),
-    "family-called-like-a-member": ("family", "two models would be called 'wrong-1'"),
+    "family-called-like-a-member": ("family", "two models are called 'wrong-1'"),
     "two-families-of-one-name": ("family.1.name", "two families are called 'right'"),
     "family-with-a-slash": ("family.a/b.name", "'a/b'"),
     "no-families": ("family", "must be a list of 1 or more entries (it has 0)"),
