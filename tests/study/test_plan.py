@@ -177,13 +177,6 @@ def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:
     assert plan.cells == 4 * 4
 
 
-def test_changes_reach_the_document(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "method.0.units": 7, "description": "new"})
-    assert [model.name for model in plan.foundations][1:6] == [f"wrong-{k}" for k in range(1, 6)]
-    assert isinstance(plan.methods[0].method, PathDrawn)
-    assert (plan.batches[0].N_D, plan.methods[0].method.units, plan.study.description) == (3, 7, "new")
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -239,12 +232,12 @@ def test_digest_follows_the_document(tmp_path: Path) -> None:
     assert build_plan(turned, Path(plain.file)).digest == plain.digest
 
 
-def test_truth_takes_its_blocks(tmp_path: Path) -> None:
-    lag = {"kind": "first_order", "T": 2.0, "rate": 0.1}
-    plan = tiny_plan(tmp_path, {"truth.set": {"thruster.port.actuator.n": lag}})
-    assert plan.truth is not None
-    assert plan.truth.parameters["thruster.port.actuator.n.T"] == 2.0
-    assert all("actuator" not in path for model in plan.foundations if model.vessel for path in model.vessel.parameters)
+def test_digest_follows_the_vessel_of_the_truth(tmp_path: Path) -> None:
+    document, original = tmp_path / "own.toml", Path(bundled_documents("models")["gunnerus-28.9"]).read_text()
+    document.write_text(original)
+    before = tiny_plan(tmp_path, {"truth.vessel": "./own.toml"}).digest
+    document.write_text(original.replace("L_oa = 31.25", "L_oa = 31.3"))
+    assert tiny_plan(tmp_path, {"truth.vessel": "./own.toml"}).digest != before
 
 
 def test_work_is_cut_where_cells_share_hardly_anything(tmp_path: Path) -> None:
