@@ -205,14 +205,13 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
     each = (prediction.horizon + 1) * (columns + 6 + 2 * len(plan.foundations)) + past * columns
     if fault := excess_memory_words(float(count * each)):
         words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval {fault}"
-        raise DocumentError(words, file=plan.file, path="prediction.interval")
+        raise DocumentError(words, path="prediction.interval")
     try:
         windows = cut(dataset)
     except DataError as error:
-        raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
+        raise DocumentError(error.message, path="prediction.ahead") from None
     if study.data is not None and study.data.causal:
-        with _name_study_file(plan):
-            known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
+        known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
         windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
         windows = windows.select(pd.Series(windows.run).groupby(windows.run).cumcount().to_numpy() < prediction.samples)
@@ -234,11 +233,7 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         notes.append(
             f"runs that move as others do ({copies}): errors and intervals take them for new: leave out copies"
         )
-    longest = max(float(np.ptp(rows["t"])) for _, rows in stretches_of_runs(dataset))
     for foundation in plan.foundations:
-        if foundation.identify is not None and foundation.identify.horizon / 2 > longest:
-            message = f"{foundation.identify.horizon:g} s: no run is even half as long, the longest has {longest:g} s"
-            raise DocumentError(message, file=plan.file, path=f"family.{foundation.family}.identify.horizon")
         if foundation.base is not None:
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)

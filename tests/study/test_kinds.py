@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM
-from shipid.study.kinds import STOPPED_SHAFT, kind_by_motion, kinds_of_runs
+from shipid.study.kinds import kind_by_motion, kinds_of_runs
 from shipid.study.prepare import obtain_runs
 from tests.study.tiny import logged, tiny_plan
 
@@ -36,15 +35,6 @@ def test_a_stopped_shaft_at_speed_is_coasting_and_a_slow_ship_manoeuvres() -> No
     helm = np.zeros(len(T))
     assert kind_by_motion(rows(helm, n=0.0, u=np.linspace(4, 1, len(T))), 4.0, 2.0) == COASTING
     assert kind_by_motion(rows(steps([20, -5, 12, -18]), u=0.4), 4.0, 2.0) == LOW_SPEED
-
-
-@pytest.mark.parametrize("usual", [0.4, 2.0, 25.0])
-def test_what_is_stopped_is_judged_by_the_usual_shaft_speed(usual: float) -> None:
-    helm, u = np.zeros(len(T)), np.linspace(4, 1, len(T))
-    for share, coasts in ((0.8, True), (1.2, False)):
-        for turns in (1, -1):
-            seen = kind_by_motion(rows(helm, n=turns * share * STOPPED_SHAFT * usual, u=u), 4.0, usual)
-            assert (seen == COASTING) == coasts
 
 
 def test_the_mapping_wins_over_the_name_and_the_name_over_the_motion() -> None:

@@ -72,14 +72,6 @@ def test_the_first_instant_comes_after_the_run_up() -> None:
     assert set(windows.spans.values()) == {(0.0, 32.0 + 59.0 + 15.0)}
 
 
-@pytest.mark.parametrize(("step", "steps"), [(1.0, 7), (0.5, 13), (4.0, 2)])
-def test_a_past_in_seconds_is_whole_steps(tmp_path: Path, step: float, steps: int) -> None:
-    """As many as hold it."""
-    ahead = {"prediction.ahead": 8.0, "prediction.step": step, "prediction.interval": step}
-    assert past_steps(tiny_plan(tmp_path, {**ahead, "prediction.past": 6.5})) == steps
-    assert past_steps(tiny_plan(tmp_path, ahead)) == 0
-
-
 def test_orders_and_weather_make_pairs_of_runs_and_nothing_else_does(tmp_path: Path) -> None:
     """Runs of two truths are pairs where all is alike that is drawn before the ship reacts."""
     plan = tiny_plan(tmp_path)

@@ -82,26 +82,6 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
     assert set(first) != set(second)
 
 
-@pytest.mark.parametrize("folds", [1, 2, 3])
-def test_folds_are_by_run(tiny: tuple[Plan, Dataset, PreparedStudy], folds: int) -> None:
-    plan, _, prepared = tiny
-    split = plan.study.split.model_copy(update={"folds": folds})
-    prepared = replace(prepared, study=plan.study.model_copy(update={"split": split}))
-    for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
-        pairs = prepared.folds(batch, windows, "share")
-        assert len(pairs) == min(folds, batch.N_D)
-        validated: list[str] = []
-        for train, validation in pairs:
-            assert not set(windows.run[train]) & set(windows.run[validation])
-            assert len(train) + len(validation) == len(windows)
-            validated += set(windows.run[validation])
-        if folds == 1:
-            assert len(validated) == max(1, round(0.2 * batch.N_D))
-        else:
-            assert sorted(validated) == sorted(prepared.runs(batch))
-
-
 def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     """Midpoint rule with 2,000 steps a second; r = 0 included."""
     windows = tiny[2].test.select(slice(0, 12))
