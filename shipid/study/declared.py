@@ -13,7 +13,7 @@ from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
-from shipid.study.schema import ROLES, Study
+from shipid.study.schema import PAIRED_ROLES, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, draw_members, resolve_families
 
@@ -212,11 +212,8 @@ def check_claims(study: Study, models: Sequence[Foundation]) -> None:
         if name not in known:
             raise DocumentError(f"{name!r} is not a {kind}: {suggest_name(name, set(known))}", path=f"claims.{key}")
     for role, family in roles.items():
-        count = families.count(family)
-        if ROLES[role].single and count > 1:
-            raise DocumentError(f"{family!r} has {count} members: {ROLES[role].single}", path=f"claims.{role}")
-        if same := next((other for other in ROLES[role].unlike if roles.get(other) == family), None):
-            raise DocumentError(f"the same family as claims.{same}: name two different families", path=f"claims.{role}")
+        if role not in PAIRED_ROLES[1] and (count := families.count(family)) > 1:
+            raise DocumentError(f"{family!r} has {count} members: give one", path=f"claims.{role}")
     nominal = next((model for model in models if model.family == roles.get("nominal")), None)
     if nominal is not None and nominal.variant is not None and nominal.variant.values:
         raise DocumentError(

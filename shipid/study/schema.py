@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
@@ -117,26 +117,8 @@ class BandsBlock(Strict):
     )
 
 
-class Role(NamedTuple):
-    """What a family must be that `[claims]` gives a role.
-
-    pair : the role that must be given, too. unlike : roles before this one that the same family may not have.
-    single : why the family may have one member only; empty: it may have any number.
-    """
-
-    pair: str = ""
-    unlike: tuple[str, ...] = ()
-    single: str = ""
-
-
-ROLES: dict[str, Role] = {
-    "accurate": Role("inaccurate", single="the findings compare one model with one"),
-    "inaccurate": Role("accurate", ("accurate",), single="the findings compare one model with one"),
-    "moderate": Role("high"),
-    "high": Role("moderate", ("moderate",)),
-    "nominal": Role(unlike=("moderate", "high"), single="the nominal row is the base as it is"),
-}
-"""Name of a role, a key of `[claims]`, -> what its family must be."""
+PAIRED_ROLES = (("accurate", "inaccurate"), ("moderate", "high"))  # keys of `[claims]`: both are given, or neither
+ROLES = (*PAIRED_ROLES[0], *PAIRED_ROLES[1], "nominal")
 
 
 class Claims(Strict):
@@ -153,10 +135,11 @@ class Claims(Strict):
 
     @model_validator(mode="after")
     def _pairs(self) -> Claims:
-        lone = next((name for name in self.roles if ROLES[name].pair not in ("", *self.roles)), None)
-        if lone is not None:
-            one, other = (name for name in ROLES if name in (lone, ROLES[lone].pair))
-            raise ValueError(f"give both `{one}` and `{other}`, or neither")
+        for one, other in PAIRED_ROLES:
+            if (one in self.roles) != (other in self.roles):
+                raise ValueError(f"give both `{one}` and `{other}`, or neither")
+            if one in self.roles and self.roles[one] == self.roles[other]:
+                raise ValueError(f"`{one}` and `{other}` are the same family: name two different families")
         return self
 
     @property
