@@ -96,7 +96,9 @@ def predict_log(
     tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in stretches_of_runs(dataset)]
     parts = [table for table in tables if len(table)]
     if not parts:
-        raise DataError(_too_short_sentence(predictor), file=log)
+        steps = predictor.past + (predictor.physics.horizon if predictor.commands == "known" else 0)
+        needed = f"{steps * predictor.physics.step:g} s"
+        raise DataError(f"no run has {needed} for the past and, where commands are known, the horizon", file=log)
     frame = pd.concat(parts, ignore_index=True)
     write_table(out, frame)
     step = predictor.physics.step
@@ -126,20 +128,10 @@ def read_or_import(log: Path, mapping: str | None) -> Dataset:
     return import_log(read_mapping(mapping), log)
 
 
-def _too_short_sentence(predictor: Predictor) -> str:
-    step = predictor.physics.step
-    length = predictor.physics.horizon * step
-    past = f"the past of {predictor.past * step:g} s" if predictor.past else ""
-    plan = f"the horizon of {length:g} s, over which commands are known" if predictor.commands == "known" else ""
-    return f"no run is as long as {' and '.join(filter(None, (past, plan)))}"
-
-
 def _find_cell_file(folder: Path, cell: str) -> Path:
     available = {file.stem for file in (folder / "cells").glob("*.npz")}
-    if not folder.is_dir():
-        raise ResultError("no such folder: give that of a run", file=folder)
     if not available:
-        raise ResultError("holds no finished cells: is it the folder of a run?", file=folder)
+        raise ResultError("holds no finished cells: give the folder of a run", file=folder)
     if cell not in available:
         raise ResultError(f"no such cell: {suggest_name(cell, available)}", file=folder, path=f"--cell {cell}")
     return cell_file(folder, cell)

@@ -13,7 +13,7 @@ from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
-from shipid.study.schema import ROLES, Study
+from shipid.study.schema import PAIRED_ROLES, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, draw_members, resolve_families
 
@@ -75,7 +75,7 @@ def named_vessel(name: str, file: Path, path: str, known: dict[str, Vessel]) -> 
         try:
             document = documents.find_document(name, "models", file.parent)
         except DocumentError as error:
-            raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+            raise DocumentError(f"{name!r}: {error.message}", path=path) from None
         known[name] = load_vessel(str(document))
     return known[name]
 
@@ -87,47 +87,39 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
     for index, family in enumerate(families):
         assert family.base is not None  # written out by resolve
         if family.name.lower() == NO_MODEL:
-            message = "this name is taken by the foundation without physics"
-            raise DocumentError(message, file=file, path=f"family.{index}.name")
+            raise DocumentError("this name is taken by the foundation without physics", path=f"family.{index}.name")
         vessel = named_vessel(family.base, file, f"family.{index}.base", known)
-        words = family.description or ""
-        if family.identify is None and family.observer is None:
-            foundations += [
-                Foundation(v.name, v.family, v.member, v, vessel, words) for v in draw_members(family, vessel, file)
-            ]
-            continue
-        root = _root(study.family, index, file)
-        parent = families[root]
-        settings = None if family.identify is None else _identify(study, family, index, vessel, file)
-        observer = None if family.observer is None else _observer(study, family, index, vessel, file)
-        ways = (IDENTIFIED if settings else "", OBSERVED if observer else "")
-        described = words or ", ".join(filter(None, (parent.description, *ways)))
+        parent = families[_root(study.family, index)]
+        identify = None if family.identify is None else _identify(study, family, index, vessel)
+        observer = None if family.observer is None else _observer(study, family, index, vessel)
+        ways = (parent.description, IDENTIFIED if identify else "", OBSERVED if observer else "")
+        words = family.description or ", ".join(filter(None, ways))
         for variant in draw_members(parent, vessel, file):
-            name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
+            name = variant.name
+            if parent is not family:
+                name = family.name if parent.members == 1 else f"{family.name}-{variant.member + 1}"
             foundations.append(
-                Foundation(name, family.name, variant.member, variant, vessel, described, settings, observer)
+                Foundation(name, family.name, variant.member, variant, vessel, words, identify, observer)
             )
-    if twice := names_of_one_file([foundation.name for foundation in foundations]):
-        raise DocumentError(f"two models would be called {twice}: rename a family", file=file, path="family")
+    check_file_names([foundation.name for foundation in foundations], "family", "models")
     return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "no physics: data alone"))
 
 
-def names_of_one_file(names: Sequence[str]) -> str:
-    """The first two names that would be one file, in words; empty where there are none.
+def check_file_names(names: Sequence[str], path: str, what: str) -> None:
+    """Refuse names that would be one file, with `*` of the path as the place of the second.
 
     Many file systems do not tell capitals from small letters: the files of one model would replace those of the other.
     """
     first: dict[str, str] = {}
-    for name in names:
-        key = name.lower()
-        if key in first:
-            same = first[key]
-            return repr(name) if same == name else f"{same!r} and {name!r}, which are one file on many systems"
-        first[key] = name
-    return ""
+    for place, name in enumerate(names):
+        other = first.get(name.lower())
+        if other is not None:
+            same = repr(name) if other == name else f"{other!r} and {name!r}, which are one file on many systems"
+            raise DocumentError(f"two {what} are called {same}: rename one", path=path.replace("*", str(place)))
+        first[name.lower()] = name
 
 
-def _root(families: Sequence[Family], index: int, file: Path) -> int:
+def _root(families: Sequence[Family], index: int) -> int:
     """Place of the family whose members an identified or observed family takes, as far up as it extends.
 
     DocumentError unless the families on the way only extend: no base, perturbations or members.
@@ -136,111 +128,94 @@ def _root(families: Sequence[Family], index: int, file: Path) -> int:
     while families[index].identify is not None or families[index].observer is not None:
         one, block = families[index], "identify" if families[index].identify is not None else "observer"
         if one.extends is None or one.perturb or "members" in one.model_fields_set:
-            message = (
+            raise DocumentError(
                 "an identified or observed family must be a separate family: remove the block here and add "
-                f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]'
+                f'[[family]] name = "{one.name}-new", extends = "{one.name}" with the block [family.{block}]',
+                path=f"family.{index}.{block}",
             )
-            raise DocumentError(message, file=file, path=f"family.{index}.{block}")
         index = by_name[one.extends]
     return index
 
 
-def _observer(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Observer:
+def _observer(study: Study, family: Family, index: int, vessel: Vessel) -> Observer:
     """Settings of an observer of this vessel; DocumentError with the path of a wrong key or value.
 
     Where velocities make the true path, positions are too coarse to be measurements; then no current can be seen.
     """
-    coarse = study.data is not None and study.data.path == "velocity"
+    coarse, prefix = study.data is not None and study.data.path == "velocity", f"family.{index}.observer"
     default: dict[str, Any] = {"measured": ["psi", "u", "v", "r"], "current": 0.0} if coarse else {}
-    settings: Observer = documents.parse_model(
-        Observer, default | (family.observer or {}), file, f"family.{index}.observer"
-    )
+    settings: Observer = documents.parse_model(Observer, default | (family.observer or {}), None, prefix)
     try:
         filter_bank(vessel, settings)
     except DocumentError as error:
-        raise DocumentError(error.message, file=file, path=f"family.{index}.observer") from None
+        raise DocumentError(error.message, path=prefix) from None
     return settings
 
 
-def _identify(study: Study, family: Family, index: int, vessel: Vessel, file: Path) -> Identify:
+def _identify(study: Study, family: Family, index: int, vessel: Vessel) -> Identify:
     """What a family identifies; horizon, step and method are those of the study's prediction unless it says else."""
     ahead, prefix = study.prediction, f"family.{index}.identify"
     default = {"horizon": ahead.ahead, "step": ahead.step, "method": ahead.integrator}
-    settings: Identify = documents.parse_model(Identify, default | (family.identify or {}), file, prefix)
+    settings: Identify = documents.parse_model(Identify, default | (family.identify or {}), None, prefix)
     try:
         free_factors(vessel, settings)
     except DocumentError as error:
-        where = (error.path or "identify").replace("identify", prefix, 1)
-        raise DocumentError(error.message, file=file, path=where) from None
+        raise DocumentError(error.message, path=(error.path or "identify").replace("identify", prefix, 1)) from None
     return settings
 
 
-def methods_of(study: Study, foundations: Sequence[Foundation], file: Path) -> tuple[StudyMethod, ...]:
+def methods_of(study: Study, foundations: Sequence[Foundation]) -> tuple[StudyMethod, ...]:
     """The methods with their settings checked, and the foundations that each meets."""
+    check_file_names([block.name for block in study.method], "method.*.name", "methods")
     ways: list[StudyMethod] = []
     families = list(dict.fromkeys(foundation.family for foundation in foundations))
     for index, block in enumerate(study.method):
         path = f"method.{index}"
-        if twice := names_of_one_file([*(way.name for way in ways), block.name]):
-            raise DocumentError(f"two methods are called {twice}", file=file, path=f"{path}.name")
-        try:
-            method = method_of(block.kind, block.settings, path)
-        except DocumentError as error:
-            raise DocumentError(error.message, file=file, path=error.path) from None
+        method = method_of(block.kind, block.settings, path)
         met: set[str] = set()
         refused = set() if method.meets_observer else {f.family for f in foundations if f.observer is not None}
         for pattern in block.families:
-            if pattern in refused:
-                message = f"{pattern!r} has an observer, which {block.kind} does not take: name the family it extends"
-                raise DocumentError(message, file=file, path=f"{path}.families")
             matching = documents.match_paths(pattern, families)
+            if pattern in refused:
+                words = f"{pattern!r} has an observer, which {block.kind} does not take: name the family it extends"
+                raise DocumentError(words, path=f"{path}.families")
             if not matching:
-                message = f"{pattern!r} is no family: {suggest_name(pattern, families)}"
-                raise DocumentError(message, file=file, path=f"{path}.families")
+                words = f"{pattern!r} is no family: {suggest_name(pattern, families)}"
+                raise DocumentError(words, path=f"{path}.families")
             met.update(matching)
         if not method.meets_none:
             met -= {NO_MODEL}
-        left_out = tuple(f.name for f in foundations if f.family in met & refused)
-        taken = tuple(f.name for f in foundations if f.family in met - refused)
-        bases = {f.family: f.base for f in foundations if f.name in taken and f.base is not None}
-        for family, base in bases.items():
+        taken = [f for f in foundations if f.family in met - refused]
+        for family, base in {f.family: f.base for f in taken if f.base is not None}.items():
             if words := method.unfit(base):
-                raise DocumentError(f"{family} with {block.kind}: {words}", file=file, path=path)
-        ways.append(StudyMethod(block.name, block.kind, method, taken, left_out))
+                raise DocumentError(f"{family} with {block.kind}: {words}", path=path)
+        left_out = tuple(f.name for f in foundations if f.family in met & refused)
+        ways.append(StudyMethod(block.name, block.kind, method, tuple(f.name for f in taken), left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
     if idle is not None:
-        observed = any(idle in way.left_out for way in ways)
-        remedy = "add one that takes an observer, such as alone" if observed else "name its family in `families`"
-        raise DocumentError(f"no method meets {idle!r}: {remedy}", file=file, path="method")
+        remedy = "name its family in `families`; one with an observer needs a method that takes it, such as alone"
+        raise DocumentError(f"no method meets {idle!r}: {remedy}", path="method")
     return tuple(ways)
 
 
-def check_claims(study: Study, models: Sequence[Foundation], file: Path) -> None:
+def check_claims(study: Study, models: Sequence[Foundation]) -> None:
     """Refuse claims about families that are not there, or that are not what their role needs."""
     if study.claims is None:
         return
-    families = [model.family for model in models if model.family != NO_MODEL]
-    named = [*study.claims.roles.items(), *(("aside", name) for name in study.claims.aside)]
-    for role, name in named:
-        if name not in families:
-            message = f"{name!r} is not a family: {suggest_name(name, set(families))}"
-            raise DocumentError(message, file=file, path=f"claims.{role}")
-    names = [block.name for block in study.method]
-    if study.claims.method is not None and study.claims.method not in names:
-        message = f"{study.claims.method!r} is not a method: {suggest_name(study.claims.method, names)}"
-        raise DocumentError(message, file=file, path="claims.method")
-    roles = study.claims.roles
+    families, roles = [model.family for model in models if model.family != NO_MODEL], study.claims.roles
+    named = [(role, name, families, "family") for role, name in roles.items()]
+    named += [("aside", name, families, "family") for name in study.claims.aside]
+    if study.claims.method is not None:
+        named.append(("method", study.claims.method, [block.name for block in study.method], "method"))
+    for key, name, known, kind in named:
+        if name not in known:
+            raise DocumentError(f"{name!r} is not a {kind}: {suggest_name(name, set(known))}", path=f"claims.{key}")
     for role, family in roles.items():
-        single, count = ROLES[role].single, families.count(family)
-        if single and count > 1:
-            raise DocumentError(f"{family!r} has {count} members: {single}", file=file, path=f"claims.{role}")
-    for role, family in roles.items():
-        same = next((other for other in ROLES[role].unlike if roles.get(other) == family), None)
-        if same is not None:
-            message = f"the same family as claims.{same}: name two different families"
-            raise DocumentError(message, file=file, path=f"claims.{role}")
+        if role not in PAIRED_ROLES[1] and (count := families.count(family)) > 1:
+            raise DocumentError(f"{family!r} has {count} members: give one", path=f"claims.{role}")
     nominal = next((model for model in models if model.family == roles.get("nominal")), None)
     if nominal is not None and nominal.variant is not None and nominal.variant.values:
-        message = f"{nominal.name!r} is perturbed: the nominal model must be the base as it is"
-        raise DocumentError(message, file=file, path="claims.nominal")
+        raise DocumentError(
+            f"{nominal.name!r} is perturbed: the nominal model must be the base as it is", path="claims.nominal"
+        )

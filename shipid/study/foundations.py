@@ -75,32 +75,35 @@ def _fit_foundation(
     device: str,
     known: dict[Any, Solution],
 ) -> FoundationPrediction:
-    """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone."""
+    """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone.
+
+    Where that fails, its paths are no numbers, and the sentence says why.
+    """
     study = prepared.study
-    now, sentence, seconds = foundation, "", 0.0
-    words = "identification" if foundation.identify is not None else "observer"
+    now, sentence, seconds, estimates = foundation, "", 0.0, None
     try:
         if foundation.identify is not None:
             solution = _solution(foundation, foundation.identify, runs, data, known)
             if solution.status != "ok":
-                return _failed_prediction(foundation, windows, prepared.test, f"{words}: {solution.sentence}")
+                raise ShipidError(solution.sentence)
             assert foundation.variant is not None
             values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
             now = replace(foundation, variant=replace(foundation.variant, values=values))
             sentence, seconds = solution.sentence, solution.seconds
-        if now.observer is not None and now.observer.choose:
+        if now.observer is not None:
             begun = time.thread_time()
-            now = replace(now, observer=chosen_observer(study, now, data.select(runs), windows))
-            seconds += time.thread_time() - begun
-        calls = sum(one.observer is not None for one in prepared.foundations)
-        estimates = estimates_of(study, now, prepared.data, prepared.test, calls) if now.observer is not None else None
+            if now.observer.choose:
+                now = replace(now, observer=chosen_observer(study, now, data.select(runs), windows))
+                seconds += time.thread_time() - begun
+            calls = sum(one.observer is not None for one in prepared.foundations)
+            estimates = estimates_of(study, now, prepared.data, prepared.test, calls)
         pair = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
+        if not np.isfinite(pair[0]).all():
+            raise ShipidError("the model diverges on training windows")
     except ShipidError as error:
-        return _failed_prediction(foundation, windows, prepared.test, f"{words}: {error.message}")
-    if not np.isfinite(pair[0]).all():
-        return _failed_prediction(
-            foundation, windows, prepared.test, f"{words}: the model diverges on training windows"
-        )
+        words = "identification" if foundation.identify is not None else "observer"
+        here, there = (np.full_like(part.future, np.nan) for part in (windows, prepared.test))
+        return FoundationPrediction(foundation, here, there, f"{words}: {error.message}")
     return FoundationPrediction(now, *pair, sentence, seconds, estimates)
 
 
@@ -116,9 +119,3 @@ def _solution(
     if key not in known:
         known[key] = identify(foundation.vessel, data, runs, settings)
     return known[key]
-
-
-def _failed_prediction(foundation: Foundation, windows: Windows, test: Windows, sentence: str) -> FoundationPrediction:
-    """A foundation without a result: paths that are no numbers, and why."""
-    here, there = (np.full_like(part.future, np.nan) for part in (windows, test))
-    return FoundationPrediction(foundation, here, there, sentence)

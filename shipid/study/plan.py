@@ -6,9 +6,10 @@ import json
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ import tomlkit
 
 from shipid import document as documents
 from shipid.arguments import check_mapping
+from shipid.capacity import excess_memory_words
 from shipid.document import Document
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.files import quote_argument
@@ -30,13 +32,13 @@ from shipid.study.declared import (
     Foundation,
     StudyMethod,
     check_claims,
+    check_file_names,
     foundations_of,
     methods_of,
     named_vessel,
-    names_of_one_file,
 )
-from shipid.study.ranges import LONGEST_NAME, check_memory, check_ranges, check_seeds, window_numbers
-from shipid.study.schema import Data, Study, check_version
+from shipid.study.ranges import check_ranges
+from shipid.study.schema import Data, Study
 from shipid.users import is_user_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve_families
@@ -107,10 +109,6 @@ class Plan:
         another one.
     changes : what `--set` changed, already in the document.
     families : of the study, those that extend another written out.
-    pairs : every foundation with every method that it meets: a cell each at every amount of data and seed.
-    units : all work, the largest amounts of data first; a unit repeats hardly anything that another one does.
-    cells : their number.
-    digest : of the document, every vessel, the data's sources and the methods in full: what results depend on.
     parts : name -> a complete study for every repetition in every condition; empty where there is neither. If there
         are parts, they are run in place of this study.
     """
@@ -127,24 +125,36 @@ class Plan:
     sources: Mapping[str, str] = field(default_factory=dict)
     changes: Mapping[str, Any] = field(default_factory=dict)
     families: tuple[Family, ...] = field(default=(), repr=False)
-    pairs: tuple[tuple[str, StudyMethod], ...] = field(default=(), repr=False)
-    units: tuple[Unit, ...] = field(default=(), repr=False)
-    cells: int = 0
-    digest: str = ""
     parts: Mapping[str, Part] = field(default_factory=dict, repr=False)
 
+    @cached_property
+    def pairs(self) -> tuple[tuple[str, StudyMethod], ...]:
+        """Every foundation with every method that it meets: a cell each at every amount of data and seed."""
+        return tuple((f.name, way) for f in self.foundations for way in self.methods if f.name in way.foundations)
 
-def completed_plan(plan: Plan) -> Plan:
-    """The plan with what follows from its other fields: pairs, units, cells and digest."""
-    pairs = tuple((f.name, way) for f in plan.foundations for way in plan.methods if f.name in way.foundations)
-    groups = _shared_pairs(plan.foundations, pairs)
-    units = tuple(
-        Unit(batch, group, batch.key if len(groups) == 1 else batch.cell(*group[0]))
-        for batch in plan.batches
-        for group in groups
-    )
-    plan = replace(plan, pairs=pairs, units=units, cells=len(plan.batches) * len(pairs))
-    return replace(plan, digest=_digest_with(plan, plan.document))
+    @cached_property
+    def units(self) -> tuple[Unit, ...]:
+        """All work, the largest amounts of data first; a unit repeats hardly anything that another one does."""
+        groups = _shared_pairs(self.foundations, self.pairs)
+        return tuple(
+            Unit(batch, group, batch.key if len(groups) == 1 else batch.cell(*group[0]))
+            for batch in self.batches
+            for group in groups
+        )
+
+    @property
+    def cells(self) -> int:
+        """Number of cells."""
+        return len(self.batches) * len(self.pairs)
+
+    @cached_property
+    def digest(self) -> str:
+        """Of the document, every vessel, the sources and the methods in full: what results depend on."""
+        methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in self.methods]
+        vessels = sorted({vessel.digest for vessel in vessels_of(self)})
+        return documents.digest_document(
+            {"study": self.document, "vessels": vessels, "sources": dict(self.sources), "methods": methods}
+        )
 
 
 def _shared_pairs(
@@ -170,17 +180,9 @@ def _shared_pairs(
     return sorted((tuple(sorted(mine, key=order.__getitem__)) for _, mine in groups), key=lambda group: order[group[0]])
 
 
-def _digest_with(plan: Plan, document: Document) -> str:
-    vessels = sorted({vessel.digest for vessel in vessels_of(plan)})
-    methods = [{"kind": way.kind, **way.method.model_dump(mode="json", exclude_none=True)} for way in plan.methods]
-    return documents.digest_document(
-        {"study": document, "vessels": vessels, "sources": dict(plan.sources), "methods": methods}
-    )
-
-
 def digest_without_seed(plan: Plan) -> str:
     """Digest of a study without its top-level seed: equal for repetitions in other worlds."""
-    return _digest_with(plan, {key: value for key, value in plan.document.items() if key != "seed"})
+    return replace(plan, document={key: value for key, value in plan.document.items() if key != "seed"}).digest
 
 
 def vessels_of(plan: Plan) -> list[Vessel]:
@@ -229,20 +231,14 @@ def own_code(plan: Plan) -> dict[str, dict[str, str]]:
 
 
 def run_command(plan: Plan) -> str:
-    """The command that runs this study, with its changes: by name if bundled, else by its file.
-
-    A line before it says what the script is where the user wrote a part and no script has started this process.
-    """
+    """The command that runs this study, with its changes: by name if bundled, else by its file."""
     name = (
         plan.name
         if documents.bundled_documents("studies").get(plan.name) == Path(plan.file)
         else quote_argument(plan.file)
     )
     changes = (f"--set {shlex.quote(f'{path}={json.dumps(value)}')}" for path, value in plan.changes.items())
-    program = program_of(plan)
-    missing = program != "shipid" and not _script()
-    note = f"# {USER_SCRIPT}: your script that puts methods into METHODS or terms into TERMS and calls main\n"
-    return note * missing + " ".join([program, "study run", name, *changes])
+    return " ".join([program_of(plan), "study run", name, *changes])
 
 
 def plan_text(plan: Plan) -> str:
@@ -342,14 +338,8 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     check_mapping("changes", changes or {}, "a dotted path to a value", DocumentError)
     file = documents.find_document(str(name), "studies")
     document = documents.read_document(file)
-    for path in changes or {}:
-        head = str(path).split(".", 1)[0]
-        if head not in Study.model_fields:
-            raise DocumentError(
-                f"--set: no such block: {suggest_name(head, Study.model_fields)}", file=file, path=str(path)
-            )
     try:
-        document = documents.replace_values(document, changes or {})
+        document = _changed_document(document, changes or {}, "", Study.model_fields)
     except DocumentError as error:
         raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
     return build_plan(document, file, changes=changes)
@@ -366,16 +356,18 @@ def build_plan(
     try:
         return _check_and_expand(document, file, vessels, sources, changes)
     except DocumentError as error:
-        raise _error_by_name(error, document, tuple(changes or ())) from None
+        raise _error_by_name(error, document, tuple(changes or ()), str(file)) from None
 
 
-def _error_by_name(error: DocumentError, document: Document, changes: Sequence[str]) -> DocumentError:
+def _error_by_name(error: DocumentError, document: Document, changes: Sequence[str], file: str) -> DocumentError:
     """The error with paths by which a person finds the block, families and methods by name; whether --set made it."""
     path = error.path and documents.path_with_names(document, error.path)
-    others = [_error_by_name(other, document, changes) for other in error.others if isinstance(other, DocumentError)]
+    others = [
+        _error_by_name(other, document, changes, file) for other in error.others if isinstance(other, DocumentError)
+    ]
     changed = any(f"{place}.".startswith(f"{change}.") for place in (error.path, path) for change in changes)
     message = f"--set: {error.message}" if changed else error.message
-    return type(error)(message, file=error.file, path=path, others=others)
+    return type(error)(message, file=error.file or file, path=path, others=others)
 
 
 def _check_and_expand(
@@ -386,14 +378,12 @@ def _check_and_expand(
     changes: Mapping[str, Any] | None,
 ) -> Plan:
     documents.check_values(document, file)
-    check_version(document, file)
     study = documents.parse_model(Study, document, file).in_its_world()
-    check_ranges(document, file)
-    check_seeds(study, file)
+    check_ranges(document)
     known = dict(vessels or {})
     foundations = foundations_of(study, file, known)
-    methods = methods_of(study, foundations, file)
-    check_claims(study, foundations, file)
+    methods = methods_of(study, foundations)
+    check_claims(study, foundations)
     batches = tuple(
         Batch(amount, seed)
         for amount in sorted(set(study.grid.N_D), reverse=True)
@@ -401,25 +391,19 @@ def _check_and_expand(
     )
     truth = None
     if study.truth is not None:
-        _check_truth_amounts(study, study.truth, file)
+        _check_amounts_of_truth(study, study.truth)
         base = named_vessel(study.truth.vessel, file, "truth.vessel", known)
-        try:
-            truth = truth_vessel(study.truth, base)
-            check_truth(study.truth, truth)
-        except DocumentError as error:
-            raise DocumentError(error.message, file=file, path=error.path) from None
+        truth = truth_vessel(study.truth, base)
+        check_truth(study.truth, truth)
+        _check_memory(study.truth, truth)
     digests = _sources(study.data, file) if sources is None else sources
     mine = {name: digest for name, digest in digests.items() if OF_PART not in name}
     families = tuple(resolve_families(study.family, file))
-    plan = completed_plan(
-        Plan(
-            *(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine),
-            changes=changes or {},
-            families=families,
-        )
+    plan = Plan(
+        *(file.stem, str(file), document, study, foundations, methods, batches, truth, known, mine),
+        changes=changes or {},
+        families=families,
     )
-    _check_names(plan)
-    _check_memory(plan)
     plan = replace(plan, parts=_parts(plan, file, known, sources))
     theirs = {
         f"{name}{OF_PART}{source}": digest
@@ -427,7 +411,7 @@ def _check_and_expand(
         if part.plan.study.data != study.data
         for source, digest in part.plan.sources.items()
     }
-    return completed_plan(replace(plan, sources={**mine, **theirs}))
+    return replace(plan, sources={**mine, **theirs})
 
 
 def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[str, str] | None) -> dict[str, Part]:
@@ -435,11 +419,9 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
     repeat, conditions = plan.study.repeat, plan.study.condition
     if not repeat and not conditions:
         return {}
-    names = [condition.name for condition in conditions]
-    for place in range(len(names)):
-        if twice := names_of_one_file(names[: place + 1]):
-            raise DocumentError(f"two conditions are called {twice}", file=file, path=f"condition.{place}.name")
+    check_file_names([condition.name for condition in conditions], "condition.*.name", "conditions")
     bare = {key: value for key, value in plan.document.items() if key not in OF_PARTS}
+    blocks = Study.model_fields.keys() - OF_PARTS
     turns = [dict(zip(repeat, values, strict=True)) for values in product(*repeat.values())]
     parts: dict[str, Part] = {}
     for place, condition in enumerate(conditions or [None]):
@@ -447,14 +429,15 @@ def _parts(plan: Plan, file: Path, known: dict[str, Vessel], sources: Mapping[st
             words = [*([condition.name] if condition else []), *([str(number)] if repeat else [])]
             name = "-".join(words)
             mine: dict[str, Any] = {} if condition is None else condition.set
-            part = build_plan(_changed_document(bare, mine, f"condition.{place}.set", file), file, known, plan.sources)
-            part = build_plan(_changed_document(part.document, turn, "repeat", file), file, known, plan.sources)
+            changed = _changed_document(bare, mine, f"condition.{place}.set.", blocks)
+            changed = _changed_document(changed, turn, "repeat.", blocks)
+            part = build_plan(changed, file, known, plan.sources)
             if part.study.data != plan.study.data:
-                part = completed_plan(replace(part, sources=_of_part(name, part, sources)))
+                part = replace(part, sources=_of_part(name, part, sources))
             twin = next((other for other, done in parts.items() if done.plan.study == part.study), None)
             if twin is not None:
                 message = f"{name} has the settings of {twin}: equal studies are no more evidence than one"
-                raise DocumentError(message, file=file, path=f"condition.{place}.set" if conditions else "repeat")
+                raise DocumentError(message, path=f"condition.{place}.set" if conditions else "repeat")
             whole: dict[str, Any] = {"repeat": {}, "condition": []}
             parts[name] = Part(
                 condition.name if condition else "", replace(part, changes={**plan.changes, **whole, **mine, **turn})
@@ -470,47 +453,17 @@ def _of_part(name: str, part: Plan, stored: Mapping[str, str] | None) -> Mapping
     return {key.removeprefix(begins): digest for key, digest in stored.items() if key.startswith(begins)}
 
 
-def _changed_document(document: Document, changes: Mapping[str, Any], where: str, file: Path) -> Document:
-    """A document with changes; DocumentError that names the key of the change where it reaches nothing."""
+def _changed_document(document: Document, changes: Mapping[str, Any], where: str, blocks: Collection[str]) -> Document:
+    """A document with changes; DocumentError that names `where` and the path of a change that reaches nothing."""
     for path, value in changes.items():
-        if path.split(".", 1)[0] not in set(Study.model_fields) - set(OF_PARTS):
-            message = f"no such block: {suggest_name(path, set(Study.model_fields) - set(OF_PARTS))}"
-            raise DocumentError(message, file=file, path=f"{where}.{path}")
+        head = path.split(".", 1)[0]
         try:
+            if head not in blocks:
+                raise DocumentError(f"no such block: {suggest_name(head, blocks)}")
             document = documents.replace_values(document, {path: value})
         except DocumentError as error:
-            raise DocumentError(error.message, file=file, path=f"{where}.{path}") from None
+            raise DocumentError(error.message, path=where + path) from None
     return document
-
-
-def _check_names(plan: Plan) -> None:
-    """Refuse names that are too long for the file of a cell."""
-    for name, way in plan.pairs:
-        longest = max(len(batch.cell(name, way.name)) for batch in plan.batches)
-        if longest > LONGEST_NAME:
-            message = (
-                f"{name[:40]}...: the name of a cell would have {longest} characters, at most {LONGEST_NAME} can be"
-            )
-            raise DocumentError(f"{message}: shorten the names of families and methods", file=plan.file, path="family")
-
-
-def _check_memory(plan: Plan) -> None:
-    """Refuse a truth whose records or windows exceed the memory of this machine, with the number that causes it."""
-    truth = plan.study.truth
-    if truth is None or plan.truth is None:
-        return
-    commands = 2 * len(plan.truth.document.get("thruster", {}))
-    columns = 8 + commands
-    each = {"truth.step": commands + columns * bool(truth.sensors) + 4 * bool(truth.gusts), "truth.interval": columns}
-    for path, between in (("truth.step", truth.step), ("truth.interval", truth.interval)):
-        numbers = truth.manoeuvres * truth.length / between * each[path]
-        words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s"
-        check_memory(numbers, words, path, plan.file)
-    words = f"{plan.study.prediction.interval:g} s: {truth.manoeuvres} runs cut into windows at this interval"
-    numbers = truth.manoeuvres * window_numbers(
-        plan.study.prediction, past_steps(plan), columns, len(plan.foundations), truth.length
-    )
-    check_memory(numbers, words, "prediction.interval", plan.file)
 
 
 def path_from_study(folder: Path, name: str) -> Path:
@@ -540,21 +493,23 @@ def _sources(data: Data | None, file: Path) -> dict[str, str]:
     return digests
 
 
-def _check_truth_amounts(study: Study, truth: Truth, file: Path) -> None:
+def _check_amounts_of_truth(study: Study, truth: Truth) -> None:
     """Refuse a truth with too few manoeuvres for the grid, or too short ones for the horizon."""
     test, most, ahead = study.split.test, max(study.grid.N_D), study.prediction.horizon * study.prediction.step
     if not isinstance(test, int):
-        raise DocumentError("runs of a [truth] are drawn: give the number of test runs", file=file, path="split.test")
+        raise DocumentError("runs of a [truth] are drawn: give the number of test runs", path="split.test")
     pool = truth.manoeuvres - test
-    if truth.manoeuvres < 3:
-        message = f"{truth.manoeuvres}: a study needs 3 or more: 1 to test, 2 to train and validate"
-        raise DocumentError(message, file=file, path="truth.manoeuvres")
-    if pool < 2:
-        message = f"{test}: of {truth.manoeuvres} manoeuvres at most {truth.manoeuvres - 2} can test"
-        raise DocumentError(message, file=file, path="split.test")
-    if pool < most:
-        message = f"{most}: {truth.manoeuvres} manoeuvres less {test} test runs leave {pool}"
-        raise DocumentError(message, file=file, path="grid.N_D")
+    if pool < max(most, 2):
+        message = f"{most}: {truth.manoeuvres} manoeuvres less {test} test runs leave {pool}, and 2 are the fewest"
+        raise DocumentError(message, path="grid.N_D")
     if truth.duration < ahead:
-        message = f"{truth.duration:g} s: shorter than the horizon of {ahead:g} s"
-        raise DocumentError(message, file=file, path="truth.duration")
+        raise DocumentError(f"{truth.duration:g} s: shorter than the horizon of {ahead:g} s", path="truth.duration")
+
+
+def _check_memory(truth: Truth, vessel: Vessel) -> None:
+    """Refuse a truth whose records exceed the memory of this machine, with the number that causes it."""
+    commands = 2 * len(vessel.document.get("thruster", {}))
+    for path, between, columns in (("step", truth.step, commands), ("interval", truth.interval, 8 + commands)):
+        if fault := excess_memory_words(truth.manoeuvres * truth.length / between * columns):
+            words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s {fault}"
+            raise DocumentError(words, path=f"truth.{path}")

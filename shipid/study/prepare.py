@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from shipid.capacity import excess_memory_words
 from shipid.data.causal import causal_columns
-from shipid.data.checks import copies_of_earlier_runs, copies_of_other_runs
+from shipid.data.checks import copies_of_earlier_runs
 from shipid.data.dataset import Dataset, clock_slack, keep_rows, read_dataset, rows_outside_spans, stretches_of_runs
 from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import (
@@ -44,7 +45,6 @@ from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
 from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Batch, Plan, mapping_of, past_steps, path_from_study
-from shipid.study.ranges import check_memory, window_numbers
 from shipid.study.schema import Study
 from shipid.units import percent_text, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
@@ -97,7 +97,7 @@ class PreparedStudy:
 
     def runs(self, batch: Batch) -> tuple[str, ...]:
         """Training and validation runs of a batch: nested over N_D for one seed."""
-        return nested_run_names(self.study, self.pool, batch)
+        return nested_runs(self.pool.spans, self.study.grid.N_D, batch.seed)[batch.N_D]
 
     def folds(self, batch: Batch, windows: Windows, validation: str) -> list[tuple[Array, Array]]:
         """(Training, validation) indices into the windows of a batch, split by run, sharing no moment.
@@ -168,12 +168,11 @@ def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:
         there = f"only {left} {plural_word(left, 'run is', 'runs are')} left for training"
         tested = f"{tests} {plural_word(tests, 'tests', 'test')} (split.test)"
         raise DocumentError(f"{max(amounts)}: {there}, {tested}", path="grid.N_D")
-    for batch in plan.batches:
-        if batch.N_D == 1:
-            try:
-                part_folds(rest.select(rest.run == nested_run_names(plan.study, rest, batch)[0]))
-            except DataError as error:
-                raise DocumentError(f"1: {error.message}; take 2 runs or more", path="grid.N_D") from None
+    for seed in plan.study.grid.seeds if 1 in amounts else ():
+        try:
+            part_folds(rest.select(rest.run == nested_runs(rest.spans, amounts, seed)[1][0]))
+        except DataError as error:
+            raise DocumentError(f"1: {error.message}; take 2 runs or more", path="grid.N_D") from None
 
 
 def over_gaps(dataset: Dataset, windows: Windows) -> list[str]:
@@ -200,18 +199,19 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
         path=path_source(study),
         past=past,
     )
-    lengths = [float(np.ptp(rows["t"])) for _, rows in stretches_of_runs(dataset)]
-    words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval"
+    lengths = np.array([np.ptp(rows["t"]) for _, rows in stretches_of_runs(dataset)])
+    count = (np.maximum(lengths - (prediction.horizon + past) * prediction.step, 0) // prediction.interval + 1).sum()
     columns = len(dataset.frame.columns)
-    numbers = sum(window_numbers(prediction, past, columns, len(plan.foundations), length) for length in lengths)
-    check_memory(numbers, words, "prediction.interval", plan.file)
+    each = (prediction.horizon + 1) * (columns + 6 + 2 * len(plan.foundations)) + past * columns
+    if fault := excess_memory_words(float(count * each)):
+        words = f"{prediction.interval:g} s: {len(lengths)} runs cut into windows at this interval {fault}"
+        raise DocumentError(words, path="prediction.interval")
     try:
         windows = cut(dataset)
     except DataError as error:
-        raise DocumentError(error.message, file=plan.file, path="prediction.ahead") from None
+        raise DocumentError(error.message, path="prediction.ahead") from None
     if study.data is not None and study.data.causal:
-        with _name_study_file(plan):
-            known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
+        known = cut(known_by_then(study, dataset))  # the truth is that of the log, inputs are what was known
         windows = replace(windows, columns=known.columns, past=known.past)
     if prediction.samples is not None:
         windows = windows.select(pd.Series(windows.run).groupby(windows.run).cumcount().to_numpy() < prediction.samples)
@@ -228,12 +228,12 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
     notes += [
         f"{way.name} takes no observer: not fitted to {', '.join(way.left_out)}" for way in plan.methods if way.left_out
     ]
-    notes += _copied_run_notes(dataset, rest, test)
-    longest = max(float(np.ptp(rows["t"])) for _, rows in stretches_of_runs(dataset))
+    if same := copies_of_earlier_runs(dataset, (*rest.spans, *test.spans)):
+        copies = ", ".join(f"{run!r} as {other!r}" for run, other in same.items())
+        notes.append(
+            f"runs that move as others do ({copies}): errors and intervals take them for new: leave out copies"
+        )
     for foundation in plan.foundations:
-        if foundation.identify is not None and foundation.identify.horizon / 2 > longest:
-            message = f"{foundation.identify.horizon:g} s: no run is even half as long, the longest has {longest:g} s"
-            raise DocumentError(message, file=plan.file, path=f"family.{foundation.family}.identify.horizon")
         if foundation.base is not None:
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
@@ -264,28 +264,6 @@ def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
     return Dataset(dataset.frame[[*others, *commands]], dataset.metadata)
 
 
-def _copied_run_notes(dataset: Dataset, rest: Windows, test: Windows) -> list[str]:
-    """Sentences on runs that move as others: test runs as runs that train, and each among themselves."""
-    pairs = {
-        "test runs that move as runs that train do ({}): their errors say nothing of new runs: "
-        "leave out copies": copies_of_other_runs(dataset, test.spans, rest.spans),
-        "test runs that move as other test runs do ({}): each counts as a manoeuvre of its own, so intervals are "
-        "too narrow: leave out copies": copies_of_earlier_runs(dataset, test.spans),
-        "runs that train and move as others that train do ({}): N_D counts each, and validation and bands judge by "
-        "runs whose copies trained: leave out copies": copies_of_earlier_runs(dataset, rest.spans),
-    }
-    return [
-        words.format(", ".join(f"{run!r} as {other!r}" for run, other in same.items()))
-        for words, same in pairs.items()
-        if same
-    ]
-
-
-def nested_run_names(study: Study, pool: Windows, batch: Batch) -> tuple[str, ...]:
-    """Training and validation runs of a batch: nested over N_D for one seed."""
-    return nested_runs(pool.spans, study.grid.N_D, batch.seed)[batch.N_D]
-
-
 def runs_by_amount(study: Study, pool: Windows) -> dict[int, tuple[str, ...]]:
     """Training and validation runs of each amount of data, fewest first, for the least seed."""
     runs = nested_runs(pool.spans, study.grid.N_D, min(study.grid.seeds))
@@ -296,12 +274,10 @@ def _test_runs(study: Study, windows: Windows) -> list[str]:
     wanted, runs = study.split.test, windows.spans
     if isinstance(wanted, int):
         if wanted >= len(runs):
-            there = f"there {plural_word(len(runs), 'is only one run', f'are only {len(runs)} runs')}"
-            raise DocumentError(f"{wanted}: {there}", path="split.test")
+            raise DocumentError(f"{wanted} of only {len(runs)} runs: one must be left to train", path="split.test")
         return list(nested_runs(runs, [wanted], study.split.seed)[wanted])
     if unknown := next((name for name in wanted if name not in runs), None):
-        star = " (a * is not read here)" if "*" in unknown else ""
-        message = f"{unknown!r} is no run with windows{star}: {suggest_name(unknown, runs)}"
+        message = f"{unknown!r} is no run with windows: {suggest_name(unknown, runs)}"
         raise DocumentError(message, path="split.test")
     return wanted
 

@@ -1,31 +1,23 @@
-"""The keys of a study document: blocks as pydantic models, and what to write instead of keys of version 0.1."""
+"""The keys of a study document: blocks as pydantic models."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, NonNegativeInt, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.arguments import whole_steps
 from shipid.data.windows import Commands, PathSource
-from shipid.document import Document, document_leaves
 from shipid.engine.integrate import Method as Integrator
-from shipid.errors import DocumentError, suggest_name
+from shipid.errors import suggest_name
 from shipid.physics.signals import SIGNALS, rows_of_role
 from shipid.predictor import MOST_HORIZON_STEPS
 from shipid.simulation.truth import Truth
 from shipid.vessel.perturb import Family
 
-NAME = r"^[A-Za-z][A-Za-z0-9_.-]*$"
+NAME = r"^[A-Za-z][A-Za-z0-9_.-]{0,79}$"  # a cell has two such names, and file systems allow 255 characters
+Seed = Annotated[int, Field(ge=0, le=2_000_000_000)]  # with 1000 times `seed` below 2^32
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
-OLD_KEYS = {
-    "recipe": 'write [[method]] with kind = "path-drawn" (it was "fast") or "path-trained" (it was "paper"), the same '
-    "name, and the other keys of [recipe] instead",
-    "prediction.horizon": "was a number of steps: write ahead = its product with the step, in seconds",
-    "prediction.method": "is now called `integrator`",
-}
-"""Dotted path of a key of version 0.1 -> what to write instead."""
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
 
@@ -73,7 +65,7 @@ class Split(Strict):
         description="names of the test runs, or how many to draw"
     )
     folds: Annotated[int, Field(ge=1)] = Field(default=1, description="1: 80 % train, 20 % validate; else k-fold")
-    seed: NonNegativeInt = 0
+    seed: Seed = 0
 
 
 class Prediction(Strict):
@@ -111,7 +103,7 @@ class Grid(Strict):
     """`[grid]`: amounts of data and repetitions; every model gets a cell at each."""
 
     N_D: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1, description="runs for training")]
-    seeds: Annotated[list[NonNegativeInt], Field(min_length=1)] = [0]
+    seeds: Annotated[list[Seed], Field(min_length=1)] = [0]
 
 
 class BandsBlock(Strict):
@@ -125,26 +117,8 @@ class BandsBlock(Strict):
     )
 
 
-class Role(NamedTuple):
-    """What a family must be that `[claims]` gives a role.
-
-    pair : the role that must be given, too. unlike : roles before this one that the same family may not have.
-    single : why the family may have one member only; empty: it may have any number.
-    """
-
-    pair: str = ""
-    unlike: tuple[str, ...] = ()
-    single: str = ""
-
-
-ROLES: dict[str, Role] = {
-    "accurate": Role("inaccurate", single="the findings compare one model with one"),
-    "inaccurate": Role("accurate", ("accurate",), single="the findings compare one model with one"),
-    "moderate": Role("high"),
-    "high": Role("moderate", ("moderate",)),
-    "nominal": Role(unlike=("moderate", "high"), single="the nominal row is the base as it is"),
-}
-"""Name of a role, a key of `[claims]`, -> what its family must be."""
+PAIRED_ROLES = (("accurate", "inaccurate"), ("moderate", "high"))  # keys of `[claims]`: both are given, or neither
+ROLES = (*PAIRED_ROLES[0], *PAIRED_ROLES[1], "nominal")
 
 
 class Claims(Strict):
@@ -161,10 +135,11 @@ class Claims(Strict):
 
     @model_validator(mode="after")
     def _pairs(self) -> Claims:
-        lone = next((name for name in self.roles if ROLES[name].pair not in ("", *self.roles)), None)
-        if lone is not None:
-            one, other = (name for name in ROLES if name in (lone, ROLES[lone].pair))
-            raise ValueError(f"give both `{one}` and `{other}`, or neither")
+        for one, other in PAIRED_ROLES:
+            if (one in self.roles) != (other in self.roles):
+                raise ValueError(f"give both `{one}` and `{other}`, or neither")
+            if one in self.roles and self.roles[one] == self.roles[other]:
+                raise ValueError(f"`{one}` and `{other}` are the same family: name two different families")
         return self
 
     @property
@@ -222,7 +197,9 @@ class Study(Strict):
 
     question: Annotated[str, Field(min_length=3)]
     description: str | None = None
-    seed: NonNegativeInt = Field(default=0, description="another world: other manoeuvres, families, data, training")
+    seed: int = Field(
+        default=0, ge=0, le=2_000_000, description="another world: other manoeuvres, families, data, training"
+    )
     truth: Truth | None = None
     data: Data | None = None
     split: Split
@@ -256,12 +233,3 @@ class Study(Strict):
         grid = self.grid.model_copy(update={"seeds": [seed + shift for seed in self.grid.seeds]})
         family = [one.model_copy(update={"seed": one.seed + shift}) for one in self.family]
         return self.model_copy(update={"truth": truth, "split": split, "grid": grid, "family": family})
-
-
-def check_version(document: Document, file: Path) -> None:
-    """Refuse a document of version 0.1: a line for each old key, with what to write instead."""
-    paths = [f"{path}." for path, _ in document_leaves(document)]
-    found = (key for key in OLD_KEYS if any(path.startswith(f"{key}.") for path in paths))
-    old = [DocumentError(OLD_KEYS[key], file=file, path=key) for key in found]
-    if old:
-        raise DocumentError(old[0].message, file=file, path=old[0].path, others=old[1:])

@@ -118,10 +118,8 @@ class StructureComparison:
             notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
         elif others:
             notes.append(f"not shown to be worse: {', '.join(others)}")
-        elif judged := int(self.table["low"].notna().sum()):
-            notes.append(
-                f"all others {'' if judged == len(rows) - 1 else 'that could be judged '}are shown to be worse"
-            )
+        elif self.table["low"].notna().any():
+            notes.append("all others that could be judged are shown to be worse")
         wide = [row for row in self.spread.to_dict("records") if row["spread"] > row["width"]]
         if wide:
             worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
@@ -136,12 +134,11 @@ class StructureComparison:
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""
         vessel = self.fits[self.chosen].vessel
-        odd = list(
-            find_contradictions(vessel.document, vessel.parameters)
-        )  # refused where it is read, unless it is named
+        odd = find_contradictions(vessel.document, vessel.parameters)  # refused where it is read, unless it is named
+        unusual = [*vessel.document.get(UNUSUAL, []), *odd]
         document = {
             **vessel.document,
-            **({UNUSUAL: [*vessel.document.get(UNUSUAL, []), *odd]} if odd else {}),
+            **({UNUSUAL: unusual} if unusual else {}),
             "name": f"{self.vessel.name}, {self.chosen}",
             "source": f"structure {self.chosen} identified from {len(self.runs)} runs of dataset {self.digest} by "
             f"shipid {__version__}, on {self.vessel.key}, digest {self.vessel.digest}",
@@ -193,25 +190,24 @@ def compare_structures(
     length = proposed_horizon(vessel, survey_dataset(dataset))[0] if ahead is None else ahead
     check_length(settings, length)
     report = say or (lambda _: None)
-    parts = [fitted[number :: min(folds, len(fitted))] for number in range(min(folds, len(fitted)))]
+    parts = [part for number in range(folds) if (part := fitted[number::folds])]
     errors, fits, notes, series = list[pd.DataFrame](), dict[str, FittedStructure](), dict[str, str](), dict[str, Any]()
-    counts: dict[str, int] = {}
     for name in names:
         try:
             frames, whole, seen = _errors_and_fit(
                 vessel, name, dataset, settings, parts, fitted, tested, length, report
             )
+        except DataError:
+            raise
         except ShipidError as error:
-            if isinstance(error, DataError):
-                raise
             notes[name] = error.message
             continue
         errors += [frame.assign(structure=name) for frame in frames]
-        fits[name], series[name], counts[name] = whole, seen, len(whole.solution.paths)
+        fits[name], series[name] = whole, seen
     if not fits:
         raise ShipidError("; ".join(f"{name}: {note}" for name, note in notes.items()))
     every = pd.concat(errors, ignore_index=True)
-    table = _structure_table(names, every, counts, notes, fitted)
+    table = _structure_table(names, every, {name: len(fit.solution.paths) for name, fit in fits.items()}, notes, fitted)
     if not np.isfinite(table["position"].iloc[0]):
         raise ShipidError(
             "no structure predicts every run that was held out: give priors, more runs, or a shorter --ahead"
@@ -266,12 +262,8 @@ def check_comparison(
     check_length(settings, ahead or 0.0)
     fitted, tested = pick_runs(dataset, runs, held_out)
     dataset, fitted, shared = without_shared(dataset, fitted, tested)
-    if folds < 2:
-        raise ShipidError(f"{folds}: give two folds or more", path="folds")
-    if folds > max(len(fitted), STRUCTURE_FOLDS):
-        raise ShipidError(
-            f"{folds} folds of {len(fitted)} runs: give as many as there are runs, or fewer", path="folds"
-        )
+    if not 2 <= folds <= max(len(fitted), STRUCTURE_FOLDS):
+        raise ShipidError(f"{folds} folds of {len(fitted)} runs: give 2 or more, at most one a run", path="folds")
     if len(fitted) < 2:
         raise DataError(
             "only one run: give two or more, because each run is predicted by a fit to the others", path="runs"

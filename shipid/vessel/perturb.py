@@ -175,7 +175,7 @@ class Family(CheckedModel, BaseModel):
     """A `[[family]]` block of a study: so many members of one base, perturbed by the same rules."""
 
     model_config = ConfigDict(extra="forbid")
-    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]*$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,79}$")]
     base: str | None = None
     extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
     members: Annotated[int, Field(ge=1, le=100000)] = 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,14 +15,13 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
-from shipid.metrics import position_error
 from shipid.observer import Observer, run_observer
 from shipid.predictor import Predictor
 from shipid.study import foundations, run, store
 from shipid.study import prepare as preparing
 from shipid.study.cells import accuracy_of
 from shipid.study.foundations import predictions
-from shipid.study.plan import Plan, fitted_families, whole_unit
+from shipid.study.plan import Plan, whole_unit
 from shipid.study.prepare import instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
@@ -174,24 +172,6 @@ def test_refits_observe_the_rows_that_they_predict_from(recorded: Recorded, monk
     assert errors[1] == pytest.approx(errors[0], rel=0.1)
 
 
-@pytest.mark.slow
-def test_an_observer_is_chosen_by_the_physics_alone_on_the_runs_of_the_batch(recorded: Recorded) -> None:
-    """Among its levels and fades none predicts the training runs better; the page says whose A moves with the data."""
-    plan, dataset = study(recorded, [WRONG, SEEN])
-    assert fitted_families(plan) == {"seen"}
-    prepared = prepare(plan, dataset)
-    runs = prepared.runs(plan.batches[0])
-    known = predictions(prepared, runs, "cpu")["seen"]
-    windows = prepared.pool.select(np.isin(prepared.pool.run, runs))
-    chosen = position_error(known.paths, windows.future).mean()
-    for waves, fade in product(([0.0], [0.01], [0.0, 0.01]), (0.0, 12.0, 40.0)):
-        block = {**CHOOSING, "choose": False, "waves": waves, "fade": fade}
-        other, _ = study(recorded, [WRONG, {**SEEN, "observer": block}])
-        given = predictions(prepare(other, dataset), runs, "cpu", {"seen"})["seen"]
-        assert chosen <= position_error(given.paths, windows.future).mean() * 1.02, (waves, fade)
-    assert known.seconds > 0
-
-
 def test_what_is_identified_sees_no_moment_of_the_test(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs of 40 s that start 30 s after one another on one clock: rows that the test shares are not handed over."""
     plan, dataset = study(recorded, BOTH)
@@ -251,8 +231,6 @@ def test_a_member_that_diverges_is_redrawn_once_for_it_and_its_identified_twin(r
     ("block", "path", "message"),
     [
         ({"parameters": ["hull.derivatives.Q_q"]}, "family.fitted.identify.parameters", "selects nothing"),
-        ({"parameters": PATHS, "fixed": PATHS}, "family.fitted.identify.fixed", "none is left"),
-        ({"parameters": PATHS, "weight": {}}, "family.fitted.identify.weight", "weights"),
         ({}, "family.fitted.identify.parameters", "missing"),
     ],
 )

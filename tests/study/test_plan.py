@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from shipid.document import bundled_documents, bundled_documents_folder
+from shipid.document import bundled_documents
 from shipid.errors import DocumentError
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.path_drawn import PathDrawn
@@ -70,14 +70,6 @@ def test_the_first_instant_comes_after_the_run_up() -> None:
     windows = all_windows(plan, obtain_runs(plan))
     assert (windows.t.min(), windows.t.max()) == (32.0, 32.0 + 59.0)
     assert set(windows.spans.values()) == {(0.0, 32.0 + 59.0 + 15.0)}
-
-
-@pytest.mark.parametrize(("step", "steps"), [(1.0, 7), (0.5, 13), (4.0, 2)])
-def test_a_past_in_seconds_is_whole_steps(tmp_path: Path, step: float, steps: int) -> None:
-    """As many as hold it."""
-    ahead = {"prediction.ahead": 8.0, "prediction.step": step, "prediction.interval": step}
-    assert past_steps(tiny_plan(tmp_path, {**ahead, "prediction.past": 6.5})) == steps
-    assert past_steps(tiny_plan(tmp_path, ahead)) == 0
 
 
 def test_orders_and_weather_make_pairs_of_runs_and_nothing_else_does(tmp_path: Path) -> None:
@@ -177,13 +169,6 @@ def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:
     assert plan.cells == 4 * 4
 
 
-def test_changes_reach_the_document(tmp_path: Path) -> None:
-    plan = tiny_plan(tmp_path, {"family.1.members": 5, "grid.N_D": [3], "method.0.units": 7, "description": "new"})
-    assert [model.name for model in plan.foundations][1:6] == [f"wrong-{k}" for k in range(1, 6)]
-    assert isinstance(plan.methods[0].method, PathDrawn)
-    assert (plan.batches[0].N_D, plan.methods[0].method.units, plan.study.description) == (3, 7, "new")
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -228,9 +213,7 @@ def test_the_command_of_a_users_method_names_the_script(tmp_path: Path, monkeypa
     monkeypatch.setattr("sys.argv", ["my scripts/own.py", "study", "run", "tiny.toml"])
     assert run_command(plan).startswith(f"python 'my scripts/own.py' study run {tmp_path}/tiny.toml --set ")
     monkeypatch.setattr("sys.argv", ["notebook_kernel.py", "-f", "key"])
-    note, command = run_command(plan).splitlines()
-    assert note.startswith("# my.py: your script ")
-    assert command.startswith("python my.py study run ")
+    assert run_command(plan).startswith("python my.py study run ")
 
 
 def test_digest_follows_the_document(tmp_path: Path) -> None:
@@ -241,25 +224,12 @@ def test_digest_follows_the_document(tmp_path: Path) -> None:
     assert build_plan(turned, Path(plain.file)).digest == plain.digest
 
 
-@pytest.mark.parametrize("role", ["truth", "base"])
-def test_digest_follows_every_vessel(tmp_path: Path, role: str) -> None:
-    """Not only models, the vessel behind the truth too changes what comes out."""
-    document = tmp_path / "own.toml"
-    original = (bundled_documents_folder("models") / "gunnerus-28.9.toml").read_text()
+def test_digest_follows_the_vessel_of_the_truth(tmp_path: Path) -> None:
+    document, original = tmp_path / "own.toml", Path(bundled_documents("models")["gunnerus-28.9"]).read_text()
     document.write_text(original)
-    change = {"truth.vessel": "./own.toml"} if role == "truth" else {"family.0.base": "./own.toml"}
-    before = tiny_plan(tmp_path, change).digest
-    document.write_text(re.sub(r"(?m)^m( *)= [\d.]+", r"m\1= 400000.0", original, count=1))
-    assert load_vessel(str(document)).parameters["inertia.m"] == 400000.0
-    assert tiny_plan(tmp_path, change).digest != before
-
-
-def test_truth_takes_its_blocks(tmp_path: Path) -> None:
-    lag = {"kind": "first_order", "T": 2.0, "rate": 0.1}
-    plan = tiny_plan(tmp_path, {"truth.set": {"thruster.port.actuator.n": lag}})
-    assert plan.truth is not None
-    assert plan.truth.parameters["thruster.port.actuator.n.T"] == 2.0
-    assert all("actuator" not in path for model in plan.foundations if model.vessel for path in model.vessel.parameters)
+    before = tiny_plan(tmp_path, {"truth.vessel": "./own.toml"}).digest
+    document.write_text(original.replace("L_oa = 31.25", "L_oa = 31.3"))
+    assert tiny_plan(tmp_path, {"truth.vessel": "./own.toml"}).digest != before
 
 
 def test_work_is_cut_where_cells_share_hardly_anything(tmp_path: Path) -> None:

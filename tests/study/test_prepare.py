@@ -82,26 +82,6 @@ def test_data_sets_are_nested_and_never_hold_a_test_run(tiny: tuple[Plan, Datase
     assert set(first) != set(second)
 
 
-@pytest.mark.parametrize("folds", [1, 2, 3])
-def test_folds_are_by_run(tiny: tuple[Plan, Dataset, PreparedStudy], folds: int) -> None:
-    plan, _, prepared = tiny
-    split = plan.study.split.model_copy(update={"folds": folds})
-    prepared = replace(prepared, study=plan.study.model_copy(update={"split": split}))
-    for batch in plan.batches:
-        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
-        pairs = prepared.folds(batch, windows, "share")
-        assert len(pairs) == min(folds, batch.N_D)
-        validated: list[str] = []
-        for train, validation in pairs:
-            assert not set(windows.run[train]) & set(windows.run[validation])
-            assert len(train) + len(validation) == len(windows)
-            validated += set(windows.run[validation])
-        if folds == 1:
-            assert len(validated) == max(1, round(0.2 * batch.N_D))
-        else:
-            assert sorted(validated) == sorted(prepared.runs(batch))
-
-
 def test_constant_motion_is_the_integral(tiny: tuple[Plan, Dataset, PreparedStudy]) -> None:
     """Midpoint rule with 2,000 steps a second; r = 0 included."""
     windows = tiny[2].test.select(slice(0, 12))
@@ -272,11 +252,6 @@ def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Da
     ("changes", "path", "message"),
     [
         ({"split": {"test": ["z"]}}, "split.test", "'z' is no run with windows: valid: a, b, c, d"),
-        (
-            {"split": {"test": ["a*"]}},
-            "split.test",
-            r"is no run with windows \(a \* is not read here\): did you mean 'a'",
-        ),
         ({"split": {"test": 4}}, "split.test", "only 4 runs"),
         ({"split": {"test": 2}, "grid": {"N_D": [3]}}, "grid.N_D", "only 2 runs are left"),
         ({"split": {"test": 1}, "prediction": {"ahead": 40.0}}, "prediction.ahead", "as long as the horizon of 40 s"),
@@ -365,10 +340,7 @@ def test_a_test_run_that_is_a_copy_of_one_that_trains_is_named(
     for test, other in (("a", "again"), ("again", "a")):
         plan, dataset = recorded(twice, split={"test": [test, "c"]}, prediction={"ahead": 5.0})
         (note,) = (words for words in prepare(plan, dataset).notes if "copies" in words)
-        assert note.startswith(f"test runs that move as runs that train do ({test!r} as {other!r}): ")
-    for test in ("b", "f"):
-        plan, dataset = recorded(twice, split={"test": [test]}, prediction={"ahead": 5.0})
-        assert not [words for words in prepare(plan, dataset).notes if words.startswith("test runs that move")]
+        assert note.startswith(f"runs that move as others do ({test!r} as {other!r}): ")
 
 
 def test_a_ship_at_rest_is_no_copy(recorded: Callable[..., tuple[Plan, Dataset]]) -> None:

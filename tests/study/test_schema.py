@@ -1,27 +1,10 @@
-"""Keys of a study document: those of version 0.1, and times in whole steps."""
+"""Keys of a study document: times in whole steps."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from shipid.errors import DocumentError
-from shipid.study.plan import read_plan
-from shipid.study.schema import OLD_KEYS, Prediction
-
-FOLDER = Path(__file__).parents[1] / "bad" / "studies"
-
-
-def test_a_document_of_version_0_1_is_answered_as_a_whole(tmp_path: Path) -> None:
-    """Every old key in one message, a line each with its file and path; done, the document is one of today."""
-    text, file = (FOLDER / "recipe-of-old.toml").read_text(), tmp_path / "old.toml"
-    file.write_text(text.replace("ahead = 5.0", 'horizon = 10\nstep = 0.5\nmethod = "rk4"'))
-    with pytest.raises(DocumentError) as caught:
-        read_plan(file)
-    assert str(caught.value).split("\n") == [f"{file}: {key}: {new}" for key, new in OLD_KEYS.items()]
-    file.write_text(text.replace('[recipe]\nkind = "fast"', '[[method]]\nname = "path-drawn"\nkind = "path-drawn"'))
-    assert read_plan(file).methods[0].kind == "path-drawn"
+from shipid.study.schema import Prediction
 
 
 @pytest.mark.parametrize(("ahead", "step", "steps"), [(30.0, 1.0, 30), (10.0, 1 / 3, 30), (5.0, 0.3333333, 15)])

@@ -135,9 +135,9 @@ def test_what_cannot_be_compared_is_refused() -> None:
     data = zigzags(SHIP)
     with pytest.raises(DataError, match="only one run"):
         compare_structures(SHIP, data, SETTINGS, ["mmg"], runs=["10_5_627"])
-    with pytest.raises(ShipidError, match="two folds or more"):
+    with pytest.raises(ShipidError, match="1 folds of"):
         compare_structures(SHIP, data, SETTINGS, ["mmg"], folds=1)
-    with pytest.raises(ShipidError, match=r"1000 folds of \d+ runs: give as many"):
+    with pytest.raises(ShipidError, match="1000 folds of"):
         compare_structures(SHIP, data, SETTINGS, ["mmg"], folds=1000)
     with pytest.raises(DataError, match="must hold two steps"):
         compare_structures(SHIP, data, SETTINGS, ["mmg"], ahead=0.5)

@@ -181,7 +181,7 @@ def test_a_family_with_an_observer_is_refused_by_name(whole: Finished) -> None:
     for families, message in (
         (["seen"], "'seen' has an observer, which one-step does not take: name the family it extends"),
         (["seen*"], "no method meets 'wrong': name its family in `families`"),
-        (["*"], "no method meets 'seen': add one that takes an observer, such as alone"),
+        (["*"], "no method meets 'seen': name its family in `families`; one with an observer needs"),
     ):
         method = [{"name": "steps", "kind": "one-step", "families": families}]
         with pytest.raises(DocumentError, match=re.escape(message)):
