@@ -152,6 +152,16 @@ class PathDrawn(SearchMethod):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
+        from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
 
-        return tune_ridge(task, self)
+        recipe = Recipe(
+            corrector=self.corrector,
+            inputs=self.inputs(task.commands),
+            units=self.units,
+            terms=self.terms,
+            ridges=self.path(),
+            search_windows=self.search_windows,
+            points=self.points,
+            left_out=self.left_out,
+        )
+        return tune_ridge(task, self, recipe)

@@ -15,7 +15,7 @@ The best ones are judged once more, and solved, with all of them: successive hal
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -27,14 +27,14 @@ from torch import Tensor
 
 from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Network, smooth_basis
-from shipid.hybrid.features import input_group
+from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.products import hidden_layer, matrix_product
 from shipid.hybrid.search import (
     CLOSING_TRIALS,
     Point,
     Search,
+    SearchMethod,
     diverged_result,
     seed_of,
     trial_row,
@@ -52,7 +52,26 @@ SPARE_TRIALS = 4  # further trials whose errors without each run are kept
 LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
 
 
-def tune_ridge(task: Task, method: PathDrawn) -> dict[str, FitResult]:
+@dataclass(frozen=True)
+class Recipe:
+    """How networks are drawn and solved.
+
+    corrector : the class of what they make. inputs : which quantities they may take. units : hidden units drawn.
+    terms : polynomials of time. ridges : those of which a trial takes one for each model, rising. search_windows : how
+    many judge all trials, about. points : gives the trials anew. left_out : trial -> kinds of memory that it lacks.
+    """
+
+    corrector: type[Any]
+    inputs: Inputs
+    units: int
+    terms: int
+    ridges: Sequence[float]
+    search_windows: int
+    points: Callable[[], Iterable[Point]]
+    left_out: Callable[[Point], frozenset[str]]
+
+
+def tune_ridge(task: Task, method: SearchMethod, recipe: Recipe) -> dict[str, FitResult]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -60,7 +79,7 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, FitResult]:
     of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
     chooses the trials that are judged by all, and of these the best make the compensator.
     """
-    tuning = _RidgeTuning(task, method)
+    tuning = _RidgeTuning(task, method, recipe)
     tuning.search()
     return {key: tuning.fitted(key) for key in task.cases}
 
@@ -198,16 +217,16 @@ class _RidgeTuning:
     windows as judges; first : those that judge all trials. rows : of each foundation, its trials.
     """
 
-    def __init__(self, task: Task, method: PathDrawn) -> None:
-        self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
+    def __init__(self, task: Task, method: SearchMethod, recipe: Recipe) -> None:
+        self.task, self.method, self.recipe = task, method, recipe
         self.windows, self.targets = windows_of_folds(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
-        tables = _tables_of_windows(shared_tables(task, self.inputs), self.windows)
+        tables = _tables_of_windows(shared_tables(task, recipe.inputs), self.windows)
         self.tables = {key: tables[key] for key in sound}
-        self.basis = smooth_basis(task.windows.horizon, method.terms)
+        self.basis = smooth_basis(task.windows.horizon, recipe.terms)
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
         self.every = _JudgingWindows.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
-        rows = part_of_runs(task.windows.run[self.windows], method.search_windows)
+        rows = part_of_runs(task.windows.run[self.windows], recipe.search_windows)
         lacks = any(not np.isin(part, self.windows[rows]).any() for fold in task.folds for part in fold)
         self.whole = len(rows) == len(self.windows) or lacks  # no fold may lose all windows of a part
         self.first = self.every if self.whole else _JudgingWindows.of(task, self.windows, rows, sound, self.basis)
@@ -223,7 +242,7 @@ class _RidgeTuning:
         closing = CLOSING_TRIALS if self.whole else FINAL_PRICE * self.finalists
         search = Search(self.task, self.paths, self.method, again=True, closing=closing)
         promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.paths}
-        for number, point in search.left(self.method.points() if self.paths else ()):
+        for number, point in search.left(self.recipe.points() if self.paths else ()):
             self.points[number] = point
             made: dict[str, Row] = {}
             for group in self._groups(number):
@@ -268,7 +287,7 @@ class _RidgeTuning:
         With a single fold there are none: nothing but that fold can choose the trials that judge it.
         """
         if key not in self.best:
-            return diverged_result(self.method, self.method.points())
+            return diverged_result(self.method, self.recipe.points())
         best, errors = self.best[key], None
         folds = [row.numpy() for block in self.every.blocks for row in block.rows]
         if len(folds) > 1:
@@ -276,12 +295,12 @@ class _RidgeTuning:
             errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
             errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
         params, networks = zip(*(kept for _, kept in best.networks), strict=True)
-        corrector, rows = self.method.corrector(self.inputs, networks, params[0]), self.rows[key]
+        corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
         return FitResult(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
     def _groups(self, number: int, *, whole: bool = False) -> list[_FoundationGroup]:
         """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""
-        left_out = self.method.left_out(self.points[number])
+        left_out = self.recipe.left_out(self.points[number])
         if left_out not in self.groups:
             self.groups[left_out] = _group_foundations(self.tables, self.paths, left_out)
         if whole or self.whole:
@@ -293,10 +312,10 @@ class _RidgeTuning:
         self, group: _FoundationGroup, number: int, judges: _JudgingWindows, wanted: Mapping[str, Index] | None = None
     ) -> dict[str, _TrialVerdict]:
         """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
-        point, terms, ridges = self.points[number], self.basis.shape[1], self.method.path()
+        point, terms, ridges = self.points[number], self.basis.shape[1], self.recipe.ridges
         mirrored = bool(point["mirror"]) and group.mirrored is not None
         seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
-        units = seen.draw(point, self.method.units, seed_of(self.task.seed, number))
+        units = seen.draw(point, self.recipe.units, seed_of(self.task.seed, number))
         layer = _hidden_weights(units)  # the same array for all foundations
         parts = _coordinates_of_trial(values, units, group.outputs)
         asked = None

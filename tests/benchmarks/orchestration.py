@@ -24,7 +24,6 @@ import numpy as np
 import torch
 
 from shipid.answer.start import event_line
-from shipid.hybrid import ridge
 from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.study import run as study
@@ -39,7 +38,7 @@ KNOWN = {"grid.N_D": [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]}  # 60 cells
 REAL = {"grid.N_D": [30], "grid.seeds": list(range(10)), "method.0.trials": 30}
 PRODUCT, PRODUCTS = 1500, 40  # order of the matrices, and how many products each of two tasks is
 
-run_unit, tune_ridge = study.run_unit, ridge.tune_ridge
+run_unit, drawn_fit = study.run_unit, PathDrawn.fit
 
 
 def run() -> dict[str, Any]:
@@ -74,13 +73,13 @@ def overhead() -> dict[str, Any]:
 
 def known_unit(plan: Plan, prepared: PreparedStudy, unit: Unit, device: str, trials: Path | None = None) -> Any:
     """As `run_unit`, with cells that take a known time."""
-    with patch.object(ridge, "tune_ridge", _known_tune):
+    with patch.object(PathDrawn, "fit", _known_fit):
         return run_unit(plan, prepared, unit, device, trials)
 
 
-def _known_tune(task: Task, method: PathDrawn) -> dict[str, FitResult]:
+def _known_fit(method: PathDrawn, task: Task) -> dict[str, FitResult]:
     begun = time.thread_time()
-    tuned = tune_ridge(task, method.model_copy(update=LIGHT))
+    tuned = drawn_fit(method.model_copy(update=LIGHT), task)
     a = np.ones((64, 64))
     while time.thread_time() - begun < CELL * len(task.cases):
         a @ a
