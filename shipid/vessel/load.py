@@ -104,16 +104,21 @@ class Vessel:
             if not documents.is_valid_for(model, documents.replace_values(self.document, {path: 0.0}))
         )
 
-    @cached_property
+    @property
     def mass(self) -> NDArray[np.float64]:
-        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; not to be changed."""
+        """Mass plus added mass (n, n) [kg, kg m, kg m^2] in the degrees of freedom of the vessel; a copy."""
         import numpy as np
 
+        return np.array(self._mass)
+
+    @cached_property
+    def _mass(self) -> list[list[float]]:
         numbers: list[dict[str, Any]] = [
             {name: self.parameters[target] if isinstance(target, str) else target for name, target in block.items()}
             for block in (self.bound["inertia"], self.bound["added_mass"])
         ]
-        return np.array(total_mass(*numbers))[np.ix_(self.axes, self.axes)]
+        M = total_mass(*numbers)
+        return [[M[row][column] for column in self.axes] for row in self.axes]
 
     @cached_property
     def structure(self) -> str:
@@ -398,21 +403,23 @@ def _check_inertia(vessel: Vessel) -> None:
             raise DocumentError(
                 f"missing: {len(vessel.axes)} degrees of freedom need it", file=vessel.file, path=f"inertia.{name}"
             )
-    if not _is_positive(vessel.mass):
+    if not _is_positive(vessel._mass):
         remedy = (
             "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
         )
         raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
 
 
-def _is_positive(M: NDArray[np.float64]) -> bool:
-    """Whether a matrix is positive definite, by its symmetric part."""
-    import numpy as np
-
-    try:
-        np.linalg.cholesky(M + M.T)
-    except np.linalg.LinAlgError:
-        return False
+def _is_positive(M: list[list[float]]) -> bool:
+    """Whether a matrix is positive definite: all pivots of its symmetric part are above 0."""
+    rows = [[M[i][j] + M[j][i] for j in range(len(M))] for i in range(len(M))]
+    while rows:
+        (pivot, *right), *below = rows
+        if not pivot > 0:
+            return False
+        rows = [
+            [entry - first / pivot * above for entry, above in zip(rest, right, strict=True)] for first, *rest in below
+        ]
     return True
 
 
