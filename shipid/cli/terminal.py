@@ -103,6 +103,7 @@ def log_to_stderr(verbose: bool) -> None:
     import logging
 
     logger, handler = logging.getLogger("shipid"), logging.StreamHandler()
+    handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger.handlers = [handler]
     if verbose:
