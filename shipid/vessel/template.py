@@ -24,8 +24,6 @@ from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.regressions import (
-    AREA_RATIO,
-    BLADES,
     PITCHES,
     correlation_allowance,
     form_factor,
@@ -439,7 +437,7 @@ def propeller_values(given: Particulars, side: int = 0) -> Values:
     (D, K_T, size, balance), (w_P0, wake) = guess_screw(given), _wake_fraction(given)
     drift = "KVLCC2, mean of both sides"
     t_P, deduction = _thrust_deduction(given, D)
-    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {balance}"
+    series = f"Wageningen B 4-55, {balance}"
     return {
         "x": TemplateValue(-0.48 * L, "m", "-0.48 L"),
         **({"y": TemplateValue(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
