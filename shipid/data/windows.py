@@ -45,8 +45,6 @@ FUTURE_STATES = ("u", "v", "r", "psi")
 class Instants:
     """What is known at S instants of prediction; every array is in SI units, time first.
 
-    Parameters
-    ----------
     columns : every measured column at the instant, name -> (S,); angles, also of thrusters and rudders, go on within
         the run as in an imported log: -10 deg after 0, not 350.
     past : the same columns P, ..., 1 steps before the instant, the oldest first, name -> (P, S); empty where no method
@@ -89,8 +87,6 @@ class Instants:
 class Windows:
     """S windows with a horizon of T steps; every array is in SI units, time first.
 
-    Parameters
-    ----------
     run : name of the run, (S,).
     t : instant of prediction on the clock of the recording [s], (S,).
     columns : every dataset column at that instant, name -> (S,); angles unwrapped within the run.
@@ -232,8 +228,6 @@ def cut_windows(
     instant, its past included, depends on no later row. Rows farther apart than the interval give a window each.
     Windows come run by run, by name, so that no fit depends on the order of the runs in the table.
 
-    Parameters
-    ----------
     dataset : the recorded or simulated runs.
     horizon, step : T, and its step [s].
     interval : time between instants of prediction [s].
@@ -525,8 +519,6 @@ def run_folds(
 ) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """(Training, validation) indices of windows, split by run, so that no moment is seen by both.
 
-    Parameters
-    ----------
     validation : `runs` leaves out every run in turn; `share` holds out a fifth of the runs, drawn by `seed`.
     num_folds : with 2 or more, runs are dealt into so many folds instead, or as many as there are runs.
 

@@ -63,8 +63,6 @@ def rollout_gradient(
     it agrees with finite differences of `rollout` for any step. Exactly on a kink, such as |v| at v = 0, it is finite;
     where several kinks meet, as at rest, it may be the derivative of neither side.
 
-    Parameters
-    ----------
     start, commands, environment, memory, tau_extra, step, num_steps, method : as in `rollout`.
     loss : path (num_steps + 1, S, C) of the channels `keep` -> (loss (S,), slope d(loss)/d(path), shaped as the path);
         such as `squared_distance_loss(goal)`.

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -74,8 +73,6 @@ def rollout(
 ) -> Trajectories:
     """Open-loop prediction of many samples by many variants of one vessel structure.
 
-    Parameters
-    ----------
     start : state name -> (S,), SI; names that the vessel does not have are passed over, missing ones raise DataError.
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
@@ -297,9 +294,8 @@ def _stack_channels(
     columns = []
     for name in names:
         if name not in given:
-            close = get_close_matches(name, [str(other) for other in given if other not in names], n=1)
-            remedy = f"did you mean {close[0]!r}?" if close else f"give an array {shapes[0]}"
-            raise DataError(f"{what} {name!r} is needed by {vessel.name} and missing: {remedy}", file=vessel.file)
+            words = f"{what} {name!r} is needed by {vessel.name} and missing: give an array {shapes[0]}"
+            raise DataError(words, file=vessel.file)
         column = as_float_array(f"{what} {name!r}", given[name])
         if column.shape not in shapes:
             raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")

@@ -2,8 +2,7 @@
 
 sin, cos, tanh and atan2 are written out where the processor multiplies and adds in one instruction: a call of a
 library would move all registers to memory and back. Their polynomials are Chebyshev approximations of the functions
-that `Precision` names. The largest error over the 12,000 arguments a function of tests/engine/test_vectors.py is 2.1
-units in the last place, in single precision 2.3; the test allows 4.
+that `Precision` names; tests/engine/test_vectors.py allows 4 units in the last place.
 """
 
 from __future__ import annotations

@@ -25,13 +25,11 @@ STRAIGHT_RATE = 0.25  # of the greatest yaw rate, up to which a ship goes straig
 def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = None) -> Record:
     """Record of one run from the columns of a dataset.
 
-    The helm is the mean of the angle commands that move, by a quarter of the one that moves most or more: a bow unit
-    parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
-    that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
-    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. In a stop it is the slowest of
-    those that are reversed, or stopped where none is reversed. A shaft with a controllable
-    pitch counts as its speed times the pitch over the greatest pitch; that of an azimuth unit which is turned to push
-    astern as its speed times 1 at 0 deg, 0 at 90 deg and -1 at 180 deg, in proportion to the angle.
+    The helm is the mean of the angle commands that move by a quarter of the one that moves most or more, each with the
+    sign that turns the ship to starboard: that in `helm`, angle command -> +1 or -1, where the vessel is known; else
+    that of the sum of angle times change of yaw rate. The shaft is the mean of the speeds that are not 0 at the start;
+    in a stop the slowest of those that are reversed, else stopped. It counts times the pitch over the greatest pitch,
+    and that of an azimuth unit turned astern times 1 at 0 deg to -1 at 180 deg.
 
     DataError for a missing column.
     """

@@ -32,8 +32,6 @@ CREEPING_CHANGE, REMAINING_CHANGE = (
 class Record:
     """One manoeuvre, arrays (N,), SI.
 
-    Parameters
-    ----------
     t : increasing [s].
     north, east, psi : place [m] and heading [rad] of the logged point; the heading may jump by full turns.
     u, v, r : velocity over ground along and across the heading [m/s], yaw rate [rad/s].
@@ -225,8 +223,6 @@ def start_of_change(t: Array, order: Array, index: int) -> float:
 class FirstExecute:
     """The first execute: the helm is first put over.
 
-    Parameters
-    ----------
     start : time [s] at which the helm begins to move; NaN if it never moves.
     row : first row with at least half of the angle.
     angle : helm angle [rad], the median of the angles above half of the largest. side : +1 to starboard, -1 to port.

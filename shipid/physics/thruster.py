@@ -52,9 +52,8 @@ def azimuth_wrench(
     n [rev/s], alpha [rad, > 0 turns the thrust to starboard]; J, J_y from the water velocity in the axes of the unit,
     J = u'/(|n| D_p), its sign reversed for n < 0. The polynomials are used inside J_min..J_max and |J_y| < Jy_max and
     continued beyond (k_over, k_over2 over-running; k_under; k_side, k_sideJ side drag). Astern thrust is k_astern times
-    ahead thrust. Finite at n = 0, where the over-running drag remains: with u' > 0 it is k_T rho D_p^2 k_over2 u'^2 for
-    n -> 0 from above and at 0, and nothing from below. So the force has this step at n = 0 where k_over2 is not 0; for
-    u' < 0 the step is k_astern times as large. A unit that is reversed at speed passes it.
+    ahead thrust. At n = 0 the force has a step where k_over2 is not 0: k_T rho D_p^2 k_over2 u'^2 of over-running drag
+    from above, nothing from below.
     """
     along, across = nu_r[0] - nu_r[5] * y, nu_r[1] + nu_r[5] * x
     c, s = ca.cos(alpha), ca.sin(alpha)

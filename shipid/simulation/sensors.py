@@ -45,8 +45,6 @@ def measure_record(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: 
     the next. Bias and noise are normal, drawn by hash(seed, run, column): other runs, other columns and more rows do
     not change them. A column without a sensor is copied.
 
-    Parameters
-    ----------
     fine : columns `run`, `t` [s] and others (SI), `t` in equal steps within each run.
 
     DocumentError where `interval` is no multiple of the record's step.

@@ -9,7 +9,7 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval2d
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from shipid.units import GRAVITY
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 PITCHES = (0.4, 1.5)  # P / D of the Wageningen B-series, 0.5 to 1.4, with a little on either side
 
-# K_T of a Wageningen B 4-55 screw, usual for merchant ships: row s and column t are the factor of J^s (P / D)^t. Table 5
-# of Oosterveld and van Oossanen (1975), Reynolds number 2e6, with four blades and an area ratio of 0.55.
+# K_T of a Wageningen B 4-55 screw, usual for merchant ships: row s, column t are the factor of J^s (P / D)^t.
+# Oosterveld and van Oossanen (1975), table 5, Reynolds number 2e6, with four blades and an area ratio of 0.55.
 K_T_SERIES = (
     (0.0197526437, 0.2237434, 0.381633694, -0.207260926, 0.0, 0.0, 0.00638407),
     (-0.23762198, -0.02209295, -0.02618432, 0.0673696, 0.0, 0.0, -0.0020949295),
@@ -30,7 +30,7 @@ K_T_SERIES = (
 
 def series_thrust_coefficient(J: Array, pitch: float) -> Array:
     """K_T [-] of a Wageningen B 4-55 screw at advance ratios J (N,) and pitch ratio P / D."""
-    return np.asarray(polyval2d(J, pitch, K_T_SERIES))
+    return np.asarray(polyval(J, np.array(K_T_SERIES) @ pitch ** np.arange(7)))
 
 
 @cache

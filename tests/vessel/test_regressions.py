@@ -80,7 +80,7 @@ def test_the_series_is_near_the_screw_of_kvlcc2() -> None:
     assert series_thrust_coefficient(J, 0.721) == pytest.approx(0.2931 - 0.2753 * J - 0.1385 * J**2, abs=0.025)
 
 
-# Oosterveld and van Oossanen (1975), table 5, compared with the print term by term: c, and powers of J, P / D, A_E / A_O, Z
+# Oosterveld and van Oossanen (1975), table 5, as printed: c, and powers of J, P / D, A_E / A_O, Z
 TABLE_5 = (
     (0.00880496, 0, 0, 0, 0), (-0.204554, 1, 0, 0, 0), (0.166351, 0, 1, 0, 0), (0.158114, 0, 2, 0, 0),
     (-0.147581, 2, 0, 1, 0), (-0.481497, 1, 1, 1, 0), (0.415437, 0, 2, 1, 0), (0.0144043, 0, 0, 0, 1),
