@@ -378,17 +378,11 @@ def _check_overlap(run: str, motions: Mapping[str, _Motion], shared: bool) -> di
     return _check_row("overlap", double, "1", OVERLAP_LIMIT, sentence)
 
 
-def copies_of_other_runs(dataset: Dataset, runs: Iterable[str], others: Collection[str]) -> dict[str, str]:
-    """Runs, and the one of some others with their motion in most rows: recorded twice, or cut from one log twice."""
-    return _copies_among(dataset, runs, list(others), grow=False)
-
-
-def copies_of_earlier_runs(dataset: Dataset, runs: Iterable[str]) -> dict[str, str]:
-    """Runs, and the one of those before them with their motion in most rows, as in `copies_of_other_runs`."""
-    return _copies_among(dataset, runs, [], grow=True)
-
-
-def _copies_among(dataset: Dataset, runs: Iterable[str], earlier: list[str], *, grow: bool) -> dict[str, str]:
+def copies_of_other_runs(
+    dataset: Dataset, runs: Iterable[str], others: Collection[str] | None = None
+) -> dict[str, str]:
+    """Runs, and the one of some others (None: of those before them) with their motion in most rows."""
+    earlier = list(others or ())
     motions = {run: _motion(parts) for run, parts in stretches_by_run(dataset).items()}
     known = {key for run in earlier for key in motions[run].keys.tolist()}
     found: dict[str, str] = {}
@@ -399,7 +393,7 @@ def _copies_among(dataset: Dataset, runs: Iterable[str], earlier: list[str], *, 
         ):  # of few runs: only then one by one
             share, other = max((_share_of_same_motion(motions[run], motions[name]), name) for name in earlier)
             found |= {run: other} if share >= OVERLAP_LIMIT else {}
-        if grow:
+        if others is None:
             earlier.append(run)
             known.update(keys)
     return found

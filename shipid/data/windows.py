@@ -224,9 +224,8 @@ def cut_windows(
 ) -> Windows:
     """Cut a window every `interval` [s], its whole past and future inside one unbroken stretch of one run.
 
-    An instant of prediction is a row: the last one at or before each multiple of the interval. So what is known at an
-    instant, its past included, depends on no later row. Rows farther apart than the interval give a window each.
-    Windows come run by run, by name, so that no fit depends on the order of the runs in the table.
+    An instant of prediction is a row: the last one at or before each multiple of the interval, so that what is known
+    depends on no later row. Windows come run by run, by name, whatever the order of the runs in the table.
 
     dataset : the recorded or simulated runs.
     horizon, step : T, and its step [s].
@@ -331,9 +330,8 @@ def _bent_positions(
 ) -> tuple[Array, Array]:
     """North and east [m] at instants, of one stretch whose rows farther apart than `longest` [s] a curve joins.
 
-    The curve is what u, v, psi travel, and what is then missing to the next row grows evenly; so it passes through the
-    rows, and a steady current or offset of the velocities bends nothing. At rows it is `values` to the bit. Where the
-    velocities miss more than `LARGEST_MISS` of the way between two rows the line stays straight.
+    The curve is what u, v, psi travel, and what is then missing to the next row grows evenly: a steady current bends
+    nothing. Where the velocities miss more than `LARGEST_MISS` of the way between two rows the line stays straight.
     """
     t = np.asarray(rows["t"])
     slack, apart = clock_slack(t), np.diff(t)

@@ -31,8 +31,7 @@ PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time wher
 class Trajectories:
     """Result of a rollout.
 
-    u, v and r are along the axes of the ship; those of a log are horizontal, which differs where she heels or trims:
-    `shipid.simulation.log.horizontal_velocities` converts them.
+    u, v and r are along the axes of the ship; those of a log are horizontal, see `horizontal_velocities`.
 
     states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
     diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
@@ -161,8 +160,7 @@ def rollout_distances(
 ) -> Distances:
     """Distances of variants to true positions `goal` (T, S, 2) [m] north and east after each of T steps.
 
-    For the other arguments see `rollout`. The native engine computes the distances during the rollout, so its memory
-    does not grow with the horizon. Other engines keep the paths of a few variants at a time.
+    For the other arguments see `rollout`. The native engine keeps no path, others those of a few variants at a time.
     """
     num_steps = len(goal)
     asked = engine_by_name(engine, device)

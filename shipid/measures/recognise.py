@@ -88,11 +88,9 @@ def _commands_that(columns: Mapping[str, Array], wanted: Callable[[str], bool]) 
 def recognise_kinds(record: Record) -> tuple[tuple[str, ...], str]:
     """Kinds of manoeuvre of a run as `shipid manoeuvre` names them, and the reason as a sentence if there is none.
 
-    Stop: the shaft changes from ahead to astern, by its speed, its pitch or the angle of its unit. The other kinds
-    follow from the helm, and the ship must be on a straight course when the helm is first put over. Zigzag: the helm is
-    reversed at least once while the heading changes by less than 90 deg. Turning: the helm stays on one side for 90 deg
-    or more. Pull-out, in addition: the helm is then amidships for at least a fifth of the time of the turn. Many helm
-    levels are a spiral; the user has to say which kind.
+    Stop: the shaft changes from ahead to astern. Else the course is straight when the helm is first put over. Zigzag:
+    the helm is reversed while the heading changes by less than 90 deg. Turning: it is on one side for 90 deg or more.
+    Pull-out, in addition: it is then amidships for a fifth of the time of the turn. Of a spiral the user has to say so.
     """
     shaft, over = record.shaft, first_execute(record)
     if shaft is not None and shaft[0] > 0 > shaft.min():

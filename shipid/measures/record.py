@@ -72,9 +72,8 @@ class Record:
     def upto(self, row: int) -> Record:
         """The record up to, and without, a row; at least two rows."""
         cut = slice(0, max(row, 2))
-        names = ("t", "north", "east", "psi", "u", "v", "r", "helm")
-        given = {name: getattr(self, name)[cut] for name in names}
-        return replace(self, **given, shaft=None if self.shaft is None else self.shaft[cut])
+        given = {one.name: getattr(self, one.name) for one in fields(self)}
+        return replace(self, **{name: None if values is None else values[cut] for name, values in given.items()})
 
     def along(self, start: float) -> tuple[Array, Array]:
         """Position (N,) [m] ahead and to starboard of that at time `start` [s], in axes of the heading at that time."""
@@ -134,9 +133,8 @@ def time_of_crossing(t: Array, values: Array, level: float, start: float, rising
 def maximum_between(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
     """Time [s] and value of the maximum between two times, from a fitted polynomial of degree 4.
 
-    The polynomial is fitted to the samples between them, at most a fifth of the rise since `start` below the maximum,
-    at least five. So the result does not depend on the sampling interval, and noise is averaged. NaN if the largest
-    value is at an end of the interval, because it is then not a maximum.
+    It is fitted to the samples at most a fifth of the rise since `start` below the maximum, at least five. NaN if the
+    largest value is at an end of the interval.
     """
     nothing = NAN, NAN
     inside = np.flatnonzero((t >= start) & (t <= end))

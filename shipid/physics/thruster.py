@@ -135,9 +135,8 @@ def first_order_advance(
 ) -> SX:
     """First-order lag over dt [s], solved exactly: a+ = c + (a - c) exp(-dt / T), the change limited to rate x dt.
 
-    T [s] time constant, rate in the command's unit per second; without it the lag alone slows the actuator. Exact for a
-    held command while the limit does not bind, so a step of 1 s with T = 0.5 s does not oscillate. The order c and the
-    state a are kept within low and high.
+    T [s], rate in the command's unit per second. Exact for a held command while the limit does not bind. The order c
+    and the state a are kept within low and high.
     """
     reached = bounded_value(state, low, high)
     change = (bounded_value(command, low, high) - reached) * (1 - ca.exp(-dt / T))
@@ -157,8 +156,7 @@ def rate_limit_advance(
 ) -> SX:
     """An actuator without lag over dt [s]: it goes to its order at `rate` and stays there.
 
-    rate in the command's unit per second; the order and the state are kept within low and high: the stops of a
-    steering gear, the greatest speed of a shaft ahead and astern.
+    rate in the command's unit per second; the order and the state are kept within low and high.
     """
     reached = bounded_value(state, low, high)
     change = bounded_value(command, low, high) - reached

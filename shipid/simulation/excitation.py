@@ -64,10 +64,8 @@ def aprbs_series(
 ) -> Array:
     """Amplitude-modulated pseudo-random binary sequence (T,) at times (T,) [s]: levels held for random times.
 
-    Hold times are uniform in `hold` [s], counted from time[0]; the last is cut at the end of `time`. Levels are
-    stratified: of every eight successive levels one lies in each eighth of `levels`, in random order, so that short
-    series cover the range too (Nelles 2001, Nonlinear System Identification, ch. 17). All draws are by hash(key): a
-    longer series begins with the shorter one.
+    Hold times are uniform in `hold` [s]. Of every eight successive levels one lies in each eighth of `levels`, at
+    random (Nelles 2001, Nonlinear System Identification, ch. 17). A longer series begins with the shorter one.
     """
     most = int((time[-1] - time[0]) / hold[0]) + 1
     draws = np.array([uniform_draw(*key, "hold", number) for number in range(most)])

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from shipid.data.causal import causal_columns
-from shipid.data.checks import copies_of_earlier_runs, copies_of_other_runs
+from shipid.data.checks import copies_of_other_runs
 from shipid.data.dataset import Dataset, clock_slack, keep_rows, read_dataset, rows_outside_spans, stretches_of_runs
 from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import (
@@ -270,9 +270,9 @@ def _copied_run_notes(dataset: Dataset, rest: Windows, test: Windows) -> list[st
         "test runs that move as runs that train do ({}): their errors say nothing of new runs: "
         "leave out copies": copies_of_other_runs(dataset, test.spans, rest.spans),
         "test runs that move as other test runs do ({}): each counts as a manoeuvre of its own, so intervals are "
-        "too narrow: leave out copies": copies_of_earlier_runs(dataset, test.spans),
+        "too narrow: leave out copies": copies_of_other_runs(dataset, test.spans),
         "runs that train and move as others that train do ({}): N_D counts each, and validation and bands judge by "
-        "runs whose copies trained: leave out copies": copies_of_earlier_runs(dataset, rest.spans),
+        "runs whose copies trained: leave out copies": copies_of_other_runs(dataset, rest.spans),
     }
     return [
         words.format(", ".join(f"{run!r} as {other!r}" for run, other in same.items()))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DocumentError
 from shipid.physics.grammar import hull_derivative
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import (
@@ -222,11 +222,6 @@ def test_a_member_is_a_whole_number() -> None:
     for one in (np.int64(1), 1.0, np.float64(1)):
         assert draw_variant(family, one, base) == first  # type: ignore[arg-type]
     assert draw_members(family, base, numbers=np.arange(3.0))[1] == first  # type: ignore[arg-type]
-    for odd in (-1, 1.5, "1", None, True):
-        with pytest.raises(ShipidError, match="member must be a whole number, 0 or more, not"):
-            draw_variant(family, odd, base)  # type: ignore[arg-type]
-    with pytest.raises(ShipidError, match="counter must be a whole number"):
-        draw_variant(family, 1, base, counter=0.5)  # type: ignore[arg-type]
 
 
 def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) -> None:
