@@ -43,7 +43,7 @@ def zigzag_helmsman(commands: tuple[str, ...]) -> Helmsman:
 
     The original heading is that at the first order (MSC.137(76), 4.2.6). Inputs: each command as first executed;
     `executed`, 1 from the first order on; `execute_heading` [rad], > 0 where the first turn is to starboard. Memory:
-    `side`, +1 as first executed, -1 reversed; `executed`; `original` [rad]. It is reversed in the first step that starts
+    `side`, +1 as first executed, -1 reversed; `executed`; `original` [rad]. Reversed in the first step that starts
     at or beyond the execute heading.
     """
 
