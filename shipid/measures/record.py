@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,8 +73,8 @@ class Record:
     def upto(self, row: int) -> Record:
         """The record up to, and without, a row; at least two rows."""
         cut = slice(0, max(row, 2))
-        given = {one.name: getattr(self, one.name) for one in fields(self)}
-        return replace(self, **{name: None if values is None else values[cut] for name, values in given.items()})
+        given: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
+        return replace(self, **{name: values if values is None else values[cut] for name, values in given.items()})
 
     def along(self, start: float) -> tuple[Array, Array]:
         """Position (N,) [m] ahead and to starboard of that at time `start` [s], in axes of the heading at that time."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -9,6 +11,10 @@ import pytest
 from shipid.physics.helm import course_helmsman
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
+
+
+def numbers(values: Any) -> dict[str, float]:
+    return {name: float(ca.DM(value)) for name, value in values.items()}
 
 
 def test_course_keeping_is_the_pid_law_of_its_frequency() -> None:
