@@ -73,8 +73,9 @@ class Record:
     def upto(self, row: int) -> Record:
         """The record up to, and without, a row; at least two rows."""
         cut = slice(0, max(row, 2))
-        given: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(self)}
-        return replace(self, **{name: values if values is None else values[cut] for name, values in given.items()})
+        given = {one.name: getattr(self, one.name) for one in fields(self)}
+        kept: dict[str, Any] = {name: values[cut] for name, values in given.items() if values is not None}
+        return replace(self, **kept)
 
     def along(self, start: float) -> tuple[Array, Array]:
         """Position (N,) [m] ahead and to starboard of that at time `start` [s], in axes of the heading at that time."""
