@@ -23,8 +23,8 @@ def last_known_rows(t: Array, values: Array) -> NDArray[np.intp]:
 
     A bend at row i (slopes before and after differ) says that a fix lies within one step of row i. The line through row
     j ends at the first fix after it, which has come by row i if a bend has been seen at a row between them: at j or
-    later, and before i. The row of a bend itself may be part of the next line, so the row before it counts. Where
-    a value holds still (equal to the one before), nothing new is known and it counts as known.
+    later, and before i. Where a value holds still
+    (equal to the one before), it counts as known.
     """
     count, steps = len(values), np.diff(t)
     slope = np.diff(values) / steps

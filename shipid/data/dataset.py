@@ -44,8 +44,6 @@ _METADATA_KEY = b"shipid"
 class Dataset:
     """Runs of one vessel: a table that has passed `check_schema`, and where it came from. `==` compares by identity.
 
-    Parameters
-    ----------
     frame : columns `run`, `t`, `north`, `east`, `psi`, `u`, `v`, `r`, `flags`, one per command
         (`port.n` [rev/s], `port.alpha` [rad], `rudder.delta` [rad]) and, where measured, `V_w`, `beta_w`, outputs
         (`propeller.thrust` [N]) and the rest of `optional_columns()`. SI units, radians; time increases within a run;
@@ -391,8 +389,6 @@ def read_dataset(file: str | os.PathLike[str], *, remedy: str = "") -> Dataset:
         raise DataError(
             f"not a Parquet file: make one from a log with `shipid data import`{remedy}", file=file
         ) from None
-    except FileNotFoundError:
-        raise DataError("cannot be read (no such file)", file=file) from None
     except OSError as error:
         raise DataError(f"cannot be read ({error.strerror or error})", file=file) from None
     stored = (table.schema.metadata or {}).get(_METADATA_KEY)

@@ -4,10 +4,9 @@ State x = (north, east, psi, u, v, r). Between samples u, v and r change by whit
 
     north' = u cos(psi) - v sin(psi),  east' = u sin(psi) + v cos(psi),  psi' = r,  (u, v, r)' = w.
 
-Sources: Rauch, Tung, Striebel, AIAA Journal 3 (1965) 1445; Bar-Shalom, Li, Kirubarajan, Estimation with Applications
-to Tracking and Navigation (2001), ch. 6 (white-noise acceleration) and 5.4 (consistency). Written here and not taken
-from a library because steps are irregular, some columns may be measured and others not, and the smoother must use
-the transition at the filtered state.
+Rauch, Tung, Striebel, AIAA Journal 3 (1965) 1445; Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking
+and Navigation (2001), ch. 6 (white-noise acceleration) and 5.4 (consistency). Written here and not taken from a library
+because steps are irregular and some columns may be measured and others not.
 """
 
 from __future__ import annotations
@@ -53,8 +52,6 @@ class SmoothedMotion:
 def smooth_motion(t: Array, measured: dict[str, Array], noise: Noise) -> SmoothedMotion:
     """Estimate the states at every instant from all samples before and after it.
 
-    Parameters
-    ----------
     t : instants (N,) [s], rising, N >= 2.
     measured : north, east, psi (unwrapped) and those of u, v, r that are logged: name -> (N,), SI units.
     noise : how far samples err and how fast velocities change.

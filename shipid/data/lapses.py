@@ -65,16 +65,12 @@ class CommandFault:
 def find_command_faults(name: str, t: Array, values: Array, psi: Array, follows: RowMask) -> list[CommandFault]:
     """Return the rows in which a command lapses, by time.
 
-    Parameters
-    ----------
     name : of the command. t, values, psi : (N,) [s], [SI], [rad], psi without jumps.
     follows : (N - 1,) whether nothing is missing between a row and the next.
 
-    A zero comes and goes faster than the column moves elsewhere, and the value before is the one after; of a column
-    of noise it may be another one. In an order, which steps, zeros count from three on, if they last a moment and the
-    same order is held before and after. A spike is a row or two far from the rows before and after, which agree.
-    A value stands still where it is the same to the digit for long while the ship turns to both sides, and in other
-    turns is not.
+    A zero comes and goes faster than the column moves elsewhere. In an order, which steps, zeros count from three on,
+    if they last a moment and the same order is held before and after. A spike is a row or two far from the rows before
+    and after, which agree. A value stands still where it is the same to the digit while the ship turns to both sides.
     """
     if len(values) < LEAST_LOG_ROWS or not follows.any() or not np.ptp(values) > 0:
         return []

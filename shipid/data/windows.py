@@ -45,8 +45,6 @@ FUTURE_STATES = ("u", "v", "r", "psi")
 class Instants:
     """What is known at S instants of prediction; every array is in SI units, time first.
 
-    Parameters
-    ----------
     columns : every measured column at the instant, name -> (S,); angles, also of thrusters and rudders, go on within
         the run as in an imported log: -10 deg after 0, not 350.
     past : the same columns P, ..., 1 steps before the instant, the oldest first, name -> (P, S); empty where no method
@@ -89,8 +87,6 @@ class Instants:
 class Windows:
     """S windows with a horizon of T steps; every array is in SI units, time first.
 
-    Parameters
-    ----------
     run : name of the run, (S,).
     t : instant of prediction on the clock of the recording [s], (S,).
     columns : every dataset column at that instant, name -> (S,); angles unwrapped within the run.
@@ -228,12 +224,9 @@ def cut_windows(
 ) -> Windows:
     """Cut a window every `interval` [s], its whole past and future inside one unbroken stretch of one run.
 
-    An instant of prediction is a row: the last one at or before each multiple of the interval. So what is known at an
-    instant, its past included, depends on no later row. Rows farther apart than the interval give a window each.
-    Windows come run by run, by name, so that no fit depends on the order of the runs in the table.
+    An instant of prediction is a row: the last one at or before each multiple of the interval, so that what is known
+    depends on no later row. Windows come run by run, by name, whatever the order of the runs in the table.
 
-    Parameters
-    ----------
     dataset : the recorded or simulated runs.
     horizon, step : T, and its step [s].
     interval : time between instants of prediction [s].
@@ -337,9 +330,8 @@ def _bent_positions(
 ) -> tuple[Array, Array]:
     """North and east [m] at instants, of one stretch whose rows farther apart than `longest` [s] a curve joins.
 
-    The curve is what u, v, psi travel, and what is then missing to the next row grows evenly; so it passes through the
-    rows, and a steady current or offset of the velocities bends nothing. At rows it is `values` to the bit. Where the
-    velocities miss more than `LARGEST_MISS` of the way between two rows the line stays straight.
+    The curve is what u, v, psi travel, and what is then missing to the next row grows evenly: a steady current bends
+    nothing. Where the velocities miss more than `LARGEST_MISS` of the way between two rows the line stays straight.
     """
     t = np.asarray(rows["t"])
     slack, apart = clock_slack(t), np.diff(t)
@@ -525,8 +517,6 @@ def run_folds(
 ) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
     """(Training, validation) indices of windows, split by run, so that no moment is seen by both.
 
-    Parameters
-    ----------
     validation : `runs` leaves out every run in turn; `share` holds out a fifth of the runs, drawn by `seed`.
     num_folds : with 2 or more, runs are dealt into so many folds instead, or as many as there are runs.
 

@@ -1,9 +1,7 @@
 """Like terms collected: the same function with fewer multiplications where many inputs are known early.
 
-The equations of a ship are sums of products: coefficients, which a rollout computes once, by powers of velocities. As
-they are written, Coriolis forces and the hull's polynomial multiply the same velocities twice. Here each sum becomes
-coefficients of monomials; those of one monomial are added early, and the sum is written with common factors taken out,
-as Horner's rule does for a polynomial of one variable. The result differs by rounding alone.
+Each sum of products becomes coefficients, which a rollout computes once, of monomials of velocities; common factors are
+taken out, as by Horner's rule. The result differs by rounding alone.
 """
 
 from __future__ import annotations

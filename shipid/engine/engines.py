@@ -32,11 +32,11 @@ class Engine:
     """An implementation of rollouts.
 
     run : (model, batch, job) -> records (R, V, S, C) and the greatest speed (V, S) [m/s, rad/s].
-    preferred : whether `auto` selects this engine, if it selects no engine before it, for so many evaluations of the
-        right-hand side, with an allowance for drawn components; samples x variants; and a PyTorch device.
-    available : whether this machine meets the requirements of the engine.
-    measure : (model, batch, job, goal (T, 2, S)) -> sum of distances (V, S), tally (V, BINS) and greatest speed (V, S);
-        the distances are those of the two channels of the job to the goal after every step. None if it cannot.
+    preferred : whether `auto` selects it, if none before it, for so many evaluations of the right-hand side, samples x
+        variants, and a PyTorch device.
+    available : whether it can run on this machine.
+    measure : (model, batch, job, goal (T, 2, S)) -> sum of distances (V, S) of the job's two channels to the goal,
+        tally (V, BINS) and greatest speed (V, S). None if it cannot.
     gradient : (model, batch of one variant, job, places of the wanted parameters, loss) -> Adjoint. None if it cannot.
     any_device : whether it runs on every PyTorch device, not on the CPU alone.
     checks : whether the greatest speed is no number wherever an input is none.

@@ -59,12 +59,9 @@ def rollout_gradient(
 ) -> Gradient:
     """Value and exact gradient of a loss on a rollout of many samples by one variant.
 
-    Reverse mode: the cost does not grow with the number of parameters. It is the derivative of the discrete motion, so
-    it agrees with finite differences of `rollout` for any step. Exactly on a kink, such as |v| at v = 0, it is finite;
-    where several kinks meet, as at rest, it may be the derivative of neither side.
+    Reverse mode, of the discrete motion: it agrees with finite differences of `rollout` for any step. On a kink, as |v|
+    at v = 0, it is finite; where several meet, as at rest, it may be the derivative of neither side.
 
-    Parameters
-    ----------
     start, commands, environment, memory, tau_extra, step, num_steps, method : as in `rollout`.
     loss : path (num_steps + 1, S, C) of the channels `keep` -> (loss (S,), slope d(loss)/d(path), shaped as the path);
         such as `squared_distance_loss(goal)`.

@@ -74,7 +74,6 @@ _FOR_GCC = """#ifndef __clang__
 #endif
 """
 PARTS = 12  # tasks for each core at least: for an even load
-LONGEST_VERSION = 80  # characters of the version text of a compiler that are noted
 NOTED = 128  # vectors of distances that are counted at a time: between the steps a count costs five times as much
 BLOCK = 8  # groups that step together, so that records are written in runs; one where drawn components fill the cache
 
@@ -105,7 +104,7 @@ def engine_description() -> str:
     wanted = compiler_target()
     missing = ", no libmvec" if wanted.fused and not wanted.prefix else ""  # other functions round otherwise
     apart = "".join(f", {name} by CasADi" for name in sorted(_interpreted))
-    return f"native, {escape_unprintable(version)[:LONGEST_VERSION]}, {wanted.lanes} lanes{missing}{apart}"
+    return f"native, {escape_unprintable(version)}, {wanted.lanes} lanes{missing}{apart}"
 
 
 def noted_engine() -> str | None:

@@ -1,8 +1,7 @@
 """A CasADi SX function as text in another language, one operation an instruction, so that whole batches go at once.
 
-The printer walks the instructions of the function. What depends on parameters alone, or on commands and weather, is
-printed into stages that run early; the rest goes over (variant, sample). Nothing of the physics is written twice:
-PyTorch (`lowering`) and C (`native`) are two dialects.
+What depends on parameters alone, or on commands and weather, is printed into stages that run early; the rest goes over
+(variant, sample). PyTorch (`lowering`) and C (`native`) are two dialects.
 """
 
 from __future__ import annotations

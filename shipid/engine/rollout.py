@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -32,8 +31,7 @@ PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time wher
 class Trajectories:
     """Result of a rollout.
 
-    u, v and r are along the axes of the ship; those of a log are horizontal, which differs where she heels or trims:
-    `shipid.simulation.log.horizontal_velocities` converts them.
+    u, v and r are along the axes of the ship; those of a log are horizontal, see `horizontal_velocities`.
 
     states : (num_records, num_variants, num_samples, num_channels), SI; channels named by `names`.
     diverged : (num_variants, num_samples): an input or a record is not finite, or a speed is above 100 m/s. Others are
@@ -74,8 +72,6 @@ def rollout(
 ) -> Trajectories:
     """Open-loop prediction of many samples by many variants of one vessel structure.
 
-    Parameters
-    ----------
     start : state name -> (S,), SI; names that the vessel does not have are passed over, missing ones raise DataError.
     commands, environment : name -> (S,) held over the horizon, or (num_steps, S) in force from step to step.
     step, num_steps, every : step [s], number of steps, and one record every so many steps (the start is a record).
@@ -164,8 +160,7 @@ def rollout_distances(
 ) -> Distances:
     """Distances of variants to true positions `goal` (T, S, 2) [m] north and east after each of T steps.
 
-    For the other arguments see `rollout`. The native engine computes the distances during the rollout, so its memory
-    does not grow with the horizon. Other engines keep the paths of a few variants at a time.
+    For the other arguments see `rollout`. The native engine keeps no path, others those of a few variants at a time.
     """
     num_steps = len(goal)
     asked = engine_by_name(engine, device)
@@ -297,9 +292,8 @@ def _stack_channels(
     columns = []
     for name in names:
         if name not in given:
-            close = get_close_matches(name, [str(other) for other in given if other not in names], n=1)
-            remedy = f"did you mean {close[0]!r}?" if close else f"give an array {shapes[0]}"
-            raise DataError(f"{what} {name!r} is needed by {vessel.name} and missing: {remedy}", file=vessel.file)
+            words = f"{what} {name!r} is needed by {vessel.name} and missing: give an array {shapes[0]}"
+            raise DataError(words, file=vessel.file)
         column = as_float_array(f"{what} {name!r}", given[name])
         if column.shape not in shapes:
             raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")

@@ -31,8 +31,6 @@ def map_over_samples(
 ) -> Callable[..., list[Array]]:
     """The function over samples: takes each input as (entries, S), gives each output as (entries, S), S >= 1.
 
-    Parameters
-    ----------
     function : of dense vectors, in SX.
     num_samples : in all calls to come; for many it pays to compile.
     shared : names of inputs that all samples share, given as (entries,).

@@ -1,10 +1,9 @@
 """Tables in the equations: piecewise linear functions, recognised in a CasADi function and looked up by vectors of C.
 
 `shipid.physics.wind.interpolate_ramps` writes a table as a sum of ramps, which every engine can differentiate:
-y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). That is three operations for each knot. In C the interval
-of x is computed once for all tables with the same knots. Then ordinate and slope are read: lane by lane, or, where a
-processor permutes vectors (AVX-512), by one instruction for each 16 intervals (32 in single precision). The values are
-those of the ramps to rounding. This needs knots that are evenly apart; with others the ramps are as fast.
+y_0 + b_0 (x - k_0) + sum_i (b_i - b_(i-1)) max(x - k_i, 0). In C the interval of x is computed once for all tables with
+the same knots, which must be evenly apart; ordinate and slope are read lane by lane, or (AVX-512) by permutations of
+vectors. The values are those of the ramps to rounding.
 """
 
 from __future__ import annotations

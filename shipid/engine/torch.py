@@ -27,11 +27,10 @@ LEAST_SAMPLES = 256  # samples of one block of a large family
 class Program:
     """One step of a rollout as PyTorch functions, in stages.
 
-    parameters_stage : parameters (P, V, 1) -> saved tensors of all functions, once a rollout.
-    held_stage : (commands, environment, saved) -> what else is known before the state is, once while they are held.
-    step : (state, memory, greatest, tau, drawn, known) -> the three after the step, and the record (C, V, S) of the
-        kept channels. `drawn` are the components of each drawn sum, (num_entries, 1, S, num_components); `known` is
-        what the held stage gave.
+    parameters_stage : parameters (P, V, 1) -> saved tensors, once a rollout.
+    held_stage : (commands, environment, saved) -> known, once while these are held.
+    step : (state, memory, greatest, tau, drawn, known) -> the first three after the step, and the record (C, V, S).
+        drawn : components of each drawn sum, (num_entries, 1, S, num_components).
     """
 
     parameters_stage: Callable[[torch.Tensor], list[torch.Tensor]]
@@ -100,15 +99,16 @@ def _sum_components(value: Any, count: int) -> Any:
 
 
 def check_torch_device(name: str) -> None:
-    """Raise ShipidError unless PyTorch can compute on a device here.
-
-    Each kind of device that is not there fails in another way: RuntimeError (no such name; no numbers come back from
-    `meta`), AssertionError (`cuda` of a build without it), ImportError and AttributeError (`hpu`, `privateuseone`).
-    """
+    """Raise ShipidError unless PyTorch can compute on a device here; each kind that is missing fails in another way."""
     try:
         float(torch.zeros(1, device=torch.device(name)))
     except (RuntimeError, AssertionError, TypeError, ImportError, AttributeError):
         raise ShipidError("PyTorch has no such device here: use cpu", path=f"--device {name}") from None
+
+
+def _series_tensor(array: np.ndarray, place: torch.device) -> torch.Tensor:
+    """(..., channel, S) -> (..., channel, 1, S)."""
+    return torch.tensor(array, dtype=torch.float64, device=place).unsqueeze(-2)
 
 
 def run_torch(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[np.ndarray, np.ndarray]:
@@ -123,12 +123,15 @@ def run_torch(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[np
     most_components = max((part.shape[2] for part in batch.components), default=1)
     width = _block_width(num_samples, num_variants, most_components, job.device)
 
-    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, S)
-        return torch.tensor(array, dtype=torch.float64, device=place).unsqueeze(-2)
-
-    start, memory = tensor(batch.state), tensor(batch.memory)
-    held = [tensor(batch.commands), tensor(batch.environment), tensor(batch.tau_extra)]
-    drawn = [tensor(part.swapaxes(1, 2)).movedim(1, -1) for part in batch.components]  # (entries, 1, S, components)
+    start, memory = _series_tensor(batch.state, place), _series_tensor(batch.memory, place)
+    held = [
+        _series_tensor(batch.commands, place),
+        _series_tensor(batch.environment, place),
+        _series_tensor(batch.tau_extra, place),
+    ]
+    drawn = [
+        _series_tensor(part.swapaxes(1, 2), place).movedim(1, -1) for part in batch.components
+    ]  # (entries, 1, S, components)
     values = torch.tensor(batch.parameters, dtype=torch.float64, device=place).T[..., None]
     shape = (num_variants, num_samples)
     records = torch.empty((num_steps // every + 1, len(rows), *shape), dtype=torch.float64, device=place)
@@ -161,13 +164,12 @@ def gradient_torch(
     program = _lower_step(model, job.method, job.step, job.rows)
     place, num_samples = torch.device(job.device), batch.state.shape[1]
 
-    def tensor(array: np.ndarray) -> torch.Tensor:  # (..., channel, S) -> (..., channel, 1, S)
-        return torch.tensor(array, dtype=torch.float64, device=place).unsqueeze(-2)
-
-    start, memory = tensor(batch.state).requires_grad_(), tensor(batch.memory)
-    commands, environment = tensor(batch.commands), tensor(batch.environment)
-    force = tensor(np.repeat(batch.tau_extra, job.num_steps // len(batch.tau_extra), axis=0)).requires_grad_()
-    values = tensor(np.repeat(batch.parameters.T, num_samples, axis=1)).requires_grad_()
+    start, memory = _series_tensor(batch.state, place).requires_grad_(), _series_tensor(batch.memory, place)
+    commands, environment = _series_tensor(batch.commands, place), _series_tensor(batch.environment, place)
+    force = _series_tensor(
+        np.repeat(batch.tau_extra, job.num_steps // len(batch.tau_extra), axis=0), place
+    ).requires_grad_()
+    values = _series_tensor(np.repeat(batch.parameters.T, num_samples, axis=1), place).requires_grad_()
     saved = program.parameters_stage(values)
     x, m, both = start, memory, torch.cat([start, memory])
     worst = both[model.num_dof : 2 * model.num_dof].abs().amax(0) + 0 * both.sum(0)

@@ -2,8 +2,7 @@
 
 sin, cos, tanh and atan2 are written out where the processor multiplies and adds in one instruction: a call of a
 library would move all registers to memory and back. Their polynomials are Chebyshev approximations of the functions
-that `Precision` names. The largest error over the 12,000 arguments a function of tests/engine/test_vectors.py is 2.1
-units in the last place, in single precision 2.3; the test allows 4.
+that `Precision` names; tests/engine/test_vectors.py allows 4 units in the last place.
 """
 
 from __future__ import annotations
@@ -174,10 +173,9 @@ def _power_in_c(variable: str, exponent: int) -> str:
 def _written_functions(of: Precision) -> str:
     """The functions that are written out, as C.
 
-    Adding 1.5 * 2^mantissa rounds to an integer, which is then in the low bits. sin and cos: what is left of whole
-    quarters of a turn; arguments beyond 10^9 (single precision: 10^4) lose digits. tanh: (e - 1) / (e + 1), e =
-    exp(2 |x|) as 2^n (1 + p), so that no digit is lost near 0. atan2: of the smaller over the larger, then turned; two
-    infinite arguments give no number.
+    Adding 1.5 * 2^mantissa rounds to an integer, which is then in the low bits. sin, cos: arguments beyond 10^9 (single
+    precision: 10^4) lose digits. tanh: (e - 1) / (e + 1), e = exp(2 |x|) as 2^n (1 + p). atan2: of the smaller over the
+    larger, then turned; two infinite arguments give no number.
     """
     first, second, third = of.quarter
     whole, rest = of.half

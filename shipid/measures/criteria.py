@@ -19,8 +19,6 @@ LARGEST_CURRENT = 0.1  # of the steady speed: a current from which a turning cir
 class Criterion:
     """One criterion with the measured value.
 
-    Parameters
-    ----------
     name : the measure, and the paragraph of the resolution.
     value, limit, unit : measured value, largest value allowed, and their unit: ship lengths ("L") or rad.
     met : whether value <= limit; None if the value is missing or the manoeuvre is not that of the criterion.

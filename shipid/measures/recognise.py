@@ -25,13 +25,11 @@ STRAIGHT_RATE = 0.25  # of the greatest yaw rate, up to which a ship goes straig
 def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = None) -> Record:
     """Record of one run from the columns of a dataset.
 
-    The helm is the mean of the angle commands that move, by a quarter of the one that moves most or more: a bow unit
-    parked across, or the offset of a rudder at rest, is no helm. Each has the sign that turns the ship to starboard:
-    that in `helm`, angle command -> +1 or -1, where the vessel is known; else the sign of the sum of angle times change
-    of yaw rate. The shaft is the mean of the shaft speeds that are not 0 at the start. In a stop it is the slowest of
-    those that are reversed, or stopped where none is reversed. A shaft with a controllable
-    pitch counts as its speed times the pitch over the greatest pitch; that of an azimuth unit which is turned to push
-    astern as its speed times 1 at 0 deg, 0 at 90 deg and -1 at 180 deg, in proportion to the angle.
+    The helm is the mean of the angle commands that move by a quarter of the one that moves most or more, each with the
+    sign that turns the ship to starboard: that in `helm`, angle command -> +1 or -1, where the vessel is known; else
+    that of the sum of angle times change of yaw rate. The shaft is the mean of the speeds that are not 0 at the start;
+    in a stop the slowest of those that are reversed, else stopped. It counts times the pitch over the greatest pitch,
+    and that of an azimuth unit turned astern times 1 at 0 deg to -1 at 180 deg.
 
     DataError for a missing column.
     """
@@ -90,11 +88,9 @@ def _commands_that(columns: Mapping[str, Array], wanted: Callable[[str], bool]) 
 def recognise_kinds(record: Record) -> tuple[tuple[str, ...], str]:
     """Kinds of manoeuvre of a run as `shipid manoeuvre` names them, and the reason as a sentence if there is none.
 
-    Stop: the shaft changes from ahead to astern, by its speed, its pitch or the angle of its unit. The other kinds
-    follow from the helm, and the ship must be on a straight course when the helm is first put over. Zigzag: the helm is
-    reversed at least once while the heading changes by less than 90 deg. Turning: the helm stays on one side for 90 deg
-    or more. Pull-out, in addition: the helm is then amidships for at least a fifth of the time of the turn. Many helm
-    levels are a spiral; the user has to say which kind.
+    Stop: the shaft changes from ahead to astern. Else the course is straight when the helm is first put over. Zigzag:
+    the helm is reversed while the heading changes by less than 90 deg. Turning: it is on one side for 90 deg or more.
+    Pull-out, in addition: it is then amidships for a fifth of the time of the turn. Of a spiral the user has to say so.
     """
     shaft, over = record.shaft, first_execute(record)
     if shaft is not None and shaft[0] > 0 > shaft.min():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,6 @@ CREEPING_CHANGE, REMAINING_CHANGE = (
 class Record:
     """One manoeuvre, arrays (N,), SI.
 
-    Parameters
-    ----------
     t : increasing [s].
     north, east, psi : place [m] and heading [rad] of the logged point; the heading may jump by full turns.
     u, v, r : velocity over ground along and across the heading [m/s], yaw rate [rad/s].
@@ -74,9 +73,9 @@ class Record:
     def upto(self, row: int) -> Record:
         """The record up to, and without, a row; at least two rows."""
         cut = slice(0, max(row, 2))
-        names = ("t", "north", "east", "psi", "u", "v", "r", "helm")
-        given = {name: getattr(self, name)[cut] for name in names}
-        return replace(self, **given, shaft=None if self.shaft is None else self.shaft[cut])
+        given = {one.name: getattr(self, one.name) for one in fields(self)}
+        kept: dict[str, Any] = {name: values[cut] for name, values in given.items() if values is not None}
+        return replace(self, **kept)
 
     def along(self, start: float) -> tuple[Array, Array]:
         """Position (N,) [m] ahead and to starboard of that at time `start` [s], in axes of the heading at that time."""
@@ -136,9 +135,8 @@ def time_of_crossing(t: Array, values: Array, level: float, start: float, rising
 def maximum_between(t: Array, values: Array, start: float, end: float) -> tuple[float, float]:
     """Time [s] and value of the maximum between two times, from a fitted polynomial of degree 4.
 
-    The polynomial is fitted to the samples between them, at most a fifth of the rise since `start` below the maximum,
-    at least five. So the result does not depend on the sampling interval, and noise is averaged. NaN if the largest
-    value is at an end of the interval, because it is then not a maximum.
+    It is fitted to the samples at most a fifth of the rise since `start` below the maximum, at least five. NaN if the
+    largest value is at an end of the interval.
     """
     nothing = NAN, NAN
     inside = np.flatnonzero((t >= start) & (t <= end))
@@ -225,8 +223,6 @@ def start_of_change(t: Array, order: Array, index: int) -> float:
 class FirstExecute:
     """The first execute: the helm is first put over.
 
-    Parameters
-    ----------
     start : time [s] at which the helm begins to move; NaN if it never moves.
     row : first row with at least half of the angle.
     angle : helm angle [rad], the median of the angles above half of the largest. side : +1 to starboard, -1 to port.

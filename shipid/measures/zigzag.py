@@ -36,8 +36,6 @@ def zigzag_measures(record: Record, execute_heading: float | None = None, course
     of the rudder. The n-th overshoot is the largest heading beyond the execute heading before the ship turns back. The
     zigzag ends where the helm is released for longer than it was ever over.
 
-    Parameters
-    ----------
     execute_heading : change of heading from the course [rad]; default: estimated from the reversals of the helm.
     course : course of the approach [rad]; default: the heading at the first execute.
 

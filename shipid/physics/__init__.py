@@ -19,16 +19,12 @@ class Term:
     """One term of the sum of forces.
 
     function : signals (and component arrays) in, wrench (6) [N, N m] out.
-    components : for a sum over components, a function from structural keys to one array per component argument;
-        `function` is then written for one component.
-    drawn : for a sum over components that are inputs of a rollout (random waves), a function from structural keys to
-        the width of each component argument.
-    states : for a term with additional states, a function from its block to their names; `function` and `rates` take
-        them as the signal `state`.
-    rates : d(state)/dt from signals; integrated with the motion.
-    gives : signal -> function of signals. A term whose block says that it is `behind` this one receives a signal of
-        `GIVEN`. An output (`thrust`) is what an instrument on this component shows: a log may have it as
-        `<component>.thrust`. None where the block lacks the parameters of an output.
+    components : of a sum, structural keys -> one array per component argument; `function` is of one component.
+    drawn : of a sum over inputs of a rollout (random waves), structural keys -> width of each component argument.
+    states : of a term with own states, its block -> their names; functions take them as the signal `state`.
+    rates : d(state)/dt from signals.
+    gives : signal -> function of signals: one of `GIVEN` for a term that is `behind` this one, or an output (`thrust`)
+        that a log may have as `<component>.thrust`; None where the block lacks its parameters.
 
     The parameters of a block are those of `function`, `gives` and `rates` together; each takes those that it declares.
     """

@@ -66,9 +66,8 @@ def current_velocity(eta: SX, nu: SX, V_c: SX, beta_c: SX, *, heaves: bool = Tru
     """A steady uniform current in body axes, nu_c (6), and its rate d(nu_c)/dt.
 
     V_c in m/s, beta_c in rad: the direction the current sets towards, clockwise from north. The rate is
-    -omega x nu_c; in the plane [r v_c, -r u_c, 0] (method eq. 3; Fossen 2021, sec. 10.3). A ship that rolls and does
-    not heave has w = 0 through the water and over ground: nu_c then has no w, and its v is greater by 1 / cos(phi),
-    so that the ship is carried as the water is.
+    -omega x nu_c; in the plane [r v_c, -r u_c, 0] (method eq. 3; Fossen 2021, sec. 10.3). Of a ship that rolls and does
+    not heave nu_c has no w, and its v is greater by 1 / cos(phi).
     """
     towards = column_vector(V_c * ca.cos(beta_c), V_c * ca.sin(beta_c), 0)
     if heaves:

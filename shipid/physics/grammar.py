@@ -10,12 +10,14 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from shipid.physics import symbols as ca
 
 if TYPE_CHECKING:
     from casadi import SX
+
+Names = TypeVar("Names", bound=Iterable[str])
 
 AXES = "XYZKMN"
 MOTIONS = "uvwpqr"
@@ -91,9 +93,10 @@ class Grammar:
     unit: Callable[[str], str]
     names: str
 
-    def check(self, names: Iterable[str]) -> None:
-        """Raise ValueError for the first invalid name, or for a second name of one monomial."""
+    def check(self, names: Names) -> Names:
+        """The names as they are; ValueError for the first invalid one, or for a second name of one monomial."""
         _check_coefficient_names(self, tuple(names))
+        return names
 
 
 @lru_cache(maxsize=256)

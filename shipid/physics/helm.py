@@ -42,10 +42,9 @@ def zigzag_helmsman(commands: tuple[str, ...]) -> Helmsman:
     """Zigzag: reverse the helm when the heading has changed from the original heading by the execute heading.
 
     The original heading is that at the first order (MSC.137(76), 4.2.6). Inputs: each command as first executed;
-    `executed`, 0 before the first order and 1 from it on; `execute_heading` [rad], the change of heading at which the
-    helm is first reversed, > 0 to starboard. Memory `side`: +1 as first executed, -1 reversed; `executed`, whether the
-    first order was given, and `original` [rad], the heading at which it was. The order is reversed in the first step
-    that starts at or beyond the execute heading.
+    `executed`, 1 from the first order on; `execute_heading` [rad], > 0 where the first turn is to starboard. Memory:
+    `side`, +1 as first executed, -1 reversed; `executed`; `original` [rad]. Reversed in the first step that starts
+    at or beyond the execute heading.
     """
 
     def original(signals: Named, memory: Named) -> Any:

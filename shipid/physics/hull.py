@@ -109,10 +109,8 @@ def mmg_wrench(
     """Wrench (6) of the MMG hull polynomial (Yasukawa and Yoshimura 2015, eqs. 9-11).
 
     X = 1/2 rho L T U^2 (-R_0 + X_vv v'^2 + ...), N with L^2 T; v' = v / U, r' = r L / U at the origin (amidships). The
-    resistance opposes the motion along the ship: with its full value for drift angles below 45 deg, and k_astern times
-    that when she goes astern. U [m/s] is the instantaneous speed through the water, rounded off at 0.01 m/s: the root
-    of u^2 + v^2 + 0.01^2. In the primes of the derivatives it is at least |r| L_pp / TIGHTEST: beyond any turn in which
-    such polynomials were measured they may drive a ship that turns on the spot.
+    resistance has its full value for drift angles below 45 deg, k_astern times that astern. U^2 = u^2 + v^2 + 0.01^2
+    [m^2/s^2]; in the primes U is at least |r| L_pp / TIGHTEST: in tighter turns no such polynomial was measured.
 
     Astern the hull counts as alike fore and aft: Y_v |u| v, Y_r u r, N_v u v, N_r |u| r (Yoshimura et al. 2009). What
     turns round has its full value for drift angles below 45 deg and |r| L_pp / TIGHTEST below |u|, and fades from there
@@ -189,13 +187,10 @@ def cross_flow(
 ) -> SX:
     """Wrench (6) of cross-flow drag on one strip of the hull: dY = -1/2 rho T C(x) (v + x r)|v + x r| dx, dN = x dY.
 
-    C(x) = C_d (1 + k_fwd s + k_ends (3 s^2 - 1) / 2), at least 0, with s = -1 aft and 1 forward. Its mean is C_d for
-    any k: C_d is the coefficient of the force in pure sway; k_fwd moves its centre forward by k_fwd / 6 of the length;
-    the moment of pure yaw goes as 1 + k_ends / 2. So force and moment differ in their coefficients, and the drag still
-    never adds energy. x_aft, x_fwd, T [m].
-
-    Strip theory (Faltinsen 1990, sec. 6; Fossen 2021, sec. 6.7); coefficients that vary along the hull: Hooft (1994),
-    The cross-flow drag on a manoeuvring ship, Ocean Eng. 21, 329-342. Written as Legendre polynomials here.
+    C(x) = C_d (1 + k_fwd s + k_ends (3 s^2 - 1) / 2), at least 0, with s = -1 aft and 1 forward. C_d is the coefficient
+    of pure sway; k_fwd moves the centre forward by k_fwd / 6 of the length; the moment of pure yaw goes as
+    1 + k_ends / 2. x_aft, x_fwd, T [m]. Strip theory (Faltinsen 1990, sec. 6; Fossen 2021, sec. 6.7); coefficients that
+    vary along the hull: Hooft (1994), Ocean Eng. 21, 329-342.
     """
     x = x_aft + (x_fwd - x_aft) * fraction
     across = nu_r[1] + x * nu_r[5]

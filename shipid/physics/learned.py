@@ -34,7 +34,6 @@ def learned_wrench(
     Unit j is h_j(u, v, r) = tanh(w_u u / u_scale + w_v v / v_scale + w_r r / r_scale + w_0). Its even part e_j is half
     the sum of h_j at (u, v, r) and at (u, -v, -r), its odd part o_j half the difference:
     X = X_max tanh(sum_j c_X (e_j - tanh(w_0))), Y = Y_max tanh(sum_j c_Y o_j), N = N_max tanh(sum_j c_N o_j).
-    So the force has port-starboard symmetry, is zero at rest, and is zero if all output weights c are 0.
     Every list has one number for each unit; nu_r (6) [m/s, rad/s] is the velocity through the water.
 
     A network inside the equations of motion is a universal differential equation (Rackauckas et al. 2020,

@@ -22,9 +22,8 @@ ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 def drift_angle(nu_r: SX) -> tuple[SX, SX]:
     """Speed U [m/s] and drift angle beta = atan(-v / |u|) [rad] at the origin; finite, with derivatives, at rest.
 
-    Ahead it is the drift angle of the MMG model; astern it is measured from the stern, so that it stays small. Where
-    the speed is below SPEED_FLOOR, |u| counts as 0.01 m/s, and U is rounded off by it everywhere: formulas of wake and
-    rudder are then not those of the source.
+    Astern it is measured from the stern, so that it stays small. Below SPEED_FLOOR |u| counts as 0.01 m/s; U is rounded
+    off by it everywhere.
     """
     square = nu_r[0] ** 2 + nu_r[1] ** 2
     along = ca.if_else(square < SPEED_FLOOR**2, SPEED_FLOOR, ca.fabs(nu_r[0]))
@@ -208,11 +207,9 @@ def propeller_wash(
 ) -> SX:
     """Propeller slipstream at a rudder behind it, (3): inflow u_P [m/s], slipstream speed far behind [m/s], D_p [m].
 
-    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, that is u_P^2 (1 + 8 K_T / (pi J^2)); on a ship that goes
-    astern, u_P < 0, it is a signed square: a stopped screw adds nothing. With the screw astern the race goes forward,
-    and the rudder is in the water that the screw draws in: the flow over its whole height is u_P less k_suction times
-    the speed that momentum theory adds, sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|. By the same theory that share is 1/2
-    at the disc and falls away from it. Without k_suction a screw astern does not reach the rudder.
+    Momentum theory: u_race^2 = u_P^2 + 8 K_T n^2 D_p^2 / pi, a signed square for u_P < 0. With the screw astern the
+    rudder is in the water that it draws in: u_P less k_suction times sqrt(u_P^2 + 8 K n^2 D_p^2 / pi) - |u_P|, a share
+    that by the same theory is 1/2 at the disc.
     """
     u_P = propeller_inflow(nu_r, ca.SX(x), ca.SX(y), w_P0, C_1, C_2_plus, C_2_minus, tau, C_P)
     K = propeller_thrust_coefficient(u_P, n, D_p, K_T, ca.SX(J_min), ca.SX(J_max))
@@ -259,11 +256,9 @@ def controllable_pitch(
 ) -> SX:
     """Wrench (6) of a controllable-pitch propeller: X = (1 - t_P) rho D_p^4 (k_P p n|n| - k_J |n| u_P / D_p).
 
-    n [rev/s]; pitch p [-], the ratio P/D at 0.7 of the radius, negative to drive astern. That is K_T = k_P p - k_J J:
-    no thrust at p = 0 in still water, zero thrust at J = k_P p / k_J, and drag of a rotating propeller of zero pitch.
-    The inflow u_P is that behind a hull (see `propeller_inflow`). The form is the bilinear thrust T_nn n|n| - T_nV |n|
-    V_a of Blanke (1981), in Fossen (2021), with T_nn proportional to the pitch: a linear approximation of the K_T
-    curves of the Wageningen B-series over pitch, not a fit. It overestimates the thrust at the largest pitches.
+    n [rev/s]; pitch p [-], P/D at 0.7 of the radius, negative to drive astern; inflow u_P as of `propeller_inflow`.
+    That is K_T = k_P p - k_J J: the bilinear thrust of Blanke (1981), in Fossen (2021), proportional to the pitch. It
+    overestimates the thrust at the largest pitches.
     """
     u_P = propeller_inflow(
         nu_r, ca.SX(x), ca.SX(y), ca.SX(w_P0), ca.SX(C_1), ca.SX(C_2_plus), ca.SX(C_2_minus), tau, C_P

@@ -2,8 +2,7 @@
 
 K(t) = sum over k of exp(-sigma_k t) (a_k cos omega_k t + b_k sin omega_k t). Each velocity drives a pair of states
 (c, s) for each mode k: c' = -sigma c - omega s + velocity, s' = omega c - sigma s; the force is -(a c + b s). Added
-mass at infinite frequency belongs in [added_mass]. Surge, sway and yaw have no radiation memory here, because a
-manoeuvring model includes their added mass and damping at zero frequency: they would be counted twice.
+mass at infinite frequency belongs in [added_mass]. Surge, sway and yaw have none: a manoeuvring model includes theirs.
 """
 
 from __future__ import annotations

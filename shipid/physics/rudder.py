@@ -56,9 +56,7 @@ def rudder_wrench(
     eta = D_p / H_R at most 1. Across: v_R = gamma_R (U beta - ell_R r), gamma_R_plus if U beta - ell_R r > 0.
 
     With s = sin(alpha_R), F_N is multiplied by 1 + f_angle |s| + f_side sign(s) + f_angle_side s: f_angle is the loss
-    (or gain) that grows with the angle on both sides, f_side makes starboard helm stronger than port helm at all
-    angles, f_angle_side does so in proportion to the angle. So F_N has odd and even parts, as the force behind one
-    turning screw has; gamma_R_plus and gamma_R_minus of the MMG method are such a difference in the flow across alone.
+    (or gain) with the angle, f_side and f_angle_side make starboard helm the stronger, as behind one turning screw.
     """
     F_N = normal_force(
         nu_r,
@@ -148,9 +146,8 @@ def rudder_polynomial(
 
     wash : (u_P, u_race, D_p) as of `rudder_wrench`. Along: u_R = epsilon sqrt(u_P^2 + k_x (u_race^2 - u_P^2)), signed.
     Across: v_R = U x the sum of value x monomial in v' = v / U and r' = r L_pp / U, signed as in `rudder_wrench`
-    (-gamma_R is the value of "v"). U is at least |r| L_pp / TIGHTEST: beyond any turn in which such a polynomial was
-    measured a cubic of r' would grow without limit on a ship that turns on the spot. F_N and the forces of it are those
-    of `rudder_wrench`.
+    (-gamma_R is the value of "v"). U is at least |r| L_pp / TIGHTEST, see `mmg_wrench`. F_N and the forces of it are
+    those of `rudder_wrench`.
     """
     F_N = polynomial_normal_force(
         nu_r, delta, wash, A_R=A_R, f_alpha=f_alpha, epsilon=epsilon, k_x=k_x, v_R=v_R, L_pp=L_pp, rho=rho

@@ -34,12 +34,12 @@ class Signal:
     mirror : sign under port-starboard reflection.
     column : whether a dataset must, may, or cannot have this column. Commands and outputs are always allowed.
     names : regular expression of its names in logs, in lower case and without the unit; empty: not in logs.
-    plausible : largest plausible magnitude [SI] for checks; None: not checked.
-    read_as_SI : a log column without a unit is read as SI up to this magnitude, and in `shown` above it.
-    reach : smallest and largest value [SI] in the tests of physical laws.
-    usual : smallest and largest value [SI] of a command in normal operation: the default range of a simulated truth.
-    neutral : default value [SI] of a command: helm amidships, shaft stopped, service pitch.
-    component : component name for a log column that does not name its side.
+    plausible : largest plausible magnitude [SI]; None: not checked.
+    read_as_SI : a log column without a unit is read as SI up to this magnitude, in `shown` above it.
+    reach : least and greatest value [SI] in the tests of physical laws.
+    usual : the same of a command in normal operation: the default range of a simulated truth.
+    neutral : default value [SI] of a command.
+    component : of a log column that does not name its side.
     """
 
     role: Role

@@ -52,9 +52,8 @@ def azimuth_wrench(
     n [rev/s], alpha [rad, > 0 turns the thrust to starboard]; J, J_y from the water velocity in the axes of the unit,
     J = u'/(|n| D_p), its sign reversed for n < 0. The polynomials are used inside J_min..J_max and |J_y| < Jy_max and
     continued beyond (k_over, k_over2 over-running; k_under; k_side, k_sideJ side drag). Astern thrust is k_astern times
-    ahead thrust. Finite at n = 0, where the over-running drag remains: with u' > 0 it is k_T rho D_p^2 k_over2 u'^2 for
-    n -> 0 from above and at 0, and nothing from below. So the force has this step at n = 0 where k_over2 is not 0; for
-    u' < 0 the step is k_astern times as large. A unit that is reversed at speed passes it.
+    ahead thrust. At n = 0 the force has a step where k_over2 is not 0: k_T rho D_p^2 k_over2 u'^2 of over-running drag
+    from above, nothing from below.
     """
     along, across = nu_r[0] - nu_r[5] * y, nu_r[1] + nu_r[5] * x
     c, s = ca.cos(alpha), ca.sin(alpha)
@@ -136,9 +135,8 @@ def first_order_advance(
 ) -> SX:
     """First-order lag over dt [s], solved exactly: a+ = c + (a - c) exp(-dt / T), the change limited to rate x dt.
 
-    T [s] time constant, rate in the command's unit per second; without it the lag alone slows the actuator. Exact for a
-    held command while the limit does not bind, so a step of 1 s with T = 0.5 s does not oscillate. The order c and the
-    state a are kept within low and high.
+    T [s], rate in the command's unit per second. Exact for a held command while the limit does not bind. The order c
+    and the state a are kept within low and high.
     """
     reached = bounded_value(state, low, high)
     change = (bounded_value(command, low, high) - reached) * (1 - ca.exp(-dt / T))
@@ -158,8 +156,7 @@ def rate_limit_advance(
 ) -> SX:
     """An actuator without lag over dt [s]: it goes to its order at `rate` and stays there.
 
-    rate in the command's unit per second; the order and the state are kept within low and high: the stops of a
-    steering gear, the greatest speed of a shaft ahead and astern.
+    rate in the command's unit per second; the order and the state are kept within low and high.
     """
     reached = bounded_value(state, low, high)
     change = bounded_value(command, low, high) - reached

@@ -62,8 +62,7 @@ def relative_heading(psi: SX, c_chi: SX, s_chi: SX) -> tuple[SX, SX]:
 def first_order(eta: SX, state: SX, omega: SX, k: SX, c_chi: SX, s_chi: SX, epsilon: SX, real: SX, imag: SX) -> SX:
     """Wrench (6) of one component: Re F(omega, beta) a exp(i(omega t - k(N cos chi + E sin chi) + epsilon)).
 
-    The phase is that at the ship's position relative to the water, which moves with the current. So the ship's speed
-    through the water gives the frequency of encounter. The transfer function is evaluated at the wave frequency omega
+    The phase is that at the ship's position relative to the water; the transfer function is at the wave frequency omega
     [rad/s]. k [rad/m]; c_chi, s_chi: cosine and sine of the direction of travel; epsilon [rad]: phase at the origin at
     t = 0; real, imag (6 series, one after the other): Fourier coefficients of a F [N, N m].
     """

@@ -21,7 +21,7 @@ from shipid.physics.signals import ACTUAL, is_shaft, is_steering, neutral_value
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import balanced_shaft_speed, bisect_root
+from shipid.vessel.stability import balanced_shaft_speed, bisect_root, straight_acceleration
 
 Array = NDArray[np.float64]
 
@@ -143,28 +143,6 @@ class Controls:
             name: angles.get(name, n if name in self.drives else np.full(len(n), neutral_value(name)))
             for name in self.commands
         }
-
-
-def straight_acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> Array:
-    """Surge, sway and yaw acceleration (3,) [m/s^2, rad/s^2] of the ship straight ahead at u [m/s] in calm water.
-
-    Surge is that of a ship that keeps her trim, as on a steady course: a deep screw would trim her first.
-
-    commands : command -> value [SI], reached by the actuators; other commands are neutral.
-    """
-    model = vessel_dynamics(vessel)
-    state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
-    memory, orders = (
-        [commands.get(name, neutral_value(name)) for name in names] for names in (model.memory, model.commands)
-    )
-    calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
-    rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
-    motions, mass = model.state[model.num_dof :], vessel.mass
-    result = rates[[model.state.index(name) for name in ("u", "v", "r")]]
-    trim = [motions.index(name) for name in motions if name in "wq"]
-    surge = motions.index("u")
-    result[0] += mass[surge, trim] @ rates[model.num_dof :][: model.num_dof][trim] / mass[surge, surge]
-    return result
 
 
 def helm_effect(controls: Controls, n: float, u: float) -> float:

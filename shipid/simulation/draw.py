@@ -44,8 +44,6 @@ class ManoeuvreDraw(CheckedModel, BaseModel):
     def manoeuvre(self, duration: float, at: At) -> Manoeuvre:
         """Return the manoeuvre of one run.
 
-        Parameters
-        ----------
         duration : length of the log [s].
         at : quantity -> position in its range, in [0, 1). A quantity is a key without its unit (`n`, `angle`), or `psi`
             for the course.

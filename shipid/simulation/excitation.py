@@ -30,16 +30,11 @@ def multisine_series(
 ) -> Array:
     """Sum (T,) of sines of equal amplitude at harmonics / period [Hz], within +- amplitude at all times, 0 at t = 0.
 
-    x(t) = a sum_k sin(2 pi h_k t / period + phi_k) at times (T,) [s]; it repeats after `period` [s]. For a given
-    amplitude limit, a is the larger the lower the crest factor is, the greatest |x| over the root mean square.
-
-    The phases are searched. From those of Schroeder, phi_k = -pi k (k - 1) / K, k = 1..K (1970, IEEE Trans. Inf.
-    Theory 16), and from random phases by `key`, repeat: clip the peaks, keep the phases of the clipped signal, restore
-    the amplitudes (Van der Ouderaa, Schoukens and Renneboog 1988, IEEE Trans. Instrum. Meas. 37). The best result is
-    used: a crest factor of 1.4 for 10 to 40 harmonics of a wide band, where Schroeder's is 1.9.
-
-    Several commands at once get disjoint harmonics (`deal_harmonics`), which makes them orthogonal over a period, and
-    are shifted in time to begin at 0 each: Morelli's design (2003, AIAA 2003-5807).
+    x(t) = a sum_k sin(2 pi h_k t / period + phi_k) at times (T,) [s]. For a low crest factor the phases are searched,
+    from those of Schroeder (1970, IEEE Trans. Inf. Theory 16) and from random ones by `key`: clip the peaks, keep the
+    phases of the clipped signal, restore the amplitudes (Van der Ouderaa, Schoukens and Renneboog 1988, IEEE Trans.
+    Instrum. Meas. 37). Several commands get disjoint harmonics (`deal_harmonics`), and begin at 0 each: Morelli's
+    design (2003, AIAA 2003-5807).
 
     DocumentError for harmonics that are too fast for the steps of `time`.
     """
@@ -69,10 +64,8 @@ def aprbs_series(
 ) -> Array:
     """Amplitude-modulated pseudo-random binary sequence (T,) at times (T,) [s]: levels held for random times.
 
-    Hold times are uniform in `hold` [s], counted from time[0]; the last is cut at the end of `time`. Levels are
-    stratified: of every eight successive levels one lies in each eighth of `levels`, in random order, so that short
-    series cover the range too (Nelles 2001, Nonlinear System Identification, ch. 17). All draws are by hash(key): a
-    longer series begins with the shorter one.
+    Hold times are uniform in `hold` [s]. Of every eight successive levels one lies in each eighth of `levels`, at
+    random (Nelles 2001, Nonlinear System Identification, ch. 17). A longer series begins with the shorter one.
     """
     most = int((time[-1] - time[0]) / hold[0]) + 1
     draws = np.array([uniform_draw(*key, "hold", number) for number in range(most)])

@@ -38,12 +38,9 @@ class Gusts(CheckedModel, BaseModel):
 def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:
     """Gust speed (T, S) [m/s] at times (T,) [s], for mean speeds (S,) [m/s]; mean + gust is never negative.
 
-    x(t) = sum_k a_k cos(2 pi f_k t + phi_k). The band is divided into bins of equal width in ln f. f_k is uniform in
-    ln f within its bin, so that the series does not repeat. a_k^2 / 2 is the integral of the spectrum over the bin, so
-    that the variance is that of the band for every draw. A gust that would reverse the wind is cut to total speed 0.
+    x(t) = sum_k a_k cos(2 pi f_k t + phi_k). The band is divided into bins of equal width in ln f; f_k is uniform in
+    ln f within its bin, and a_k^2 / 2 the integral of the spectrum over it.
 
-    Parameters
-    ----------
     keys : for each of the S series the key of its random draws, such as (seed, "manoeuvre", number).
     """
     amplitudes = np.sqrt(2 * _bin_variances(gusts, mean_speed))

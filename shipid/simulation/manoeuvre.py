@@ -50,8 +50,6 @@ Hold = Annotated[tuple[Positive, Positive], AfterValidator(check_rising)]
 class StartState:
     """Initial state of the ship: upright, all velocities 0 except the speed ahead.
 
-    Parameters
-    ----------
     shaft : shaft speed [rev/s] of a steady straight approach in calm water; None: no approach.
     speed : speed ahead [m/s] without an approach.
     at_order : whether actuators with lag have reached their first orders; else they are at 0.

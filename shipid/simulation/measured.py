@@ -36,8 +36,6 @@ SLOW, FAST = 0.9, 1.1  # of the service speed: the approach of the tests
 class MeasuredManoeuvre:
     """A simulated standard manoeuvre with its measures.
 
-    Parameters
-    ----------
     vessel, standard : the ship and the manoeuvre.
     frame : the log, one row every `standard.interval` [s]: run, t, states and commands in SI units and radians.
     record : the log as a `Record`, the input of the measures.

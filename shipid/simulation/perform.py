@@ -46,8 +46,6 @@ def perform_manoeuvres(
     Orders pass through the vessel's actuator models (lag, limits); without them commands act at once. The approach is
     in calm water; environment and sea act from t = 0 on.
 
-    Parameters
-    ----------
     step, interval : of the integration, and between logged rows [s]; default: every step is logged.
     duration : length of every log [s]; default: that of each manoeuvre.
     environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> one value for all runs, (num_manoeuvres,), or a series

@@ -19,8 +19,6 @@ DECAYS, LONGEST = 8.0, 200.0  # until a turn is steady: time constants of a smal
 class Request:
     """Angles, side and times of a standard manoeuvre.
 
-    Parameters
-    ----------
     controls, n, speed : the ship with her commands, shaft speed [rev/s] and speed [m/s] of the approach.
     angles : those that were given, at most as many as the kind takes, in its units. side : of the first turn.
     duration : of the log, or of each level of a kind that holds levels [s]; None: the default of the kind.

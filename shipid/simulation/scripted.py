@@ -35,8 +35,6 @@ class Script(BaseModel):
 def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
     """Simulate a vessel by the manoeuvres of a document; the columns are those of a dataset.
 
-    Parameters
-    ----------
     name : path of a TOML document. Its `[[manoeuvre]]` blocks are performed in calm water.
 
     Raises DocumentError with file, path and remedy for what this vessel cannot perform.

@@ -42,11 +42,8 @@ def measure_record(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: 
 
     A sample is the true value at the time minus `latency` (linear between rows; the first value before the start), plus
     bias and noise, rounded to `quantum`. Samples are taken every `Sensor.interval` from the first row on and held until
-    the next. Bias and noise are normal, drawn by hash(seed, run, column): other runs, other columns and more rows do
-    not change them. A column without a sensor is copied.
+    the next. Bias and noise are normal, drawn by hash(seed, run, column). A column without a sensor is copied.
 
-    Parameters
-    ----------
     fine : columns `run`, `t` [s] and others (SI), `t` in equal steps within each run.
 
     DocumentError where `interval` is no multiple of the record's step.

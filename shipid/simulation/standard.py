@@ -31,8 +31,6 @@ CALLED = {"turning_circle": "turning", "crash_stop": "stop"}
 class Standard:
     """A standard manoeuvre, ready to simulate.
 
-    Parameters
-    ----------
     kind, title : key of `standard_manoeuvres()`, and a title in words.
     speed : approach speed [m/s]. step : of the integration [s]. interval : between rows of the log [s].
     """
@@ -63,15 +61,11 @@ def define_standard(
 ) -> Standard:
     """Define a standard manoeuvre for a vessel; the time for one ship length has about 500 steps, a row has ten.
 
-    Parameters
-    ----------
     name : a key of `standard_manoeuvres()`, such as `zigzag`, `turning` or `pull-out`.
     angles : one or several [deg], of helm and, of a zigzag, the execute heading.
     speed : approach speed [m/s]; default: the document's U_0, else Froude number 0.2.
     side : first turn, `starboard` or `port`.
-    duration : [s]; of a spiral, the time of each level. Default: the time for 60 ship lengths at the approach speed, 30
-        for a zigzag, 80 for a stop, 40 for a level of a spiral. A level of a direct spiral, and a pull-out after its
-        turn of 30 lengths, take up to 200, see `Request.settling`.
+    duration : [s]; of a spiral, the time of each level. Default: by the kind, see `Trial.scaled`.
     approach : `steady` with the helm amidships, held on course by a `helmsman`, or from `rest`.
     n : shaft speed [rev/s] of the approach; default: that which gives the speed.
 

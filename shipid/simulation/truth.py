@@ -161,11 +161,9 @@ def simulate_truth(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     """Simulate and log all manoeuvres: a frame with the columns of a dataset, runs `M001`, `M002`, ...
 
     Mean wind, current and wave direction are constant in a run. Every run starts upright, so the first ten seconds of
-    roll are a transient. Position and velocities are those of the origin, the centre of gravity projected on the calm
-    waterline: u and v horizontal, along and across the heading, and r = d(psi)/dt.
+    roll are a transient. u and v are horizontal, along and across the heading, and r = d(psi)/dt.
 
-    vessel : the ship, on which the values of `truth.set` are set. Its name may be another than `truth.vessel`, which a
-    study looks up.
+    vessel : the ship, on which the values of `truth.set` are set.
 
     Raises ShipidError for a truth that is none, DocumentError if it does not fit the vessel or a manoeuvre diverges.
     """

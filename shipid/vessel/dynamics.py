@@ -70,13 +70,11 @@ class SumOverComponents:
 class Dynamics:
     """The symbolic right-hand side of a vessel's structure; numbers are inputs.
 
-    rates : (state, memory, commands, environment, parameters, tau_extra) -> d(state)/dt.
-    advance : (state, memory, commands, environment, parameters, dt) -> memory after dt, exactly.
-    orders : (state, memory, commands, environment, parameters) -> order of each actuator.
-    measured : (state, memory, commands, environment, parameters) -> what instruments on the components show.
+    rates, advance, orders, measured : functions of `INPUTS`, and tau_extra or dt: d(state)/dt, the memory after dt,
+        the order of each actuator, what instruments on the components show.
     state, hidden : names of the entries of the state vector: eta and nu, then the states that terms keep.
     memory, commands, environment, parameters : names of the entries of each other input vector.
-    ordered : names of the orders; they are the commands unless a helmsman gives them.
+    ordered : names of the orders: the commands, unless a helmsman gives them.
     outputs : name -> unit of the entries of `measured`: `propeller.thrust`.
     """
 
@@ -246,9 +244,8 @@ def _added_mass_force(M_A: SX, nu_r: SX, kept: tuple[int, ...]) -> SX:
 def _upright_correction(eta: SX, nu: SX, m: SX) -> SX:
     """Correction (6) of heave forces, which act vertically and not along the inclined body axis.
 
-    The momentum of heave m h rotates with the body axes: -m q h in surge and m p h in sway. Buoyancy and wave pressure,
-    which cause it, stay vertical. Both cancel to first order. Without this correction, heave forces on a pitching and
-    rolling ship have a mean along the body axes, which the table of mean drift already includes.
+    The momentum of heave m h rotates with the body axes: -m q h in surge, m p h in sway; its cause stays vertical.
+    Without it heave of a rolling ship has a mean along the body axes, which the table of mean drift includes already.
     """
     h = heave_rate(eta, nu)
     return column_vector(m * nu[4] * h, -m * nu[3] * h, 0, 0, 0, 0)

@@ -14,8 +14,6 @@ def ship_outline(particulars: Mapping[str, float]) -> np.ndarray:
 
     Body axes: the first column is ahead, the second to starboard, midships at 0, 0.
 
-    Parameters
-    ----------
     particulars : of a vessel [m]: L_oa, else L_pp, else 30 m; B, else a sixth of the length.
     """
     length = particulars.get("L_oa", particulars.get("L_pp", LENGTH))

@@ -218,11 +218,6 @@ class Variant:
         """Values of all parameters in the order of the base vessel's."""
         return [self.values.get(path, value) for path, value in self.base_parameters.items()]
 
-    @property
-    def from_zero(self) -> dict[str, float]:
-        """Dotted path -> new value of what was 0 on the base, and so has no factor."""
-        return {path: value for path, value in self.values.items() if path not in self.factors and value != 0}
-
     def document(self) -> str:
         """The patch as TOML: `load_vessel` on it rebuilds the variant exactly."""
         source = f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"

@@ -20,7 +20,6 @@ LEAST_BLOCK = 0.05
 # Judgement, far from ships: SOLAS asks 65 deg of helm in 28 s, which is 0.18 rad in sqrt(L / g) of a ship of 200 m.
 FASTEST = 4.0  # rad in sqrt(L / g)
 NEAR = 0.05  # ship lengths by which positions of rudder and screw may disagree: those of publications do
-TURN = 6.2832  # rad: a table of angles in degrees goes further
 _OF_RUDDER = {
     "x_H": "its force on the hull acts on the same side",
     "ell_R": "the lever of the flow across it has the same sign",
@@ -99,7 +98,6 @@ def out_of_range(
     values, units : of every number that the equations use, by dotted path.
     """
     meant, size = document.get(UNUSUAL, []), _ship_size(document, values)
-    tables: dict[str, list[float]] = {}
     for path, unit in units.items():
         limits, value = _range_of(path, unit), abs(values[path])
         if limits is not None:
@@ -107,23 +105,11 @@ def out_of_range(
             if not least <= value <= most and not _is_unusual(path, meant):
                 words = f"{values[path]:g}: expected {limits.words} ({least:.3g} to {most:.3g})"
                 return path, f"{words}; {_unusual_remedy(path)}"
-        table, _, place = path.rpartition(".")
-        if unit == "deg" and place.isdecimal():
-            tables.setdefault(table, []).append(value)
-    for path, angles in tables.items():
-        if len(angles) > 1 and max(angles) <= TURN and not _is_unusual(path, meant):
-            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_unusual_remedy(path)}"
     return None
 
 
 def first_contradiction(document: Mapping[str, Any], values: Mapping[str, float]) -> tuple[str, str] | None:
-    """Dotted path of the first number that contradicts another one, and a sentence; None where none does.
-
-    A rudder that is `behind` a screw is aft of it and on its side; its force on the hull acts where the rudder is, aft
-    or forward, and so does the flow across it; steering gear of this size is not so fast; a ship is longer
-    than broad, and broader than deep; a block coefficient is one; shares are below 1; a unit is on the side of its
-    name.
-    """
+    """Dotted path of the first number that contradicts another one, and a sentence; None where none does."""
     first = next(iter(find_contradictions(document, values).items()), None)
     return None if first is None else (first[0], f"{first[1]}; {_unusual_remedy(first[0])}")
 

@@ -9,36 +9,28 @@ import math
 from functools import cache
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from shipid.units import GRAVITY
 
 Array = NDArray[np.float64]
 
-BLADES, AREA_RATIO = 4, 0.55  # of the screw: usual for merchant ships
 PITCHES = (0.4, 1.5)  # P / D of the Wageningen B-series, 0.5 to 1.4, with a little on either side
 
-# Oosterveld and van Oossanen (1975), Wageningen B-screw series, table 5, Reynolds number 2e6:
-# K_T = sum of c J^s (P / D)^t (A_E / A_O)^u Z^v; rows c, s, t, u, v
-K_T_TERMS = (
-    (0.00880496, 0, 0, 0, 0), (-0.204554, 1, 0, 0, 0), (0.166351, 0, 1, 0, 0), (0.158114, 0, 2, 0, 0),
-    (-0.147581, 2, 0, 1, 0), (-0.481497, 1, 1, 1, 0), (0.415437, 0, 2, 1, 0), (0.0144043, 0, 0, 0, 1),
-    (-0.0530054, 2, 0, 0, 1), (0.0143481, 0, 1, 0, 1), (0.0606826, 1, 1, 0, 1), (-0.0125894, 0, 0, 1, 1),
-    (0.0109689, 1, 0, 1, 1), (-0.133698, 0, 3, 0, 0), (0.00638407, 0, 6, 0, 0), (-0.00132718, 2, 6, 0, 0),
-    (0.168496, 3, 0, 1, 0), (-0.0507214, 0, 0, 2, 0), (0.0854559, 2, 0, 2, 0), (-0.0504475, 3, 0, 2, 0),
-    (0.010465, 1, 6, 2, 0), (-0.00648272, 2, 6, 2, 0), (-0.00841728, 0, 3, 0, 1), (0.0168424, 1, 3, 0, 1),
-    (-0.00102296, 3, 3, 0, 1), (-0.0317791, 0, 3, 1, 1), (0.018604, 1, 0, 2, 1), (-0.00410798, 0, 2, 2, 1),
-    (-0.000606848, 0, 0, 0, 2), (-0.0049819, 1, 0, 0, 2), (0.0025983, 2, 0, 0, 2), (-0.000560528, 3, 0, 0, 2),
-    (-0.00163652, 1, 2, 0, 2), (-0.000328787, 1, 6, 0, 2), (0.000116502, 2, 6, 0, 2), (0.000690904, 0, 0, 1, 2),
-    (0.00421749, 0, 3, 1, 2), (0.0000565229, 3, 6, 1, 2), (-0.00146564, 0, 3, 2, 2),
+# K_T of a Wageningen B 4-55 screw, usual for merchant ships: row s, column t are the factor of J^s (P / D)^t.
+# Oosterveld and van Oossanen (1975), table 5, Reynolds number 2e6, with four blades and an area ratio of 0.55.
+K_T_SERIES = (
+    (0.0197526437, 0.2237434, 0.381633694, -0.207260926, 0.0, 0.0, 0.00638407),
+    (-0.23762198, -0.02209295, -0.02618432, 0.0673696, 0.0, 0.0, -0.0020949295),
+    (-0.22576794, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0014241708),
+    (0.0684439833, 0.0, 0.0, -0.00409184, 0.0, 0.0, 0.00049740152),
 )  # fmt: skip
 
 
 def series_thrust_coefficient(J: Array, pitch: float) -> Array:
     """K_T [-] of a Wageningen B 4-55 screw at advance ratios J (N,) and pitch ratio P / D."""
-    return np.asarray(
-        sum(c * J**s * pitch**t * AREA_RATIO**u * float(BLADES) ** v for c, s, t, u, v in K_T_TERMS), dtype=float
-    )
+    return np.asarray(polyval(J, np.array(K_T_SERIES) @ pitch ** np.arange(7)))
 
 
 @cache

@@ -125,12 +125,8 @@ def _number_type(parameter: Parameter) -> Any:
 
 
 def _table_type(grammar: Grammar) -> Any:
-    def check(table: dict[str, float]) -> dict[str, float]:
-        grammar.check(table)
-        return table
-
     named = Field(json_schema_extra={"propertyNames": {"pattern": _whole_pattern(grammar.names)}})
-    return Annotated[dict[str, FiniteFloat], AfterValidator(check), named]
+    return Annotated[dict[str, FiniteFloat], AfterValidator(grammar.check), named]
 
 
 def _whole_pattern(names: str) -> str:

@@ -36,14 +36,35 @@ def balanced_shaft_speed(surplus: Callable[[float], float]) -> float | None:
     return bisect_root(surplus, low, high)
 
 
+def straight_acceleration(vessel: Vessel, u: float, commands: Mapping[str, float]) -> np.ndarray:
+    """Surge, sway and yaw acceleration (3,) [m/s^2, rad/s^2] of the ship straight ahead at u [m/s] in calm water.
+
+    Surge is that of a ship that keeps her trim, as on a steady course: a deep screw would trim her first.
+
+    commands : command -> value [SI], reached by the actuators; other commands are neutral.
+    """
+    model = vessel_dynamics(vessel)
+    state = [u if name == "u" else 0.0 for name in (*model.state, *model.hidden)]
+    memory, orders = (
+        [commands.get(name, neutral_value(name)) for name in names] for names in (model.memory, model.commands)
+    )
+    calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
+    rates = np.array(model.rates(state, memory, orders, calm, values, np.zeros(model.num_dof))).ravel()
+    motions, mass = model.state[model.num_dof :], vessel.mass
+    result = rates[[model.state.index(name) for name in ("u", "v", "r")]]
+    trim = [motions.index(name) for name in motions if name in "wq"]
+    surge = motions.index("u")
+    result[0] += mass[surge, trim] @ rates[model.num_dof :][: model.num_dof][trim] / mass[surge, surge]
+    return result
+
+
 def yaw_growth(vessel: Vessel, speed: float, orders: Mapping[str, float]) -> float:
     """Largest real part [1/s] of the eigenvalues of sway and yaw, with what moves with them, in calm water.
 
-    It is negative where the ship is course-stable (Fossen 2021), and -inf where the equations give no number. Of the
-    two sides it is the one to which she turns more, see `yaw_growths`.
+    Negative where the ship is course-stable (Fossen 2021), -inf where the equations give no number; to the side to
+    which she turns more.
 
-    speed : straight ahead [m/s], above 0. orders : commands [SI], such as shaft speeds; rudders and azimuths are
-    amidships, and every actuator has reached its order.
+    speed : straight ahead [m/s], above 0. orders : commands [SI] that actuators have reached; helms are amidships.
     """
     return max(yaw_growths(vessel, speed, orders))
 

@@ -1,8 +1,7 @@
 """First estimate of a vessel from its main particulars, by regression formulae; each value names its formula.
 
-What is known of screw, rudder and steering gear is taken as it is; the rest is guessed for the size, so that the thrust
-at the service shaft speed equals the resistance at the design speed. Times of a model are those of the ship over the
-square root of the scale (Froude). The result is a normal vessel document: better values may replace the guesses.
+What is known is taken as it is; the rest is guessed for the size, so that thrust equals resistance at the service
+speed. Times of a model are those of the ship over the square root of the scale (Froude).
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from shipid.arguments import check_choice
 from shipid.document import bundled_documents, read_document, value_at_path
 from shipid.errors import ShipidError
@@ -24,8 +21,6 @@ from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.regressions import (
-    AREA_RATIO,
-    BLADES,
     PITCHES,
     correlation_allowance,
     form_factor,
@@ -35,7 +30,7 @@ from shipid.vessel.regressions import (
     thrust_polynomial,
     wave_resistance,
 )
-from shipid.vessel.stability import balanced_shaft_speed, bisect_root, yaw_growth
+from shipid.vessel.stability import balanced_shaft_speed, bisect_root, straight_acceleration, yaw_growth
 
 RHO_SEA, RHO_FRESH, RHO_AIR = 1025.0, 1000.0, 1.225  # sea and fresh water at 15 deg C, air; SI
 NU = 1.19e-6  # m^2/s, sea water at 15 deg C
@@ -252,8 +247,7 @@ def inertia_values(given: Particulars) -> Values:
 def added_mass_values(given: Particulars) -> Values:
     """Clarke et al. (1983), surge by Soeding, in Brix (1993); of a beamy ship Motora's charts.
 
-    Clarke's regressions are of ships four times as long as their beam and more. Of a beamier one they give a yaw
-    inertia near 0 or below, and couple sway and yaw so much that the water would move with an energy below 0.
+    Clarke's regressions are of ships from L / B = 4 on: of a beamier one the water would move with an energy below 0.
     """
     L, B, T, C_b = given.length, given.beam, given.draught, given.block
     prime = -math.pi * (T / L) ** 2 * given.rho / 2 * L**3
@@ -439,7 +433,7 @@ def propeller_values(given: Particulars, side: int = 0) -> Values:
     (D, K_T, size, balance), (w_P0, wake) = guess_screw(given), _wake_fraction(given)
     drift = "KVLCC2, mean of both sides"
     t_P, deduction = _thrust_deduction(given, D)
-    series = f"Wageningen B {BLADES}-{100 * AREA_RATIO:.0f}, {balance}"
+    series = f"Wageningen B 4-55, {balance}"
     return {
         "x": TemplateValue(-0.48 * L, "m", "-0.48 L"),
         **({"y": TemplateValue(side * 0.22 * B, "m", "0.22 B off the middle: a guess")} if side else {}),
@@ -631,16 +625,7 @@ def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
 
 def _service_shaft(vessel: Vessel, speed: float) -> float:
     """Shaft speed [rev/s] at which thrust equals resistance, by bisection."""
-    model = vessel_dynamics(vessel)
-    calm, values = np.zeros(len(model.environment)), np.array(list(vessel.parameters.values()))
-
-    def surge(n: float) -> float:
-        orders = _straight_orders(vessel, n)
-        memory, state = [orders[name] for name in model.memory], [0.0, 0.0, 0.0, speed, 0.0, 0.0]
-        rates: Any = model.rates(state, memory, list(orders.values()), calm, values, np.zeros(3))
-        return float(rates[3])
-
-    n = balanced_shaft_speed(surge)
+    n = balanced_shaft_speed(lambda n: float(straight_acceleration(vessel, speed, _straight_orders(vessel, n))[0]))
     if n is None:
         raise ShipidError(f"no shaft speed drives this ship at {speed:.3g} m/s: give a lower speed")
     return n

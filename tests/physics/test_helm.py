@@ -8,30 +8,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from shipid.physics.helm import course_helmsman, zigzag_helmsman
+from shipid.physics.helm import course_helmsman
 
 COMMANDS = ("port.n", "port.alpha", "rudder.delta")
 
 
 def numbers(values: Any) -> dict[str, float]:
     return {name: float(ca.DM(value)) for name, value in values.items()}
-
-
-@pytest.mark.parametrize("first", [1, -1])
-@pytest.mark.parametrize(
-    ("turned", "side", "after"), [(0.1, 1, 1), (0.2, 1, -1), (0.3, 1, -1), (0.1, -1, -1), (-0.2, -1, 1)]
-)
-def test_zigzag_reverses_at_the_execute_heading(first: int, turned: float, side: int, after: int) -> None:
-    """With execute heading 0.2 rad either side of a heading of 1 rad; the mirror image does the mirror image."""
-    inputs = {"port.n": 2.0, "port.alpha": -0.3 * first, "rudder.delta": 0.4 * first, "executed": 1.0}
-    inputs["execute_heading"] = 0.2 * first
-    seen = {"psi": ca.DM(1.0 + turned * first * 1.0000001)}
-    memory = {"side": ca.DM(side), "original": ca.DM(1.0), "executed": ca.DM(1.0)}
-    helmsman = zigzag_helmsman(COMMANDS)
-    ordered = numbers(helmsman.orders(seen, inputs, memory))
-    assert ordered == {"port.n": 2.0, "port.alpha": -0.3 * first * after, "rudder.delta": 0.4 * first * after}
-    assert helmsman.advance is not None
-    assert numbers(helmsman.advance(seen, inputs, memory, 0.1)) == {"side": after, "original": 1.0, "executed": 1.0}
 
 
 def test_course_keeping_is_the_pid_law_of_its_frequency() -> None:

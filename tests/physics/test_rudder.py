@@ -12,7 +12,6 @@ from shipid.physics.rudder import (
     coefficients_normal_force,
     rudder_coefficients,
     rudder_derivatives,
-    rudder_polynomial,
     rudder_wrench,
 )
 
@@ -62,26 +61,6 @@ def test_derivatives_by_hand() -> None:
     u, v = 6.0 / 7.5 - 1, -1.0 / 7.5
     Y = force * 0.2 * (-0.003 - 0.006 * u - 0.01 * v**2)
     np.testing.assert_allclose(np.array(forces).ravel(), [0, Y, 0, 0, 0, force * 160 * 0.0014 * 0.2], rtol=1e-12)
-
-
-POLYNOMIAL: dict[str, Any] = {
-    **{"x": -3.5, "z": 0.2, "A_R": 0.0539, "f_alpha": 2.747, "epsilon": 1.09, "k_x": 0.6, "t_R": 0.387, "a_H": 0.312},
-    **{"x_H": -3.248, "L_pp": L, "rho": 1000.0, "v_R": {"v": -0.5, "r": 0.3, "rrv": -1.1}},
-}
-
-
-def test_a_rudder_with_a_polynomial_flow_by_hand() -> None:
-    u, v, r, delta, u_P, race = 1.1, -0.2, 0.08, 0.3, 0.7, 1.5
-    U = np.hypot(u, v)
-    v_, r_ = v / U, r * L / U
-    v_R = U * (-0.5 * v_ + 0.3 * r_ - 1.1 * r_**2 * v_)
-    u_R = 1.09 * np.sqrt(u_P**2 + 0.6 * (race**2 - u_P**2))
-    F_N = 500 * 0.0539 * 2.747 * (u_R**2 + v_R**2) * np.sin(delta - np.arctan2(v_R, u_R))
-    X, Y = -(1 - 0.387) * F_N * np.sin(delta), -(1 + 0.312) * F_N * np.cos(delta)
-    N = (3.5 + 0.312 * 3.248) * F_N * np.cos(delta)
-    given = ca.SX(np.array([u, v, 0, 0, 0, r])), ca.SX(delta), ca.SX(np.array([u_P, race, D_P]))
-    forces = np.array(ca.evalf(rudder_polynomial(*given, **POLYNOMIAL))).ravel()
-    np.testing.assert_allclose(forces, [X, Y, 0, -0.2 * Y, 0.2 * X, N], rtol=2e-4)
 
 
 def test_rudder_coefficients_by_hand() -> None:

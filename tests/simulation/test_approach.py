@@ -12,10 +12,10 @@ from shipid.simulation.approach import (
     NotStraight,
     balanced_shaft,
     steady_approach,
-    straight_acceleration,
 )
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
+from shipid.vessel.stability import straight_acceleration
 from shipid.vessel.template import Particulars, first_guess
 from tests.conftest import PATCHED
 

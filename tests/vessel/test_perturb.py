@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DocumentError
 from shipid.physics.grammar import hull_derivative
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import (
@@ -160,12 +160,10 @@ def test_a_complaint_counts_the_blocks_that_the_family_has_in_the_document(base:
         assert caught.value.path == path
 
 
-def test_what_was_0_has_a_new_value_and_no_factor(base: Vessel) -> None:
+def test_what_was_0_has_no_factor(base: Vessel) -> None:
     variant = draw_variant(family({"set": {"inertia.x_G": 2.5}}, MASS), 0, base)
-    assert base.parameters["inertia.x_G"] == 0
-    assert variant.from_zero == {"inertia.x_G": 2.5}
+    assert variant.values["inertia.x_G"] == 2.5
     assert set(variant.factors) == {"inertia.m"}
-    assert draw_variant(family({"set": {"inertia.x_G": 0.0}}), 0, base).from_zero == {}
 
 
 @pytest.mark.parametrize("block", [{"remove": ["inertia.m"]}, {"parameters": ["inertia.I_z"], "factor": -1.0}])
@@ -224,11 +222,6 @@ def test_a_member_is_a_whole_number() -> None:
     for one in (np.int64(1), 1.0, np.float64(1)):
         assert draw_variant(family, one, base) == first  # type: ignore[arg-type]
     assert draw_members(family, base, numbers=np.arange(3.0))[1] == first  # type: ignore[arg-type]
-    for odd in (-1, 1.5, "1", None, True):
-        with pytest.raises(ShipidError, match="member must be a whole number, 0 or more, not"):
-            draw_variant(family, odd, base)  # type: ignore[arg-type]
-    with pytest.raises(ShipidError, match="counter must be a whole number"):
-        draw_variant(family, 1, base, counter=0.5)  # type: ignore[arg-type]
 
 
 def test_removal_is_zero_and_leaves_the_structure(base: Vessel, tmp_path: Path) -> None:

@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
@@ -34,22 +33,14 @@ def test_nonsense_is_refused_and_may_be_meant(name: str) -> None:
     assert caught.value.path in (path, "inertia", "inertia.m")  # of the mass of a ship of another length
 
 
-def test_a_wind_table_in_radians_is_seen() -> None:
-    ship = load_vessel("gunnerus-28.9")
-    degrees = ship.document["wind"]["gamma_deg"]
-    with pytest.raises(DocumentError, match="are these radians"):
-        ship.with_values({"wind.gamma_deg": np.radians(degrees).tolist()})
-
-
-@pytest.mark.parametrize("path", ["wind.gamma_deg", "wind.A_LW", "thruster.port.x"])
+@pytest.mark.parametrize("path", ["wind.A_LW", "thruster.port.x"])
 def test_the_remedy_of_the_message_helps(path: str) -> None:
     ship = load_vessel("gunnerus-28.9")
-    value = np.radians(ship.document["wind"]["gamma_deg"]).tolist() if path.endswith("_deg") else 1.2e7
     with pytest.raises(DocumentError) as caught:
-        ship.with_values({path: value})
+        ship.with_values({path: 1.2e7})
     word = re.search(r'write unusual = \["(.*?)"\]', str(caught.value))
     assert word is not None
-    assert ship.with_values({path: value, "unusual": [word[1]]}).document["unusual"] == [word[1]]
+    assert ship.with_values({path: 1.2e7, "unusual": [word[1]]}).document["unusual"] == [word[1]]
 
 
 def test_every_bundled_vessel_is_usual(bundled_vessel: Vessel) -> None:
