@@ -89,13 +89,15 @@ def source_files(
         {
             f"{name}.h": f"{c_comment(about)}\n#ifndef {guard}\n#define {guard}\n\n{header}#endif\n",
             f"{name}.c": origin + fill(_SOURCE_HEAD + wrapper.source),
-            f"{name}_casadi.c": _IN_C.format(generated),
+            f"{name}_casadi.c": _UNUSED_ALLOWED + _IN_C.format(generated),
             "main.c": fill(wrapper.example),
         },
     )
 
 
 _IN_C = '#ifdef __cplusplus\nextern "C" {{\n#endif\n{}\n#ifdef __cplusplus\n}}\n#endif\n'
+# CasADi gives all its functions the same parameters; tools that import an FMU may take a warning for an error.
+_UNUSED_ALLOWED = '#if defined __GNUC__\n#pragma GCC diagnostic ignored "-Wunused-parameter"\n#endif\n'
 
 _SOURCE_HEAD = """#include "@.h"
 

@@ -19,7 +19,7 @@ from shipid.export.model import ExportModel, build_model
 from shipid.hybrid.deployed import DeployedMethod
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
-GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-parameter")
+GENERATED = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 

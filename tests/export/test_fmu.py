@@ -353,7 +353,6 @@ def test_a_compiler_of_cplusplus_takes_the_sources(program, ship, aboard, tmp_pa
             "-Wextra",
             "-Wpedantic",
             "-Werror",
-            "-Wno-unused-parameter",
             "-shared",
             "-fPIC",
         ]
