@@ -11,6 +11,7 @@ light ink on a dark ground.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,13 +20,13 @@ import plotly.graph_objects as go
 
 from shipid.arguments import check_class, check_number
 from shipid.errors import ShipidError
-from shipid.report import paths
 from shipid.report.checks import CHECK_PAGE, CheckContent
 from shipid.report.content import PageContent, ReportContent
-from shipid.report.figure import PageFigure, draw_alone, dress_panels
+from shipid.report.figure import PageFigure, draw_alone
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
 from shipid.report.manoeuvre import MANOEUVRE_PAGE, ManoeuvreContent
 from shipid.report.page import Section
+from shipid.report.paths import windows_of
 from shipid.report.physics_and_data import gain_lack, map_lack
 from shipid.report.sections import SECTIONS
 
@@ -132,10 +133,10 @@ def prediction(
     if t is not None and not np.isfinite(check_number("t", t)):
         raise ShipidError(f"t must be a time in seconds, not {t}", path="prediction")
     content = content_of(source)
-    window, size = paths.find_window(content, run, t, N_D)
-    record = paths.browser_figure(content)
-    assert record is not None  # find_window has raised where there are no windows
-    return dress_panels(record, [paths.draw_window(content, window, size)], dark=dark)
+    if t is not None:
+        nearest = (min(windows, key=lambda one: abs(one.t - t)) for windows in windows_of(content).values())
+        content = replace(content, snapshots=list(nearest))
+    return _draw("browser", content, [run, N_D], dark=dark)
 
 
 def factors(source: Source, *, dark: bool = False) -> go.Figure:

@@ -25,7 +25,6 @@ from shipid.study.results import Results
 from shipid.vessel.outline import ship_outline
 
 ALL_KINDS = "all"
-MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 CLOCK = 6  # digits after the point of a time in a run [s]
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
@@ -202,12 +201,9 @@ def region_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
 
 
 def tracks_frame(results: Results) -> pd.DataFrame:
-    """Path of every run [m] and its part in the study, thinned to what pixels can show."""
+    """Path of every run [m] and its part in the study."""
     frame = results.dataset.frame[["run", "north", "east"]]
-    runs = frame.groupby("run", sort=False)["run"]
-    kept = frame[runs.cumcount() % (runs.transform("size") // MOST_POINTS).clip(lower=1) == 0]
-    part = np.where(kept["run"].isin(list(results.test.spans)), "test", "training and validation")
-    return kept.assign(set=part).reset_index(drop=True)
+    return frame.assign(set=np.where(frame["run"].isin(list(results.test.spans)), "test", "training and validation"))
 
 
 def envelope_frame(results: Results) -> pd.DataFrame:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.arguments import check_class
-from shipid.evidence import ROUNDING, CellErrors, compare_cells, world_interval
+from shipid.evidence import CellErrors, compare_cells, world_interval
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
@@ -22,7 +21,6 @@ METHOD_COLUMNS = [
     *("H", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
-    "ahead",
 ]
 ErrorsByCell = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation and seed
 
@@ -71,9 +69,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     `difference` is H less that
     of the method `reference` over the `pairs` of cells in which both have one, with a 95 % interval `low`, `high`, as
     of `compare_cells`. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
-    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. `ahead` names the methods that err
-    less over the cells that both have. The family `with physics` is all of them but `none` and those that saw the test
-    runs.
+    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -87,7 +83,6 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
             row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            row["ahead"] = ", ".join(name for name, others in by_method.items() if _is_lower(others, errors))
             row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
             rows.append(row)
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)
@@ -97,12 +92,6 @@ def _errors_by_cell(cells: pd.DataFrame) -> ErrorsByCell:
     good = cells[cells["status"] == "ok"]
     keys = zip(good["world"], good["foundation"], good["seed"], strict=True)
     return dict(zip(keys, good["errors"], strict=True))
-
-
-def _is_lower(one: ErrorsByCell, other: ErrorsByCell) -> bool:
-    """Whether the mean error of one method is lower over the cells that both have, by more than rounding."""
-    mine, others = (math.fsum(of[key].mean for key in one.keys() & other.keys()) for of in (one, other))
-    return mine < (1 - ROUNDING) * others
 
 
 def _difference_row(mine: ErrorsByCell, others: ErrorsByCell) -> dict[str, Any]:

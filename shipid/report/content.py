@@ -41,23 +41,10 @@ class SummaryLine:
 
 @dataclass(frozen=True)
 class AnswerSentence:
-    """One sentence of the answer as plain text, and the id of the figure or table that carries it; empty for no link.
-
-    Drawing the page raises ValueError for an id that no section declares, other than "findings" and "provenance".
-    """
+    """One sentence of the answer as plain text, and the id of the figure or table that carries it, if any."""
 
     text: str
     figure: str = ""
-
-
-@dataclass(frozen=True)
-class ReportFinding:
-    """A claim of the paper, the verdict of the results, and the numbers behind it."""
-
-    id: str
-    claim: str
-    verdict: Literal["confirmed", "refuted", "undecided", "not testable"]
-    evidence: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +73,7 @@ class PageContent:
     """What a page shows besides its sections; every page adds frames and `answer`, the sentences below the title.
 
     title, name : in words, and the short name beside the kicker. provenance : label -> value.
-    command : what reproduces the page. study_document : as text. findings : claims with verdicts. Empty for none.
+    command : what reproduces the page. study_document : as text. findings : id, claim, verdict, evidence of each.
     """
 
     title: str
@@ -94,7 +81,7 @@ class PageContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
     study_document: str = ""
-    findings: Sequence[ReportFinding] = ()
+    findings: Sequence[Mapping[str, Any]] = ()
 
 
 def rows_as_tuples(frame: pd.DataFrame) -> list[Any]:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, PathKey, ReportContent, WindowSnapshot
 from shipid.report.errors_over import close_up_chips, line_look
 from shipid.report.figure import (
@@ -29,19 +29,9 @@ from shipid.report.figure import (
     make_line,
 )
 from shipid.report.page import Section
-from shipid.report.selection import (
-    FEW_RUNS,
-    close_up_models,
-    data_driven,
-    drawn_source,
-    figure_sizes,
-    in_words,
-    spread_items,
-)
+from shipid.report.selection import close_up_models, data_driven, drawn_source, figure_sizes, in_words
 from shipid.report.wording import counted_text, metres_text
 
-MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 MOST_POINTS = 40  # of a path or of the outline of a band
 PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
@@ -52,18 +42,9 @@ HOW_WINDOWS = (
 
 
 def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
-    """Sort windows by test run and time, at most as many of each as the limits above."""
-    by_run: dict[str, list[WindowSnapshot]] = {}
-    for snapshot in content.snapshots:
-        by_run.setdefault(snapshot.run, []).append(snapshot)
-    shown = set(close_up_models(content))
-    paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
-    runs = max(1, min(FEW_RUNS, len(by_run)))
-    result, most = {}, min(MOST_INSTANTS, max(1, MOST_PATHS // (runs * max(1, paths))))
-    for run in spread_items(sorted(by_run), FEW_RUNS):
-        ordered = sorted(by_run[run], key=lambda window: window.t)
-        result[run] = [ordered[i] for i in even_places(len(ordered), most)]
-    return result
+    """Sort windows by test run and time."""
+    ordered = sorted(content.snapshots, key=lambda window: (window.run, window.t))
+    return {run: list(mine) for run, mine in groupby(ordered, key=lambda window: window.run)}
 
 
 def window_sizes(content: ReportContent) -> list[int]:
@@ -175,26 +156,6 @@ def outline_at(outline: Floats, pose: Floats) -> Floats:
     turn = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]])
     closed: Floats = np.vstack([outline, outline[:1]]) @ turn + pose[:2]
     return closed
-
-
-def find_window(
-    content: ReportContent, run: str | None, t: float | None, N_D: int | None
-) -> tuple[WindowSnapshot, int]:
-    """A window of a test run (default: the first), and the N_D to draw it with (default: the most).
-
-    t : instant of prediction [s], the nearest recorded one is taken; default: the middle of the run.
-    Raises ShipidError for a run or an N_D that no window holds.
-    """
-    runs, counts = windows_of(content), window_sizes(content)
-    if not runs:
-        raise ShipidError("there is nothing to draw: the results hold no windows", path="prediction")
-    if run is not None and run not in runs:
-        raise ShipidError(f"no window of run {run!r}; {suggest_name(run, runs)}", path="prediction")
-    if N_D is not None and N_D not in counts:
-        raise ShipidError(f"no window with N_D = {N_D}; valid: {', '.join(map(str, counts))}", path="prediction")
-    windows = runs[run or next(iter(runs))]
-    window = windows[len(windows) // 2] if t is None else min(windows, key=lambda shot: abs(shot.t - t))
-    return window, N_D or counts[-1]
 
 
 def _window_chips(content: ReportContent) -> list[Chip]:

@@ -181,7 +181,8 @@ def search_table(content: ReportContent) -> PageTable:
     frame, names = content.trials, searched_names(content)
     states = pd.crosstab(frame.N_D, frame.state).reindex(columns=["stopped", "diverged"], fill_value=0)
     groups = frame.groupby("N_D", sort=True)
-    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), epochs=groups.epochs.sum())
+    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size())
+    shown = shown.assign(epochs=groups.epochs.sum()) if frame.epochs.any() else shown  # methods in closed form have 0
     columns = {
         "N_D [1]": "N_D",
         "cells [1]": "cells",

@@ -102,6 +102,7 @@ def test_a_search_in_closed_form_says_what_there_was(simulation):
     assert list(drawn["mirror"].layout.xaxis.ticktext) == ["no", "yes"]
     assert [chip.label for chip in search(content).chips] == ["trial", "chosen", "median"]
     printed = search_table(content)
+    assert "epochs [1]" not in printed.columns
     assert "504 trials in 42 cells: none stopped early, none diverged" in printed.takeaway
     assert "Tried: motion scale 2 to 13, mirror yes or no." in printed.takeaway
     assert {"stopped early", "diverged"} < {chip.label for chip in search(simulation).chips}
