@@ -200,15 +200,6 @@ def training_noise(H: Sequence[Array]) -> float:
     return float(np.sqrt(squares / freedom))
 
 
-def training_error(H: Sequence[Array], trained: Sequence[NDArray[np.bool_]]) -> float:
-    """Standard error [m] that training alone gives a mean over cells of equal weight, from H by seed of each model.
-
-    trained : which cells another training would change, as H.
-    """
-    squares = sum(values.mean() ** 2 * moved.sum() for values, moved in zip(H, trained, strict=True))
-    return training_noise(H) * float(np.sqrt(squares)) / max(sum(map(len, H)), 1)
-
-
 @dataclass(frozen=True, eq=False)
 class CellErrors:
     """Mean error (R,) [m] of one cell in every test manoeuvre, and the windows (R,) of each.
@@ -272,5 +263,6 @@ def _training_of(cells: Sequence[CellErrors], pairs: Sequence[tuple[CellErrors, 
     for cell, (one, other) in zip(cells, pairs, strict=True):
         moved = cell.trained and not np.array_equal(one.errors, other.errors)
         models.setdefault((cell.world, cell.model), []).append((cell.mean, moved))
-    H, trained = zip(*(zip(*cells, strict=True) for cells in models.values()), strict=True)
-    return training_error([np.array(means) for means in H], [np.array(moved) for moved in trained])
+    by_seed = [np.array(seeds, dtype=float).T for seeds in models.values()]  # means, and whether each would change
+    squares = sum(means.mean() ** 2 * moved.sum() for means, moved in by_seed)
+    return training_noise([means for means, _ in by_seed]) * float(np.sqrt(squares)) / len(cells)

@@ -147,7 +147,7 @@ def _models_of_close_up(content: ReportContent) -> str:
     """A sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
     names = join_few_names(shown, 6)
-    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {names}."
+    words = f" Of {total} models, some spread over A and the best in validation: {names}."
     return words if len(shown) < total else ""
 
 

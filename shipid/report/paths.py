@@ -29,15 +29,15 @@ from shipid.report.figure import (
     make_line,
 )
 from shipid.report.page import Section
-from shipid.report.selection import close_up_models, data_driven, drawn_source, figure_sizes, in_words
-from shipid.report.wording import counted_text, metres_text
+from shipid.report.selection import close_up_models, figure_sizes
+from shipid.report.wording import counted_text
 
 MOST_POINTS = 40  # of a path or of the outline of a band
 PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
 HOW_WINDOWS = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
-    "where the ship truly was at the end. The pale broad line is the true path. "
+    "where the ship truly was at the end. The pale broad line is the true path. Arrow keys move the slider."
 )
 
 
@@ -60,9 +60,8 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="browser",
         title="Look at predictions",
-        takeaway=_takeaway_windows(content, counts[-1]),
-        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of "
-        f"{counted_text(len(runs), 'test run')}; arrow keys move the slider.",
+        takeaway=f"{counted_text(sum(map(len, runs.values())), 'window')} of {counted_text(len(runs), 'test run')}.",
+        how=HOW_WINDOWS,
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
@@ -175,22 +174,6 @@ def _rounded_columns(path: Floats, places: int) -> list[list[float | None]]:
 
 def _end_error(window: WindowSnapshot, points: Floats) -> float:
     return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
-
-
-def _takeaway_windows(content: ReportContent, size: int) -> str:
-    """Mean end errors over all windows, per source."""
-    pure, drawn, windows = data_driven(content), close_up_models(content), content.snapshots
-    words = {"cooperative": "the compensated paths", "physics": "physics alone", "pure": in_words(pure or "")}
-    ends: dict[str, list[float]] = {source: [] for source in words}
-    for window, (model, source, N_D) in [(shot, key) for shot in windows for key in shot.paths]:
-        if model in drawn and N_D in ([size] if model == pure else [0, size]):
-            error = _end_error(window, window.paths[model, source, N_D])
-            ends["pure" if model == pure else drawn_source(content, model, source)].append(error)
-    means = {source: float(np.mean(some)) for source, some in ends.items() if some}
-    errors = [f"{words[source]} by {metres_text(mean)}" for source, mean in means.items() if math.isfinite(mean)]
-    where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
-    text = f"In the {counted_text(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
-    return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
 PREDICTIONS = Section("The predictions", {"browser": (browser_figure, "snapshots")})

@@ -48,7 +48,7 @@ from shipid.report.selection import (
     spread_items,
     words_on_left_out,
 )
-from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text, shorten_name
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, shorten_name
 
 HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
@@ -146,18 +146,14 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
 
 def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
     """The lines of the hover box of one model and N_D, of which there are some cells."""
-    good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
+    good = [one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])]
     accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
     lines = [f"<b>{escape_name(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
     if not good:
-        first = cells[0]
-        return "<br>".join([*lines, escape_name(f"{first['status']}: {first['sentence']}".rstrip(": "))])
-    best, worst = good[0], good[-1]
-    spread = f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}"
+        return "<br>".join([*lines, escape_name(f"{cells[0]['status']}: {cells[0]['sentence']}".rstrip(": "))])
+    lines.append(f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}")
     lost = f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result"
-    lines += [f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}"]
-    lines += [spread] * (len(cells) > 1) + [lost] * (len(good) < len(cells))
-    return "<br>".join(filter(None, [*lines, escape_name(best.get("hyperparameters", ""))]))
+    return "<br>".join([*lines, *[lost] * (len(good) < len(cells))])
 
 
 def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:

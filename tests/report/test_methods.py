@@ -28,7 +28,7 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
                         dict(zip(METHOD_COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 2 * H,
                                  1.7 * H, 2.0, 8.0, "a",
                              4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
-                             difference + 0.1, np.nan, np.nan, ""], strict=True))
+                             difference + 0.1, np.nan, np.nan], strict=True))
                     )  # fmt: skip
     return pd.DataFrame(rows)
 

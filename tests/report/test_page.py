@@ -146,7 +146,7 @@ def test_every_model_run_and_finding_is_named(page):
         content.name,
         content.command,
     ]
-    expected += [part for f in content.findings for part in (f.id, f.claim, f.verdict)]
+    expected += [part for f in content.findings for part in (f["id"], f["claim"], f["verdict"])]
     expected += [part for item in content.provenance.items() for part in item]
     assert [name for name in expected if name not in words] == []
     assert content.study_document in words
@@ -269,5 +269,5 @@ def test_it_is_written_when_every_cell_failed(full_scale):
 def test_write_report(tmp_path, plain):
     file = write_report(plain, tmp_path / "new" / "report.html")
     assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
-    with pytest.raises(NotADirectoryError):
+    with pytest.raises(FileExistsError):
         write_report(plain, file / "report.html")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from shipid.report import paths
-from shipid.report.paths import browser_figure
 
 window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
 
@@ -44,14 +43,3 @@ def test_a_diverged_path_becomes_gaps(full_scale):
     paths = {key: np.where(np.arange(16)[:, None] > 7, np.inf, path) for key, path in first.paths.items()}
     text = json.dumps(window_data(replace(full_scale, snapshots=[replace(first, paths=paths)])), allow_nan=False)
     assert "null" in text
-
-
-def test_takeaway_is_the_mean_end_error(full_scale):
-    ends = {"cooperative": [], "physics": []}
-    for snapshot in full_scale.snapshots:
-        for (model, source, _), path in snapshot.paths.items():
-            if model != "no physics":
-                ends[source].append(np.linalg.norm(path[-1] - snapshot.truth[-1]))
-    text = browser_figure(full_scale).takeaway
-    assert f"compensated paths by {np.mean(ends['cooperative']):.2f} m" in text
-    assert f"physics alone by {np.mean(ends['physics']):.1f} m" in text
