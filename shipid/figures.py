@@ -1,11 +1,8 @@
 """Every figure of the reports as a plotly figure: `shipid.figures.error_map(results).show()`.
 
-Figures of a study take `Results` (as `shipid.run` and `shipid.read_results` return them), the content of a report, or
-the table of cells alone, as `shipid.read_cells` returns it. Figures of an identification take its outcome, those of a
-manoeuvre what `shipid.measure_standard` returns, those of a check a dataset.
-
-All of them raise ShipidError where there is nothing to draw or an option does not exist, and take `dark=True` for
-light ink on a dark ground.
+Figures of a study take `Results`, the content of a report, or a table of cells as of `shipid.read_cells`; others the
+outcome of an identification, what `shipid.measure_standard` returns, or a dataset. All raise ShipidError where there is
+nothing to draw or an option does not exist.
 """
 
 from __future__ import annotations
@@ -124,11 +121,8 @@ def prediction(
 ) -> go.Figure:
     """True and predicted paths from one instant of a test run, in metres ahead and to starboard, ship to scale.
 
-    Parameters
-    ----------
-    run : test run; default: the first.
-    t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
-    N_D : manoeuvres the models were trained on; default: the most.
+    run : default: the first. t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
+    N_D : default: the most.
     """
     if t is not None and not np.isfinite(check_number("t", t)):
         raise ShipidError(f"t must be a time in seconds, not {t}", path="prediction")
@@ -230,10 +224,9 @@ def _draw(
 
 
 def content_of(source: Source) -> ReportContent:
-    """Return what a report shows: from results, or from the table of cells alone.
+    """Return what a report shows: from results, or from the table of cells alone; to draw many figures, call it once.
 
-    Assembling it from results takes a moment: to draw many figures, call this once and draw from the content.
-    Raises ShipidError for anything else, and for a table that lacks a column of cells.
+    Raises ShipidError for anything else, and for a table that lacks a column.
     """
     if isinstance(source, ReportContent):
         return source

@@ -78,10 +78,9 @@ def _drawable_models(results: Results) -> pd.DataFrame:
 def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     """Write report.html, summary.md, answer.txt and the tables from what a run's folder holds; returns the report.
 
-    A study of several parts has these in the folder of each part, and a page that compares its methods over all parts,
-    with `methods.csv` beside it. say : called with a few words on how far it is.
-
-    Raises ResultError if the folder holds no run, OSError if it cannot be written.
+    Parts of a study have theirs in their folders; the page of the whole compares methods, with `methods.csv` beside it.
+    say : called with words on the progress. Raises ResultError if the folder holds no run, OSError if it cannot be
+    written.
     """
     folder = as_path("folder", folder)
     plan = store.stored_plan(folder)

@@ -44,7 +44,7 @@ MOMENTS = 6  # instants of a run whose paths are drawn
 class AboardContent(PageContent):
     """Everything the page shows.
 
-    lines : the summary, in the order of the terminal. track : run, t [s], north, east [m], as measured.
+    lines : the summary. track : run, t [s], north, east [m].
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
     [m] and band_course [rad, clockwise from north].

@@ -51,11 +51,10 @@ class AnswerSentence:
 class WindowSnapshot:
     """One window of a test run with its predictions, in the frame (11) frozen at the instant of prediction.
 
-    run, t : test run and instant of prediction [s]. outline : (k, 2) of the ship, x ahead, y to starboard [m].
-    psi_end : true heading at the end of the horizon, relative to that at its start [rad].
-    truth : (T + 1, 2) true x, y [m]. paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; N_D = 0 of physics.
+    run, t [s] : of the instant. outline : (k, 2) of the ship [m]. psi_end : change of the true heading [rad].
+    truth : (T + 1, 2) true x, y [m]. paths : (model, source, N_D) -> (T + 1, 2) [m]; N_D = 0 of physics.
     wind : speed [m/s] and direction it blows towards [rad], clockwise from ahead; None where not measured.
-    bands : (model, source, N_D) -> (n, 2) closed outline of the band around that path [m].
+    bands : key of the path -> (n, 2) closed outline of the band around it [m].
     """
 
     run: str
@@ -72,8 +71,8 @@ class WindowSnapshot:
 class PageContent:
     """What a page shows besides its sections; every page adds frames and `answer`, the sentences below the title.
 
-    title, name : in words, and the short name beside the kicker. provenance : label -> value.
-    command : what reproduces the page. study_document : as text. findings : id, claim, verdict, evidence of each.
+    name : beside the kicker. provenance : label -> value. command : what reproduces the page.
+    findings : id, claim, verdict, evidence of each.
     """
 
     title: str
@@ -98,24 +97,22 @@ def empty_frame(*columns: str) -> Callable[[], pd.DataFrame]:
 class ReportContent(PageContent):
     """Everything one report shows; a frame without rows leaves its figure out.
 
-    `source` is "physics", "cooperative" or "naive". Rows of physics and naive have N_D = 0; the model without physics
-    is the one of family "none", its source "cooperative". It is called `no physics`, whatever the frames call it.
+    `source` is "physics", "cooperative" or "naive"; N_D is 0 for physics and naive. The model without physics, of
+    family "none", has the source "cooperative" and is called `no physics`.
 
-    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres A, A_90, H, H_90, rms
-    (NaN where failed); then member, runs, minutes, seconds, hyperparameters (text).
+    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, A, A_90, H, H_90, rms [m] (NaN
+    where failed); then member, runs, minutes, seconds, hyperparameters (text).
     naive : mean, p90, rms [m] of constant u, v, r.
-    models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean
-    absolute error of the physics along x and y of the frame (11).
-    factors : of perturbed numbers: model, path, group ("hull", ...), factor [1]; 0 where a term was removed.
-    trials : cell, model, N_D, seed, number, state ("complete", "diverged", "stopped"), value [m^2] (NaN where
-    diverged), epochs, seconds, chosen (its network is in the compensator), and a float column per searched
-    hyperparameter.
+    models : model, family, A, A_90, A_rms [m], status, description; where known A_along and A_across [m].
+    factors : model, path, group ("hull", ...), factor [1]; 0 where a term was removed.
+    trials : `TRIAL_COLUMNS` and a float column per searched hyperparameter; state is "complete", "diverged" or
+    "stopped", value [m^2] NaN where diverged; chosen: its network is in the compensator.
     horizon : model, N_D, seed, source, ahead [s], mean, p90 [m]; where known along, across [m].
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
-    commands : run, t [s], one column per command in the units used on board, in brackets: "port shaft [rpm]".
+    commands : run, t [s], one column per command, named with its unit: "port shaft [rpm]".
     tracks : run, set, north, east [m]. envelope : set (or "published"), quantity, unit, min, mean, max.
-    repairs : kind, column, count, note. best : the physics model that validation prefers at the largest amount of data.
-    frames : further frames by name. alone : models whose method learns nothing from data: their path is the physics'.
+    repairs : kind, column, count, note. best : the model that validation prefers at the largest amount of data.
+    frames : further frames by name. alone : models whose method learns nothing from data.
     """
 
     answer: Sequence[AnswerSentence] = ()

@@ -62,11 +62,9 @@ MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
 class ManoeuvreContent(PageContent):
     """Everything the page shows.
 
-    first : names of the measures that the answer says.
-    log : `t` [s], `north`, `east` [m], `psi`, `helm` [rad], `u`, `v` [m/s], `r` [rad/s], `shaft` [rev/s].
-    measures, criteria : rows from `shipid.measures.rows`.
-    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed.
-    outline : (k, 2) of the ship from above, body axes x ahead, y to starboard [m].
+    first : names of the measures that the answer says. measures, criteria : rows from `shipid.measures.rows`.
+    log : t [s], north, east [m], psi, helm [rad], u, v [m/s], r [rad/s], shaft [rev/s].
+    levels : helm [rad], rate [rad/s] of a spiral in the order performed. outline : (k, 2) of the ship [m].
     """
 
     first: Sequence[str]
