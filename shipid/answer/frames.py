@@ -14,7 +14,7 @@ from shipid.hybrid.bands import Region
 from shipid.metrics import course_over_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
-from shipid.report.content import TRIAL_COLUMNS, PathKey
+from shipid.report.content import TRIAL_COLUMNS, PathKey, model_text
 from shipid.report.selection import FEW_RUNS, figure_sizes, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
@@ -160,7 +160,7 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
     paths |= {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     for row in results.rows:
         if row["cell"] in results.paths and row["N_D"] in amounts and row["seed"] == seed:
-            key = row["model"], "cooperative", int(row["N_D"])
+            key = model_text(row["model"]), "cooperative", int(row["N_D"])
             paths[key], bands = results.paths[row["cell"]], results.bands.get(row["cell"])
             if bands is not None and bands.promises(level):
                 edges[key] = bands.region(paths[key], test.columns, test.step, level)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -137,7 +137,6 @@ class ReportContent(PageContent):
         for name in ("cells", "models", "factors", "trials", "horizon", "over_time"):
             object.__setattr__(self, name, name_models(getattr(self, name)))
         object.__setattr__(self, "frames", {name: name_models(frame) for name, frame in self.frames.items()})
-        object.__setattr__(self, "snapshots", [name_window_models(snapshot) for snapshot in self.snapshots])
         object.__setattr__(self, "alone", {model_text(model) for model in self.alone})
 
     def frame(self, name: str) -> pd.DataFrame:
@@ -149,12 +148,3 @@ def name_models(frame: pd.DataFrame) -> pd.DataFrame:
     """A frame whose models have their names for people."""
     columns = [column for column in MODEL_NAME_COLUMNS if column in frame]
     return frame.assign(**{column: frame[column].map(model_text, na_action="ignore") for column in columns})
-
-
-def name_window_models(snapshot: WindowSnapshot) -> WindowSnapshot:
-    """A window whose models have their names for people."""
-    paths, bands = (
-        {(model_text(model), source, size): line for (model, source, size), line in lines.items()}
-        for lines in (snapshot.paths, snapshot.bands)
-    )
-    return replace(snapshot, paths=paths, bands=bands)

@@ -87,7 +87,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     def path_of(window: WindowSnapshot, key: PathKey) -> list[Any]:
         model, source, size = key
         which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
-        error = round(_end_error(window, window.paths[key]), 6)
+        error = round(float(np.linalg.norm(window.paths[key][-1] - window.truth[-1])), 6)
         band = _rounded_columns(window.bands[key], places) if key in window.bands else []
         at, path = counts.index(size) if source == "cooperative" else -1, _rounded_columns(window.paths[key], places)
         return [which, at, *path, error if math.isfinite(error) else None, *band]
@@ -170,10 +170,6 @@ def _rounded_columns(path: Floats, places: int) -> list[list[float | None]]:
     with np.errstate(over="ignore"):
         columns = np.round(some.T, places).tolist()
     return [[value if math.isfinite(value) else None for value in column] for column in columns]
-
-
-def _end_error(window: WindowSnapshot, points: Floats) -> float:
-    return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
 
 
 PREDICTIONS = Section("The predictions", {"browser": (browser_figure, "snapshots")})

@@ -146,7 +146,7 @@ def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
 
 def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     """Axis of a hyperparameter: yes and no, logarithmic where its values are factors apart, or linear."""
-    if _yes_or_no(every):
+    if set(every.dropna()) == {0.0, 1.0}:
         return make_axis(escape_name(name.replace("_", " ")), tickvals=[0, 1], ticktext=["no", "yes"])
     ends = np.array([every.min(), every.max()], dtype=float)
     axis = log_axis if ends[0] > 0 and ends[1] / ends[0] > WIDE_RANGE else make_axis
@@ -154,10 +154,6 @@ def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     room = 0.04 * (high - low)
     title = f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
     return axis(escape_name(title), range=[low - room, high + room], nticks=3)
-
-
-def _yes_or_no(values: pd.Series[float]) -> bool:
-    return set(values.dropna()) == {0.0, 1.0}
 
 
 def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
