@@ -88,7 +88,7 @@ def _draw_strips(frame: pd.DataFrame, names: list[str]) -> Panel:
         traces.append(make_line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
     removed = bool((frame.factor <= 0).any())
     room, ends = 0.03 * math.log10(high / low), np.log10([edge if removed else low, high])
-    x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room], nticks=6)
+    x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room], nticks=4, tickangle=0)
     y_axis = names_axis([shorten_name(name) for name in names], range=[len(names) - 0.4, -0.4])
     rule = {"type": "line", "layer": "below", "yref": "paper", "x0": 1, "x1": 1, "y0": 0, "y1": 1}
     rule |= {"line": {"color": INK, "width": 1}}
