@@ -1,10 +1,8 @@
 """Evidence of test manoeuvres: intervals of paired differences, and how easily chance makes them.
 
-Windows of one test manoeuvre are alike, test manoeuvres are not: so manoeuvres are resampled, whole and paired (cluster
-bootstrap; Davison and Hinkley 1997, section 3.8), and the difference is measured in its standard error (bootstrap-t;
-Efron and Tibshirani 1993, section 12.5), which suits few manoeuvres and skewed errors. Where Student's interval is
-wider, it counts. What another training would give adds to the standard error. Repeated training is no evidence: it only
-averages this part out.
+Test manoeuvres are resampled, whole and paired (cluster bootstrap; Davison and Hinkley 1997, section 3.8), in standard
+errors (bootstrap-t; Efron and Tibshirani 1993, section 12.5). Where Student's interval is wider, it counts. What
+another training would give adds to the standard error.
 """
 
 from __future__ import annotations
@@ -49,8 +47,6 @@ class Differences:
 def paired_difference(differences: Array, counts: Array, training: Array | float = 0.0) -> Differences:
     """Means of paired differences with intervals and chances; only means with fewer than `FEWEST_RUNS` manoeuvres.
 
-    The interval is that of a bootstrap-t over manoeuvres, or Student's where it is wider.
-
     Parameters
     ----------
     differences : (J, R) mean of each difference in each test manoeuvre [m].
@@ -80,8 +76,7 @@ def paired_difference(differences: Array, counts: Array, training: Array | float
 def _bootstrap_distances(values: Array, weights: Array, training: Array | float) -> tuple[Array, Array]:
     """(B, J) resampled weighted means less the mean, in their standard errors, and (J,) the standard error of the mean.
 
-    The distance is 0 where the spread of manoeuvres is that of rounding, or far below that of training. One manoeuvre
-    drawn again and again has no spread: its distance is very large.
+    0 where the spread of manoeuvres is that of rounding, or far below that of training.
     """
     draws = _resampling_counts(len(weights))
     mean, sums, total = values @ weights, weights * values, draws @ weights
@@ -111,14 +106,11 @@ def resampled_means(values: Array, counts: Array) -> Array:
 
 
 def share_interval(held: NDArray[Any], run: NDArray[Any]) -> tuple[float, float]:
-    """95 % interval of `share_of`, by Clopper and Pearson for so many windows as those of few runs are worth.
+    """95 % interval of `coverage_share`, by Clopper and Pearson for so many windows as those of few runs are worth.
 
-    Windows of one run are alike: the number of windows is reduced until their variance is that between runs, and is
-    never below the number of runs. Source: Korn and Graubard (1998), Survey Methodology 24. For one window a run it is
-    the exact interval.
+    Windows of one run are alike: their number is reduced until their variance is that between runs, never below the
+    number of runs. Source: Korn and Graubard (1998), Survey Methodology 24.
 
-    Parameters
-    ----------
     held : (S,) whether each window lies in its band. run : its run, (S,).
     """
     shares, windows = coverage_by_run(held, run), len(held)
@@ -200,15 +192,6 @@ def training_noise(H: Sequence[Array]) -> float:
     return float(np.sqrt(squares / freedom))
 
 
-def training_error(H: Sequence[Array], trained: Sequence[NDArray[np.bool_]]) -> float:
-    """Standard error [m] that training alone gives a mean over cells of equal weight, from H by seed of each model.
-
-    trained : which cells another training would change, as H.
-    """
-    squares = sum(values.mean() ** 2 * moved.sum() for values, moved in zip(H, trained, strict=True))
-    return training_noise(H) * float(np.sqrt(squares)) / max(sum(map(len, H)), 1)
-
-
 @dataclass(frozen=True, eq=False)
 class CellErrors:
     """Mean error (R,) [m] of one cell in every test manoeuvre, and the windows (R,) of each.
@@ -247,10 +230,9 @@ class CellDifference:
 
 
 def compare_cells(mine: Sequence[CellErrors], others: Sequence[CellErrors]) -> CellDifference:
-    """Compare cells with others, pair by pair; every pair weighs the same, whatever the number of its windows.
+    """Compare cells with others, pair by pair; every pair weighs the same.
 
-    All windows and cells of a test manoeuvre, in its world, are drawn together; what another training would give is in
-    the interval, but for cells that err alike to the digit.
+    All windows and cells of a test manoeuvre, in its world, are drawn together; the interval holds another training.
     """
     pairs = list(zip(mine, others, strict=True))
     by_world: dict[str, list[tuple[CellErrors, CellErrors]]] = {}
@@ -272,5 +254,6 @@ def _training_of(cells: Sequence[CellErrors], pairs: Sequence[tuple[CellErrors, 
     for cell, (one, other) in zip(cells, pairs, strict=True):
         moved = cell.trained and not np.array_equal(one.errors, other.errors)
         models.setdefault((cell.world, cell.model), []).append((cell.mean, moved))
-    H, trained = zip(*(zip(*cells, strict=True) for cells in models.values()), strict=True)
-    return training_error([np.array(means) for means in H], [np.array(moved) for moved in trained])
+    by_seed = [np.array(seeds, dtype=float).T for seeds in models.values()]  # means, and whether each would change
+    squares = sum(means.mean() ** 2 * moved.sum() for means, moved in by_seed)
+    return training_noise([means for means, _ in by_seed]) * float(np.sqrt(squares)) / len(cells)

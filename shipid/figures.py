@@ -1,16 +1,14 @@
 """Every figure of the reports as a plotly figure: `shipid.figures.error_map(results).show()`.
 
-Figures of a study take `Results` (as `shipid.run` and `shipid.read_results` return them), the content of a report, or
-the table of cells alone, as `shipid.read_cells` returns it. Figures of an identification take its outcome, those of a
-manoeuvre what `shipid.measure_standard` returns, those of a check a dataset.
-
-All of them raise ShipidError where there is nothing to draw or an option does not exist, and take `dark=True` for
-light ink on a dark ground.
+Figures of a study take `Results`, the content of a report, or a table of cells as of `shipid.read_cells`; others the
+outcome of an identification, what `shipid.measure_standard` returns, or a dataset. All raise ShipidError where there is
+nothing to draw or an option does not exist.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -19,13 +17,13 @@ import plotly.graph_objects as go
 
 from shipid.arguments import check_class, check_number
 from shipid.errors import ShipidError
-from shipid.report import paths
 from shipid.report.checks import CHECK_PAGE, CheckContent
 from shipid.report.content import PageContent, ReportContent
-from shipid.report.figure import PageFigure, draw_alone, dress_panels
+from shipid.report.figure import PageFigure, draw_alone
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
 from shipid.report.manoeuvre import MANOEUVRE_PAGE, ManoeuvreContent
 from shipid.report.page import Section
+from shipid.report.paths import windows_of
 from shipid.report.physics_and_data import gain_lack, map_lack
 from shipid.report.sections import SECTIONS
 
@@ -123,19 +121,16 @@ def prediction(
 ) -> go.Figure:
     """True and predicted paths from one instant of a test run, in metres ahead and to starboard, ship to scale.
 
-    Parameters
-    ----------
-    run : test run; default: the first.
-    t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
-    N_D : manoeuvres the models were trained on; default: the most.
+    run : default: the first. t : instant of prediction [s], the nearest recorded one; default: the middle of the run.
+    N_D : default: the most.
     """
     if t is not None and not np.isfinite(check_number("t", t)):
         raise ShipidError(f"t must be a time in seconds, not {t}", path="prediction")
     content = content_of(source)
-    window, size = paths.find_window(content, run, t, N_D)
-    record = paths.browser_figure(content)
-    assert record is not None  # find_window has raised where there are no windows
-    return dress_panels(record, [paths.draw_window(content, window, size)], dark=dark)
+    if t is not None:
+        nearest = (min(windows, key=lambda one: abs(one.t - t)) for windows in windows_of(content).values())
+        content = replace(content, snapshots=list(nearest))
+    return _draw("browser", content, [run, N_D], dark=dark)
 
 
 def factors(source: Source, *, dark: bool = False) -> go.Figure:
@@ -229,10 +224,9 @@ def _draw(
 
 
 def content_of(source: Source) -> ReportContent:
-    """Return what a report shows: from results, or from the table of cells alone.
+    """Return what a report shows: from results, or from the table of cells alone; to draw many figures, call it once.
 
-    Assembling it from results takes a moment: to draw many figures, call this once and draw from the content.
-    Raises ShipidError for anything else, and for a table that lacks a column of cells.
+    Raises ShipidError for anything else, and for a table that lacks a column.
     """
     if isinstance(source, ReportContent):
         return source

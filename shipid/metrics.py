@@ -44,8 +44,7 @@ def vector_lengths(vectors: Array) -> Array:
 def position_error(predicted: Array, true: Array) -> Array:
     """Return the distance (T, S) [m] between paths (T, S, 2) [m], e_k of (14) and (15); both in one frame.
 
-    Arrays of integers are taken as floats, so that no difference wraps around. Raises ShipidError for another
-    shape, and for what holds no numbers.
+    Raises ShipidError for another shape, and for what holds no numbers.
     """
     predicted, true = as_float_array("predicted", predicted), as_float_array("true", true)
     if predicted.shape != true.shape or predicted.shape[-1:] != (2,):
@@ -113,8 +112,7 @@ SLOW = 0.2  # m/s over ground: a slower ship has no course
 def course_over_horizon(predicted: Array, true: Array, step: float) -> Array:
     """Return the mean absolute error (T,) [rad] of the course, the direction of the track, of paths (T, S, 2) [m].
 
-    Paths begin at the origin and have a point each `step` [s]. Windows in which the ship truly makes less than `SLOW`
-    in that step are left out; NaN where all are.
+    A point each `step` [s] from the origin on. Windows slower than `SLOW` in that step are left out; NaN where all are.
     """
     going, truly = (np.diff(path, axis=0, prepend=np.zeros_like(path[:1])) for path in (predicted, true))
     cross = truly[..., 0] * going[..., 1] - truly[..., 1] * going[..., 0]

@@ -18,7 +18,6 @@ from shipid.evidence import (
     partial_conjunction,
     resampled_means,
     share_interval,
-    training_error,
     training_noise,
     which_significant,
     world_interval,
@@ -137,18 +136,6 @@ def test_noise_of_training() -> None:
     rng = np.random.default_rng(5)
     many = [rng.normal(2.0, 0.2, 5) for _ in range(200)]
     assert training_noise(many) == pytest.approx(0.1, rel=0.1)
-
-
-def test_the_error_that_training_gives_a_mean_over_cells() -> None:
-    """That of the mean of all cells, drawn again and again; cells that another training leaves alone add nothing."""
-    rng, sizes = np.random.default_rng(6), (3.0, 1.0, 6.0)
-    alone, all_move = [np.array([size]) for size in sizes], [np.array([True])] * 3
-    means = np.mean([size * (1 + TRAINING * rng.normal(size=20_000)) for size in sizes], axis=0)
-    assert training_error(alone, all_move) == pytest.approx(means.std(), rel=0.03)
-    pairs = [np.full(2, size) for size in sizes]
-    assert training_error(pairs, [np.full(2, True)] * 3) == pytest.approx(training_noise(pairs) * np.sqrt(2 * 46) / 6)
-    moved = [np.array([change]) for change in (True, True, False)]
-    assert training_error(alone, moved) == pytest.approx(TRAINING * np.sqrt(10) / 3)
 
 
 def test_worlds() -> None:

@@ -106,7 +106,7 @@ def test_the_path_of_a_prediction_is_the_recorded_one(content: ReportContent) ->
         np.ptp(np.hypot(np.diff(hulls[0].x), np.diff(hulls[0].y)) - np.hypot(np.diff(hulls[1].x), np.diff(hulls[1].y)))
         < 1e-4
     )
-    with pytest.raises(ShipidError, match="no window of run 'M9'"):
+    with pytest.raises(ShipidError, match="Test run: 'M9' is none"):
         figures.prediction(content, run="M9")
-    with pytest.raises(ShipidError, match="no window with N_D = 5; valid: 4, 6"):
+    with pytest.raises(ShipidError, match="N_D: '5' is none"):
         figures.prediction(content, N_D=5)

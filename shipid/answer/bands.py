@@ -40,8 +40,8 @@ def cell_regions(
 def coverage_frame(results: Results) -> pd.DataFrame:
     """Share of whole test paths in their bands, by model, N_D and level, over seeds.
 
-    Columns: model, family, N_D, level, coverage, low, high (95 % interval, clustered by run), width [m] (mean radius
-    over the horizon), end [m] (at its end), runs (test runs), seeds.
+    Columns: model, family, N_D, level, coverage, low, high (95 % interval, clustered by run), width [m] (mean radius),
+    end [m] (at the end of the horizon), runs (test runs), seeds.
     """
     run, count = results.test.run, len(results.test.spans)
     levels = sorted({*REPORTED_LEVELS, results.plan.study.bands.level})
@@ -64,9 +64,8 @@ def coverage_frame(results: Results) -> pd.DataFrame:
 def answer_on_bands(results: Results, coverage: pd.DataFrame) -> list[tuple[str, str]]:
     """What bands promise and held, and for which manoeuvres they promise nothing, each with the anchor of its figure.
 
-    Means over the models at the largest N_D that has bands, without families whose numbers were set from test runs.
-
-    coverage : as of `coverage_frame`.
+    Means over the models at the largest N_D with bands, without families set from test runs. coverage :
+    `coverage_frame`.
     """
     level = results.plan.study.bands.level
     mine = coverage[coverage["level"].eq(level) & ~coverage["family"].isin(results.saw_test)]

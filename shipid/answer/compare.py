@@ -1,8 +1,7 @@
 """Finished runs compared: what their documents differ in, errors cell by cell, and one study in several worlds.
 
-Each run is set against the first one: the same family, member, method, N_D and seed. On the test windows that both
-predict, the difference is taken in every test manoeuvre and judged over manoeuvres. Runs with other test manoeuvres
-cannot be paired and are refused. Runs of one study that differ in their top-level seed alone are repetitions of it.
+Cells are set against those of the first run with the same family, member, method, N_D and seed, on the test windows
+that both predict. Runs of one study that differ in their top-level seed alone are repetitions of it.
 """
 
 from __future__ import annotations
@@ -52,14 +51,12 @@ POSSIBLE = {
 class Comparison:
     """Several runs beside the first of them.
 
-    names : of the folders, the first one first.
-    documents : a row per value that differs: path, and a column of text per name.
-    errors : a row per other folder, family, method and N_D: `cells` that match, `first` and `other` [m], mean H over
-        them, `difference` other less first [m] with its 95 % interval `low` to `high`, `verdict` ("lower", "higher" or
-        empty, corrected for the number of rows; "identical" where every cell errs alike to the digit), and
-        `coverage_first`, `coverage_other` [1] of their bands.
-        N_D = 0 is A of the physics alone.
-    notes : sentences about what could not be matched, and what the intervals rest on.
+    names : of the folders. documents : a row per value that differs: path, and a column of text per name.
+    errors : a row per other folder, family, method and N_D (0: the physics alone): `cells` that match, `first` and
+        `other` [m], mean H over them, `difference` other less first [m] with its 95 % interval `low`, `high`, `verdict`
+        ("lower", "higher", "identical" to the digit, or empty; corrected for the number of rows), `coverage_first`,
+        `coverage_other`.
+    notes : sentences on what could not be matched, and what the intervals rest on.
     """
 
     names: tuple[str, ...]
@@ -217,9 +214,7 @@ def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Docum
 def document_differences(plans: Sequence[Plan], called: Sequence[Mapping[str, str]] = ()) -> pd.DataFrame:
     """One row per value that is not the same in all plans: `path`, then a column of text for each plan, from 0 on.
 
-    Compared are the studies with their defaults, the vessels that all have by one name, and the digests of data.
-
-    called : for each plan, method or family -> the name that it is compared under.
+    Compared are studies with their defaults, vessels that all have, and digests of data. called : see `whole_document`.
     """
     shared = set.intersection(*({*plan.vessels} for plan in plans))
     whole = [
@@ -282,11 +277,10 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
 
 
 def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
-    """H [m], coverage [1] and width [m] of bands per family, method and N_D, over worlds; of N_D = 0, A in place of H.
+    """H [m], coverage [1] and width [m] of bands per family, method and N_D (0: A in place of H), over worlds.
 
-    Columns: family, method, N_D; H, H_low, H_high: mean, least and greatest over the worlds of the means over members
-    and seeds; so for coverage and width, not numbers without a band; worlds (that have a result). Failed cells are left
-    out.
+    Columns: family, method, N_D; H, H_low, H_high: mean, least and greatest over worlds of the means over members and
+    seeds; so for coverage and width; worlds (that have a result).
     """
     parts, keys, numbers = [], ["family", "method", "N_D"], ["H", "coverage", "width"]
     for results in worlds:

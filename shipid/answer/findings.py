@@ -1,26 +1,8 @@
-"""Findings of a study: which claims it judges, R1-R4 at full scale, and B1-B2 on bands.
+"""Findings of a study: which claims it judges, R1-R4 at full scale (method, section 5), and B1-B2 on bands.
 
-R1-R4 (method, section 5) judge accurate and inaccurate physics at the largest amount of data, from paired differences
-over test manoeuvres; "shown" means a 95 % interval free of 0.
-
-R1 : both models have H below A.
-R2 : H of the inaccurate model is less than 10 % above A of the accurate one: the one whose A is smaller on the test,
-    whichever the study calls accurate. Where that is not shown of either, it must hold of both.
-R3 : the models differ less in H than in A: both A gap - H gap and A gap + H gap are above 0, where a gap is the error
-    of the model with the larger A less that of the other.
-R4 : at every step ahead no physics has a larger error than every other predictor, physics alone included; refuted
-    if one of them is worse over the whole horizon.
-
-For B1 and B2 the width of a band of the study's level is its mean radius [m] over the horizon, a mean over windows of
-each test manoeuvre; it is judged as errors are (`shipid.evidence`).
-
-B1 : at every N_D that has bands the width rises along ln A over the physics models, and it would hardly do so if the
-    models had their A in any other order. At full scale, with one accurate and one inaccurate model: at the largest N_D
-    the band of the model whose A is shown to be larger is wider, whichever the study calls accurate.
-B2 : the share of whole test paths inside their bands is the level, at the largest N_D and in the mean over models; each
-    test manoeuvre counts the same, however long it is, as in the promise.
-    Confirmed if its 95 % interval lies above the level less 5 points, refuted if it lies below the level. Manoeuvres of
-    a kind that no run of calibration has are left out.
+Rules and their error rates: docs/findings.md. "Shown" is a paired difference over test manoeuvres whose 95 % interval
+is free of 0 (`shipid.evidence`). The width of a band is its mean radius [m] over the horizon, a mean over windows of
+each test manoeuvre, and is judged as errors are.
 """
 
 from __future__ import annotations

@@ -1,27 +1,8 @@
 """Findings S1-S7 (method, section 4): verdicts on the map H(A, N_D) of a simulated study.
 
-All are taken over the members of the moderate and the high family that have a result in every cell; a member that
-failed anywhere is left out and named. The unit of evidence is the test manoeuvre: "shown" means a paired difference
-whose 95 % interval over test manoeuvres is free of 0 (`shipid.evidence`). A claim about all needs each of its
-differences shown; a claim about some, and a list of names, is corrected for how many could have been (Holm). A finding
-is confirmed if it is shown, refuted if its opposite is shown, else undecided: too few manoeuvres decide nothing.
-
-S1 : every moderate member has a lower H than no physics at the smallest N_D, and more than half of them have it
-    at every N_D.
-S2 : for every model, no physics included, H falls along ln N_D (slope by least squares over all N_D).
-S3 : at every N_D H rises along ln A over the physics models, and it rises more steeply at the smallest N_D than at the
-    largest; and neither the rise nor its fall would come by chance if the models had their A in any other order.
-S4 : at the largest N_D at least one high member is better than no physics and at least one is worse; and over the
-    seeds, each another nested order of runs, H of those that are worse varies more than that of the moderate members.
-    Never decided with fewer than five seeds.
-S5 : the rank correlation of H and H_90 over cells is at least 0.95 and H_90 turns none of S1-S4 round; refuted if it is
-    below 0.8 or H_90 confirms what H refutes, or the other way round. UndecidedClaim with too few manoeuvres.
-S6 : a moderate member with a small N_D (at most half of the largest) is better than no physics with the next
-    larger one, and one is better than physics alone that is more accurate than its physics.
-S7 : at the smallest N_D the roughness of paths without physics is more than 1.5 times that of the true paths, and that
-    of the cooperative models, in the mean, is less. Not testable where the compensation is a polynomial of time.
-
-The thresholds are free: the paper gives none. Error rates of every rule: docs/findings.md.
+Rules and their error rates: docs/findings.md. Taken over the members of the moderate and the high family with a result
+in every cell. "Shown" is a paired difference over test manoeuvres whose 95 % interval is free of 0
+(`shipid.evidence`). The thresholds are free: the paper gives none.
 """
 
 from __future__ import annotations
@@ -171,9 +152,9 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
 class AccuracyTrend:
     """How values rise along ln A over models.
 
-    slopes : the rise for twice the A at each N_D, and, where asked for, how much larger it is at the least N_D than at
-    the largest. verdict : whether all are above 0, and would hardly be so with the models in any other order.
-    words : range of the rank correlations with A. least : the least of them.
+    slopes : for twice the A at each N_D; where asked for, last, how much larger at the least N_D than at the largest.
+    verdict : whether all are above 0, and hardly by chance. words, least : range of the rank correlations with A, the
+    least.
     """
 
     slopes: Differences

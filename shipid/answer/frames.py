@@ -14,7 +14,7 @@ from shipid.hybrid.bands import Region
 from shipid.metrics import course_over_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
-from shipid.report.content import TRIAL_COLUMNS, PathKey
+from shipid.report.content import TRIAL_COLUMNS, PathKey, model_text
 from shipid.report.selection import FEW_RUNS, figure_sizes, spread_items
 from shipid.study import store
 from shipid.study.declared import NO_MODEL, StudyMethod
@@ -25,7 +25,6 @@ from shipid.study.results import Results
 from shipid.vessel.outline import ship_outline
 
 ALL_KINDS = "all"
-MOST_POINTS = 400  # of a track on the map: more than its pixels can show
 CLOCK = 6  # digits after the point of a time in a run [s]
 INSTANTS, MOST_WINDOWS = 7, 84  # windows of a test run in the browser, and of all test runs
 
@@ -161,7 +160,7 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
     paths |= {(m, "physics", 0): path for m, path in results.physics.items() if m != NO_MODEL and m not in alone}
     for row in results.rows:
         if row["cell"] in results.paths and row["N_D"] in amounts and row["seed"] == seed:
-            key = row["model"], "cooperative", int(row["N_D"])
+            key = model_text(row["model"]), "cooperative", int(row["N_D"])
             paths[key], bands = results.paths[row["cell"]], results.bands.get(row["cell"])
             if bands is not None and bands.promises(level):
                 edges[key] = bands.region(paths[key], test.columns, test.step, level)
@@ -202,12 +201,9 @@ def region_outline(region: Region, paths: np.ndarray, index: int) -> np.ndarray:
 
 
 def tracks_frame(results: Results) -> pd.DataFrame:
-    """Path of every run [m] and its part in the study, thinned to what pixels can show."""
+    """Path of every run [m] and its part in the study."""
     frame = results.dataset.frame[["run", "north", "east"]]
-    runs = frame.groupby("run", sort=False)["run"]
-    kept = frame[runs.cumcount() % (runs.transform("size") // MOST_POINTS).clip(lower=1) == 0]
-    part = np.where(kept["run"].isin(list(results.test.spans)), "test", "training and validation")
-    return kept.assign(set=part).reset_index(drop=True)
+    return frame.assign(set=np.where(frame["run"].isin(list(results.test.spans)), "test", "training and validation"))
 
 
 def envelope_frame(results: Results) -> pd.DataFrame:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.arguments import check_class
-from shipid.evidence import ROUNDING, CellErrors, compare_cells, world_interval
+from shipid.evidence import CellErrors, compare_cells, world_interval
 from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
@@ -22,7 +21,6 @@ METHOD_COLUMNS = [
     *("H", "H_90", "end", "seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
-    "ahead",
 ]
 ErrorsByCell = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation and seed
 
@@ -30,11 +28,9 @@ ErrorsByCell = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation
 def compare_methods(results: Results) -> pd.DataFrame:
     """Compare the methods of a run: a row per family, N_D and method, in the columns of `method_table`.
 
-    The family `with physics` is the mean over all families but `none` and those that saw the test runs. The difference
-    is that to the method by which the study judges. To choose the lowest H of a test chooses by the test: the interval
-    does not count that.
-
-    No rows where fewer than two methods learn from data. Raises ShipidError for results that are none.
+    The family `with physics` is all but `none` and those that saw the test runs. The difference is to the method by
+    which the study judges. No rows where fewer than two methods learn from data. Raises ShipidError for results that
+    are none.
     """
     check_class("results", results, Results, "as of `read_results`")
     if sum(way.method.compensates for way in results.plan.methods) < 2:
@@ -45,9 +41,9 @@ def compare_methods(results: Results) -> pd.DataFrame:
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
     """A row per cell, as `method_table` takes it.
 
-    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (mean error at the end of the
-    horizon) [m], seconds (core-seconds), trials, saw_test (whether the numbers of the family rest on test runs), and
-    `errors`, its `CellErrors`. Without a result the errors are not numbers, or None.
+    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (error at the end of the
+    horizon) [m], seconds (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors
+    (`CellErrors` or None).
     """
     saw, rows = results.saw_test, []
     for row in results.rows:
@@ -66,14 +62,10 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
     H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
-    the others, and `missing` also the cells of other methods that this one does not have, since it does not run on
-    their model: means of methods are over the same cells where both have 0.
-    `difference` is H less that
-    of the method `reference` over the `pairs` of cells in which both have one, with a 95 % interval `low`, `high`, as
-    of `compare_cells`. `better` counts test runs with a lower error. `least`, `greatest`: the difference by world;
-    `world_low`, `world_high`: Student's 95 % interval over worlds, from three on. `ahead` names the methods that err
-    less over the cells that both have. The family `with physics` is all of them but `none` and those that saw the test
-    runs.
+    the others, `missing` also cells that only other methods have. `difference` is H less that of `reference` over the
+    `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`); `better` counts test
+    runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over worlds, with Student's
+    interval.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -87,7 +79,6 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
             row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            row["ahead"] = ", ".join(name for name, others in by_method.items() if _is_lower(others, errors))
             row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
             rows.append(row)
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)
@@ -97,12 +88,6 @@ def _errors_by_cell(cells: pd.DataFrame) -> ErrorsByCell:
     good = cells[cells["status"] == "ok"]
     keys = zip(good["world"], good["foundation"], good["seed"], strict=True)
     return dict(zip(keys, good["errors"], strict=True))
-
-
-def _is_lower(one: ErrorsByCell, other: ErrorsByCell) -> bool:
-    """Whether the mean error of one method is lower over the cells that both have, by more than rounding."""
-    mine, others = (math.fsum(of[key].mean for key in one.keys() & other.keys()) for of in (one, other))
-    return mine < (1 - ROUNDING) * others
 
 
 def _difference_row(mine: ErrorsByCell, others: ErrorsByCell) -> dict[str, Any]:

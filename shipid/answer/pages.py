@@ -15,7 +15,7 @@ from shipid.arguments import as_path
 from shipid.errors import ResultError
 from shipid.files import write_table, write_text
 from shipid.metrics import summarise_errors
-from shipid.report import AnswerSentence, ReportContent, ReportFinding, write_report, write_summary
+from shipid.report import AnswerSentence, ReportContent, summary_text, write_report
 from shipid.report.methods import MethodsContent, sentences_on_methods, write_comparison
 from shipid.study import store
 from shipid.study.declared import NO_MODEL
@@ -47,7 +47,7 @@ def report_content(results: Results) -> ReportContent:
         title=plan.study.question,
         name=plan.name,
         answer=[AnswerSentence(text, figure) for text, figure in words],
-        findings=[ReportFinding(f["id"], f["claim"], f["verdict"], f["evidence"]) for f in judge_findings(results)],
+        findings=judge_findings(results),
         cells=results.cells,
         naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
         models=_drawable_models(results),
@@ -78,10 +78,9 @@ def _drawable_models(results: Results) -> pd.DataFrame:
 def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
     """Write report.html, summary.md, answer.txt and the tables from what a run's folder holds; returns the report.
 
-    A study of several parts has these in the folder of each part, and a page that compares its methods over all parts,
-    with `methods.csv` beside it. say : called with a few words on how far it is.
-
-    Raises ResultError if the folder holds no run or cannot be written.
+    Parts of a study have theirs in their folders; the page of the whole compares methods, with `methods.csv` beside it.
+    say : called with words on the progress. Raises ResultError if the folder holds no run, OSError if it cannot be
+    written.
     """
     folder = as_path("folder", folder)
     plan = store.stored_plan(folder)
@@ -98,8 +97,8 @@ def _write_pages_of_run(folder: Path, say: Say | None) -> Path:
         say(f"{results.plan.name}: answer, findings and tables of {len(results.cells)} cells")
     content = report_content(results)
     write_text(folder / ANSWER, "\n".join(sentence.text for sentence in content.answer) + "\n")
-    write_summary(content, folder / SUMMARY)
-    return write_report(content, folder / REPORT, say)
+    write_text(folder / SUMMARY, summary_text(content))
+    return write_report(content, folder / REPORT)
 
 
 def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> Path:

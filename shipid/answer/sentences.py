@@ -1,7 +1,6 @@
 """From results to words: the answer in sentences, each with the anchor of the figure or table that carries it.
 
-Every comparison is paired over test manoeuvres; brackets are 95 % intervals. "Best" is always the model that validation
-prefers at the largest amount of data, never the one with the lowest error on the test.
+"Best" is always the model that validation prefers at the largest amount of data, never the lowest error on the test.
 """
 
 from __future__ import annotations
@@ -44,12 +43,10 @@ def errors_by_model(results: Results) -> pd.DataFrame:
 
 
 def best_model(results: Results) -> str | None:
-    """Name of the physics model with the lowest validation loss at the largest amount of data; None without one.
+    """Name of the physics model with the lowest validation loss at the largest amount of data; None without a loss.
 
-    Where the judged method learns nothing there is no validation loss, and so no best model.
-
-    Models that were fitted to the runs are left out where there are others: their validation runs are among these, so
-    their loss says too little. So are families that a study sets aside.
+    Left out are families that a study sets aside and, where there are others, models fitted to the runs that validate
+    them.
     """
     table = errors_by_model(results)
     table = table[~table["family"].isin(results.aside)]
@@ -63,8 +60,7 @@ def best_model(results: Results) -> str | None:
 class AnswerCase:
     """Inputs of the sentences of one study, without families that are set aside.
 
-    rows : as of `errors_by_model`. table : errors by test manoeuvre at the N_D at which a model has a result.
-    best : as of `best_model`; None where no trial of a physics model has a value.
+    rows : as of `errors_by_model`. table : errors by test manoeuvre. best : as of `best_model`.
     """
 
     results: Results

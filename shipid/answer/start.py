@@ -29,17 +29,17 @@ def run(
 ) -> Results:
     """Run a study to its end, write its report, and return its results; what is finished already is not run again.
 
-    Progress is logged at level INFO to the logger "shipid". In a script, call it under `if __name__ == "__main__":`,
-    because workers are processes.
+    Progress is logged at level INFO to the logger "shipid". Call it under `if __name__ == "__main__":`: workers are
+    processes.
 
     Parameters
     ----------
     study : name of a bundled study, or path of a study document.
-    set : dotted path -> value: changes of the document, such as `{"grid.N_D": [10, 30]}`.
-    out : folder of the run; default: `results/<study>-<digest>` in the working folder.
+    set : dotted path -> value, such as `{"grid.N_D": [10, 30]}`.
+    out : folder of the run; default: `results/<study>-<digest>`.
     workers : local processes of one thread each; default: one per core.
-    scheduler : address of a Dask scheduler to use instead of local processes.
-    device : PyTorch device of rollouts and training: "cpu" or "cuda".
+    scheduler : address of a Dask scheduler to use instead.
+    device : PyTorch device: "cpu" or "cuda".
 
     Raises ShipidError for whatever a user can mend.
     """
@@ -63,10 +63,9 @@ def events(
     scheduler: str | None = None,
     device: str = "cpu",
 ) -> Iterator[Event]:
-    """Run a study and yield what happens, as it happens: notes, the start, every finished cell, the end.
+    """Run a study and yield what happens: notes, the start, every finished cell, the end, whose text is the folder.
 
-    The arguments are those of `run`. The report is not written; `write_pages(folder)` writes it, and the text of the
-    last event is that folder.
+    Arguments as of `run`. The report is not written: `write_pages(folder)` does.
     """
     plan = read_plan(study, set)
     folder = default_folder(plan) if out is None else as_path("out", out)

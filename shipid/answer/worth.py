@@ -59,9 +59,8 @@ def _with_other_trainings(drawn: Array, noise: Array) -> Array:
 def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate | None:
     """Accuracy A [m] at which compensated physics is as good as none, at the amount of this place.
 
-    A line ln H over ln A is fitted to the models by least squares, and crosses H of `none`; values beyond the models
-    that were tried are bounds. The interval holds at least every A at which Student's test over manoeuvres cannot tell
-    the line from `none`: resampled values alone end too early where a few manoeuvres have most of the error. None with
+    A line ln H over ln A, by least squares, crosses H of `none`; values beyond the models tried are bounds. The
+    interval holds at least every A at which Student's test over manoeuvres cannot tell the line from `none`. None with
     fewer than four models, or where all have the same A.
     """
     if len(models) < FEWEST_FOR_LINE:
@@ -129,8 +128,8 @@ def _crossing_of_line(values: Array, limits: tuple[float, float]) -> Array:
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
     """Runs that no physics needs for the error that a model has with the amount of this place.
 
-    Interpolated between amounts along ln H over ln N_D; where more data made it worse, the best so far counts. The
-    interval holds at least every amount of data at which the test cannot tell the two.
+    Interpolated along ln H over ln N_D; where more data made it worse, the best so far counts. The interval holds every
+    amount at which the test cannot tell the two.
     """
     rivals = np.stack([table.by_run(NO_MODEL, k) for k in range(len(table.amounts))])
     values = np.vstack([rivals, table.by_run(model, place)[None]])

@@ -25,7 +25,6 @@ from shipid.report.figure import (
     names_in,
 )
 from shipid.report.page import Section, write_page
-from shipid.report.selection import FEW_RUNS, spread_items
 from shipid.report.wording import metres_text
 
 LOGGED_TRACK, PATH, PHYSICS, BAND, ALARM = "logged track", "predicted path", "physics alone", "band", "alarm"
@@ -45,7 +44,7 @@ MOMENTS = 6  # instants of a run whose paths are drawn
 class AboardContent(PageContent):
     """Everything the page shows.
 
-    lines : the summary, in the order of the terminal. track : run, t [s], north, east [m], as measured.
+    lines : the summary. track : run, t [s], north, east [m].
     instants : run, t [s], outside (the alarm), error at the end of the horizon [m], latency [s].
     points : run, t, ahead [s], north, east, physics_north, physics_east [m]; with a band also band_along, band_across
     [m] and band_course [rad, clockwise from north].
@@ -70,12 +69,9 @@ def sentence_of(line: SummaryLine) -> str:
 
 
 def _control_of_runs(content: AboardContent) -> Control:
-    """Runs to choose from, if there are many some at even distances; first the one with the largest error."""
-    every = names_in(content.instants)
-    worst = str(content.instants["run"].iloc[int(content.instants["error"].fillna(-1.0).argmax())])
-    shown = {*spread_items(every, FEW_RUNS), worst}
-    runs = [run for run in every if run in shown]
-    return Control("Run", runs, runs.index(worst))
+    """Runs to choose from; first the one with the largest error."""
+    worst, runs = int(content.instants["error"].fillna(-1.0).argmax()), names_in(content.instants)
+    return Control("Run", runs, runs.index(str(content.instants["run"].iloc[worst])))
 
 
 def band_outline(points: pd.DataFrame, corners: int = 16) -> tuple[Floats, Floats]:

@@ -155,19 +155,15 @@ def coverage_table(content: ReportContent) -> PageTable:
         for reason, part in (refused.groupby("reason", sort=False) if len(refused) else ())
     ]
     promised = [TableCell(level_text(level), level) for level in frame.level]
+    held = [TableCell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")]
     takeaway = f"Without a band: {'; '.join(reasons)}." if reasons else ""
     return frame_table(
         "coverage-table",
         "Bands by model",
         takeaway,
-        with_cells(_coverage_cells(frame), promised=promised),
+        with_cells(frame, promised=promised, held=held),
         BAND_COLUMNS,
     )
-
-
-def _coverage_cells(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with `held`: its coverage with the interval, as cells."""
-    return with_cells(frame, held=[TableCell(_share_words(row), row["coverage"]) for row in frame.to_dict("records")])
 
 
 HOW_FAR_OFF = Section(

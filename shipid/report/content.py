@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -41,34 +41,20 @@ class SummaryLine:
 
 @dataclass(frozen=True)
 class AnswerSentence:
-    """One sentence of the answer as plain text, and the id of the figure or table that carries it; empty for no link.
-
-    Drawing the page raises ValueError for an id that no section declares, other than "findings" and "provenance".
-    """
+    """One sentence of the answer as plain text, and the id of the figure or table that carries it, if any."""
 
     text: str
     figure: str = ""
-
-
-@dataclass(frozen=True)
-class ReportFinding:
-    """A claim of the paper, the verdict of the results, and the numbers behind it."""
-
-    id: str
-    claim: str
-    verdict: Literal["confirmed", "refuted", "undecided", "not testable"]
-    evidence: str
 
 
 @dataclass(frozen=True, eq=False)
 class WindowSnapshot:
     """One window of a test run with its predictions, in the frame (11) frozen at the instant of prediction.
 
-    run, t : test run and instant of prediction [s]. outline : (k, 2) of the ship, x ahead, y to starboard [m].
-    psi_end : true heading at the end of the horizon, relative to that at its start [rad].
-    truth : (T + 1, 2) true x, y [m]. paths : (model, source, N_D) -> (T + 1, 2) predicted x, y [m]; N_D = 0 of physics.
+    run, t [s] : of the instant. outline : (k, 2) of the ship [m]. psi_end : change of the true heading [rad].
+    truth : (T + 1, 2) true x, y [m]. paths : (model, source, N_D) -> (T + 1, 2) [m]; N_D = 0 of physics.
     wind : speed [m/s] and direction it blows towards [rad], clockwise from ahead; None where not measured.
-    bands : (model, source, N_D) -> (n, 2) closed outline of the band around that path [m].
+    bands : key of the path -> (n, 2) closed outline of the band around it [m].
     """
 
     run: str
@@ -85,8 +71,8 @@ class WindowSnapshot:
 class PageContent:
     """What a page shows besides its sections; every page adds frames and `answer`, the sentences below the title.
 
-    title, name : in words, and the short name beside the kicker. provenance : label -> value.
-    command : what reproduces the page. study_document : as text. findings : claims with verdicts. Empty for none.
+    name : beside the kicker. provenance : label -> value. command : what reproduces the page.
+    findings : id, claim, verdict, evidence of each.
     """
 
     title: str
@@ -94,7 +80,7 @@ class PageContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
     study_document: str = ""
-    findings: Sequence[ReportFinding] = ()
+    findings: Sequence[Mapping[str, Any]] = ()
 
 
 def rows_as_tuples(frame: pd.DataFrame) -> list[Any]:
@@ -111,24 +97,22 @@ def empty_frame(*columns: str) -> Callable[[], pd.DataFrame]:
 class ReportContent(PageContent):
     """Everything one report shows; a frame without rows leaves its figure out.
 
-    `source` is "physics", "cooperative" or "naive". Rows of physics and naive have N_D = 0; the model without physics
-    is the one of family "none", its source "cooperative". It is called `no physics`, whatever the frames call it.
+    `source` is "physics", "cooperative" or "naive"; N_D is 0 for physics and naive. The model without physics, of
+    family "none", has the source "cooperative" and is called `no physics`.
 
-    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, and in metres A, A_90, H, H_90, rms
-    (NaN where failed); then member, runs, minutes, seconds, hyperparameters (text).
+    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, A, A_90, H, H_90, rms [m] (NaN
+    where failed); then member, runs, minutes, seconds, hyperparameters (text).
     naive : mean, p90, rms [m] of constant u, v, r.
-    models : model, family, A, A_90, A_rms [m], status, description; where known, A_along and A_across [m], the mean
-    absolute error of the physics along x and y of the frame (11).
-    factors : of perturbed numbers: model, path, group ("hull", ...), factor [1]; 0 where a term was removed.
-    trials : cell, model, N_D, seed, number, state ("complete", "diverged", "stopped"), value [m^2] (NaN where
-    diverged), epochs, seconds, chosen (its network is in the compensator), and a float column per searched
-    hyperparameter.
+    models : model, family, A, A_90, A_rms [m], status, description; where known A_along and A_across [m].
+    factors : model, path, group ("hull", ...), factor [1]; 0 where a term was removed.
+    trials : `TRIAL_COLUMNS` and a float column per searched hyperparameter; state is "complete", "diverged" or
+    "stopped", value [m^2] NaN where diverged; chosen: its network is in the compensator.
     horizon : model, N_D, seed, source, ahead [s], mean, p90 [m]; where known along, across [m].
     over_time : run, t [s], model, N_D, seed, source, error [m] (mean over the horizon from t).
-    commands : run, t [s], one column per command in the units used on board, in brackets: "port shaft [rpm]".
+    commands : run, t [s], one column per command, named with its unit: "port shaft [rpm]".
     tracks : run, set, north, east [m]. envelope : set (or "published"), quantity, unit, min, mean, max.
-    repairs : kind, column, count, note. best : the physics model that validation prefers at the largest amount of data.
-    frames : further frames by name. alone : models whose method learns nothing from data: their path is the physics'.
+    repairs : kind, column, count, note. best : the model that validation prefers at the largest amount of data.
+    frames : further frames by name. alone : models whose method learns nothing from data.
     """
 
     answer: Sequence[AnswerSentence] = ()
@@ -153,7 +137,6 @@ class ReportContent(PageContent):
         for name in ("cells", "models", "factors", "trials", "horizon", "over_time"):
             object.__setattr__(self, name, name_models(getattr(self, name)))
         object.__setattr__(self, "frames", {name: name_models(frame) for name, frame in self.frames.items()})
-        object.__setattr__(self, "snapshots", [name_window_models(snapshot) for snapshot in self.snapshots])
         object.__setattr__(self, "alone", {model_text(model) for model in self.alone})
 
     def frame(self, name: str) -> pd.DataFrame:
@@ -165,12 +148,3 @@ def name_models(frame: pd.DataFrame) -> pd.DataFrame:
     """A frame whose models have their names for people."""
     columns = [column for column in MODEL_NAME_COLUMNS if column in frame]
     return frame.assign(**{column: frame[column].map(model_text, na_action="ignore") for column in columns})
-
-
-def name_window_models(snapshot: WindowSnapshot) -> WindowSnapshot:
-    """A window whose models have their names for people."""
-    paths, bands = (
-        {(model_text(model), source, size): line for (model, source, size), line in lines.items()}
-        for lines in (snapshot.paths, snapshot.bands)
-    )
-    return replace(snapshot, paths=paths, bands=bands)

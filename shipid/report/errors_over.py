@@ -24,7 +24,6 @@ from shipid.report.figure import (
 )
 from shipid.report.page import Section
 from shipid.report.selection import (
-    FEW_RUNS,
     SOURCE_DASHES,
     close_styles,
     close_up_models,
@@ -35,7 +34,6 @@ from shipid.report.selection import (
     model_chips,
     nothing_learns,
     over_seeds,
-    spread_items,
 )
 from shipid.report.tables import PageTable, frame_table
 from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text
@@ -96,11 +94,11 @@ def _draw_horizon(content: ReportContent, means: pd.DataFrame, statistic: str, s
 def time_figure(content: ReportContent) -> PageFigure | None:
     """Error per instant of prediction of a test run, the commands below on the same axis; None without times."""
     frame = _rows_of_close_up(content.over_time, content)
-    runs, size = spread_items(sorted(frame.run[frame.t.notna()].unique()), FEW_RUNS), figure_sizes(frame.N_D)[-1]
+    runs, size = sorted(frame.run[frame.t.notna()].unique()), figure_sizes(frame.N_D)[-1]
     if not runs:
         return None
     means = over_seeds(frame[frame.run.isin(runs) & frame.N_D.isin([0, size])], [*LINE_COLUMNS, "run", "t"], ["error"])
-    left, seeds = content.over_time.run.nunique() - len(runs), content.cells["seed"].nunique()
+    seeds = content.cells["seed"].nunique()
     worst, units = _worst_instant(content, means), _commands_by_unit(content.commands)
     chips = [
         Chip(f"command:{column}", column.partition("[")[0].strip(), INK, LINE_DASHES[i % 4], 1.5)
@@ -115,8 +113,7 @@ def time_figure(content: ReportContent) -> PageFigure | None:
         + (f", with N_D = {size}" if size else "")
         + ". The commands that were given are below."
         + (f" Of {seeds} seeds the first is drawn." if seeds > 1 else "")
-        + _models_of_close_up(content)
-        + (f" {counted_text(left, 'test run')} more are not drawn." if left else ""),
+        + _models_of_close_up(content),
         alternative="Lines of the position error over the time of one test run, above lines of its commands.",
         height=ERROR_HEIGHT + COMMAND_HEIGHT * len(units),
         draw=lambda run: [_draw_time(content, means[means.run == run], content.commands[content.commands.run == run])],
@@ -150,7 +147,7 @@ def _models_of_close_up(content: ReportContent) -> str:
     """A sentence on which models are drawn; empty if all are."""
     total, shown = content.models.model.nunique(), close_up_models(content)
     names = join_few_names(shown, 6)
-    words = f" Of {total} models, the middle one of each family by A, and the best in validation: {names}."
+    words = f" Of {total} models, some spread over A and the best in validation: {names}."
     return words if len(shown) < total else ""
 
 

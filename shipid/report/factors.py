@@ -17,16 +17,16 @@ from shipid.report.figure import (
     category_colour,
     escape_name,
     log_axis,
-    make_axis,
     make_line,
     make_plot,
+    names_axis,
 )
 from shipid.report.page import Section
 from shipid.report.selection import models_by_accuracy
 from shipid.report.tables import PageTable, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, join_few_names, metres_text, number_text, shorten_name
+from shipid.report.wording import counted_text, join_few_names, number_text, shorten_name
 
-STRIP_HEIGHT = 42  # height of a model [px]
+STRIP_HEIGHT = 30  # height of a model [px]
 MODEL_COLUMNS = {
     "model": "model",
     "family": "family",
@@ -54,12 +54,12 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
         title="How the models were degraded",
         takeaway=_takeaway_factors(frame, names),
         how="One dot per perturbed number, at its factor on the base model, logarithmic; rows by "
-        "rising A, with the mean absolute error along and across the heading at the instant of prediction where known."
+        "rising A."
         + (" A factor that is not positive lies at the left edge: 0 removes the term." if crosses else "")
         + (f" Not perturbed: {join_few_names(untouched, 6)}." if untouched else ""),
         alternative=f"Dots at the factors of {counted_text(len(names), 'model')}; the table of models has A.",
         height=STRIP_HEIGHT * len(names) + 70,
-        draw=lambda: [_draw_strips(content, frame, names)],
+        draw=lambda: [_draw_strips(frame, names)],
         chips=[
             Chip(
                 f"group:{name}",
@@ -73,7 +73,7 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
     )
 
 
-def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) -> Panel:
+def _draw_strips(frame: pd.DataFrame, names: list[str]) -> Panel:
     positive = frame.factor[frame.factor > 0].to_numpy(dtype=float)
     low, high = positive.min(initial=0.8), positive.max(initial=1.25)  # at least a quarter down and up
     edge = low * (low / high) ** 0.08
@@ -88,27 +88,11 @@ def _draw_strips(content: ReportContent, frame: pd.DataFrame, names: list[str]) 
         traces.append(make_line(str(group), x, y, [f"group:{group}"], mode="markers", marker=marker, hover=words))
     removed = bool((frame.factor <= 0).any())
     room, ends = 0.03 * math.log10(high / low), np.log10([edge if removed else low, high])
-    x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room])
-    y_axis = make_axis("", range=[len(names) - 0.5, -0.85], showticklabels=False, tickvals=list(range(len(names))))
-    place = {"x": 0, "xref": "paper", "xanchor": "left", "yshift": 17, "showarrow": False, "bgcolor": "var(--page)"}
-    texts = [{**place, "y": row, "text": _words_of_row(content, name)} for row, name in enumerate(names)]
+    x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room], nticks=4, tickangle=0)
+    y_axis = names_axis([shorten_name(name) for name in names], range=[len(names) - 0.4, -0.4])
     rule = {"type": "line", "layer": "below", "yref": "paper", "x0": 1, "x1": 1, "y0": 0, "y1": 1}
     rule |= {"line": {"color": INK, "width": 1}}
-    margin = {"l": 12, "r": 12, "t": 4, "b": 44}
-    return make_plot(traces, x_axis, y_axis, annotations=texts, shapes=[rule], margin=margin)
-
-
-def _words_of_row(content: ReportContent, name: str) -> str:
-    """Name of a model and its accuracy."""
-    words = f"<b>{escape_name(shorten_name(name))}</b>"
-    mine = content.models[content.models.model == name]
-    if mine.empty:
-        return words
-    record = mine.iloc[0]
-    accuracy = f"A {metres_text(float(record.A))}" if math.isfinite(float(record.A)) else escape_name(record.status)
-    along, across = (float(record.get(column, math.nan)) for column in ("A_along", "A_across"))
-    split = f": {number_text(along)} along, {number_text(across)} across" if math.isfinite(along + across) else ""
-    return f"{words}  {accuracy}{split}"
+    return make_plot(traces, x_axis, y_axis, shapes=[rule])
 
 
 def _takeaway_factors(frame: pd.DataFrame, names: list[str]) -> str:

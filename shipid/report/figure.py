@@ -254,21 +254,7 @@ def draw_alone(figure: PageFigure, chosen: Sequence[object] = (), *, dark: bool 
     chosen : an option of each control, in order; None for the one that the page shows first; ShipidError for another.
     """
     given = [*chosen, *[None] * (len(figure.controls) - len(chosen))]
-    options = [_find_option(control, value) for control, value in zip(figure.controls, given, strict=True)]
-    return dress_panels(figure, figure.draw(*options), dark=dark)
-
-
-def _find_option(control: Control, value: object) -> Any:
-    """An option by its text, or by its number where the text is one."""
-    texts = [str(option) for option in control.options]
-    if value is not None and str(value) not in texts:
-        words = f"{control.label}: {str(value)!r} is none of its options; {suggest_name(str(value), texts)}"
-        raise ShipidError(words, path="figures")
-    return control.options[control.start if value is None else texts.index(str(value))]
-
-
-def dress_panels(figure: PageFigure, panels: Sequence[Panel], *, dark: bool = False) -> go.Figure:
-    """Put panels below each other, with title, legend and scale, in the colours of the light or the dark page."""
+    panels = figure.draw(*(_find_option(*pair) for pair in zip(figure.controls, given, strict=True)))
     whole = make_subplots(rows=len(panels), subplot_titles=[*map(escape_name, figure.captions)] or None)
     whole = go.Figure(panels[0]) if len(panels) == 1 else whole
     for row, panel in enumerate(panels if len(panels) > 1 else (), start=1):
@@ -293,6 +279,15 @@ def dress_panels(figure: PageFigure, panels: Sequence[Panel], *, dark: bool = Fa
     parts = {"data": [trace.to_plotly_json() for trace in whole.data], "layout": whole.layout.to_plotly_json()}
     plain = json.dumps(parts, cls=PlotlyJSONEncoder)
     return go.Figure(json.loads(re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], plain)))
+
+
+def _find_option(control: Control, value: object) -> Any:
+    """An option by its text, or by its number where the text is one."""
+    texts = [str(option) for option in control.options]
+    if value is not None and str(value) not in texts:
+        words = f"{control.label}: {str(value)!r} is none of its options; {suggest_name(str(value), texts)}"
+        raise ShipidError(words, path="figures")
+    return control.options[control.start if value is None else texts.index(str(value))]
 
 
 def _legend_entry(chip: Chip) -> Trace:

@@ -92,19 +92,16 @@ PROGRAMME_COLUMNS = {
 class IdentificationContent(PageContent):
     """Everything the page shows.
 
-    estimates : `name`, `path`, `with`, `unit`, `base`, `value`, `error`, `factor`, `factor_low`, `factor_high`,
-    `identified`, `reason`; infinite where nothing is known. correlations : (n, n) of them.
-    errors : `set` (`fit`, `test`), `run` (`all` at first), `model` (`before`, `after`), root mean squares `u`, `v`
-    [m/s], `r` [rad/s], `position` [m].
-    series : `run`, `piece`, `t` [s], `model` (`measured`, `before`, `after`), `north`, `east` [m], `psi` [rad],
-    `u`, `v` [m/s], `r` [rad/s], of runs held out; of fitted ones where `held_out` is empty.
-    ahead : length of a free run [s], 0 for whole runs. manoeuvres : `manoeuvre`, `measure`, `unit`, `before`, `after`,
-    `note`.
-    colours : `signal`, `lag` [s], `correlation` of the residuals.
-    profiles : `path`, `factor`, `rise`, `limit`, `sentence`, a row for each point. groups : errors by side, helm and
-    speed.
-    beyond : sentences on manoeuvres that go farther than the data.
-    programme : `manoeuvre`, `hours`, `gain` [bit], `per_hour`, `narrows`, `before`, `after`.
+    estimates : name, path, with, unit, base, value, error, factor, factor_low, factor_high (infinite where nothing is
+    known), identified, reason. correlations : (n, n) of them.
+    errors : set (`fit`, `test`), run (`all` at first), model (`before`, `after`), root mean squares u, v [m/s], r
+    [rad/s], position [m].
+    series : run, piece, t [s], model (`measured`, `before`, `after`), north, east [m], psi [rad], u, v [m/s], r
+    [rad/s].
+    ahead : length of a free run [s], 0 for whole runs. manoeuvres : manoeuvre, measure, unit, before, after, note.
+    colours : signal, lag [s], correlation of the residuals. profiles : path, factor, rise, limit, sentence.
+    groups : errors by side, helm and speed. beyond : manoeuvres that go farther than the data.
+    programme : manoeuvre, hours, gain [bit], per_hour, narrows, before, after.
     """
 
     estimates: pd.DataFrame

@@ -33,7 +33,6 @@ from shipid.report.wording import distance_text, number_text
 
 OUTLINES = 12  # ships drawn along the track
 EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
-MOST_HEADING_WITH_HELM = 120.0  # deg: a heading that stays within this is drawn with the helm
 MEASURE_COLUMNS = {
     "measure": "measure",
     "value": "value",
@@ -63,11 +62,9 @@ MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
 class ManoeuvreContent(PageContent):
     """Everything the page shows.
 
-    first : names of the measures that the answer says.
-    log : `t` [s], `north`, `east` [m], `psi`, `helm` [rad], `u`, `v` [m/s], `r` [rad/s], `shaft` [rev/s].
-    measures, criteria : rows from `shipid.measures.rows`.
-    levels : `helm` [rad], `rate` [rad/s] of a spiral in the order performed.
-    outline : (k, 2) of the ship from above, body axes x ahead, y to starboard [m].
+    first : names of the measures that the answer says. measures, criteria : rows from `shipid.measures.rows`.
+    log : t [s], north, east [m], psi, helm [rad], u, v [m/s], r [rad/s], shaft [rev/s].
+    levels : helm [rad], rate [rad/s] of a spiral in the order performed. outline : (k, 2) of the ship [m].
     """
 
     first: Sequence[str]
@@ -149,10 +146,7 @@ def histories_figure(content: ManoeuvreContent) -> PageFigure:
     executed, degrees = _value_of_measure(content, EXECUTE_HEADING), DEGREES * log[["psi", "helm", "r"]]
     values = degrees.assign(heading=degrees["psi"] - degrees["psi"].iloc[0], shaft=60 * log["shaft"])
     values = values.assign(u=log["u"], v=log["v"]).round(6)  # an axis is no picture of the rounding of a constant
-    panels = {"heading, helm [deg]": ["heading", "helm"]}
-    if np.ptp(values["heading"]) >= MOST_HEADING_WITH_HELM:
-        panels = {"heading [deg]": ["heading"], "helm [deg]": ["helm"]}
-    panels |= {"speed [m/s]": ["u", "v"], "yaw rate [deg/s]": ["r"]}
+    panels = {"heading, helm [deg]": ["heading", "helm"], "speed [m/s]": ["u", "v"], "yaw rate [deg/s]": ["r"]}
     panels |= {"shaft [rpm]": ["shaft"]} if np.ptp(values["shaft"]) > 0 else {}
     return PageFigure(
         id="histories",

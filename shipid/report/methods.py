@@ -94,11 +94,6 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
         if math.isfinite(row.low):
             its = f"{row.method} is next, its" if leads else plural_word(len(tied), "its", "their")
             text += f" ({its} difference to {row.reference} is {difference_text(row.difference, row.low, row.high)})"
-    partial = set(mine.method[mine.missing.gt(0)])
-    if ahead := [name for name in best.ahead.split(", ") if name in partial]:
-        text += (
-            f", but over the cells that both have {join_few_names(ahead)} {plural_word(len(ahead), 'errs', 'err')} less"
-        )
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in rows_as_tuples(mine[mine.failed.gt(0)])]
     text += f", without a result: {join_few_names(failed)}" if failed else ""
     partly = [str(row.method) for row in rows_as_tuples(mine[mine.missing.gt(mine.failed)])]

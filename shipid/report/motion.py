@@ -53,8 +53,7 @@ def motion_figure(
 ) -> PageFigure:
     """Panels of a run that a reader picks: u, v, r over time, and the map, north up with equal axes.
 
-    series : `run`, `model`, `piece`, `t` [s], `north`, `east` [m], `u`, `v` [m/s], `r` [rad/s].
-    inks : model -> colour and dash of its line. framed : models that the map shows whole. texts : of the figure.
+    series : run, model, piece, t [s], north, east [m], u, v [m/s], r [rad/s]. framed : models that the map shows whole.
     """
     runs = names_in(series)
     return PageFigure(
@@ -99,9 +98,8 @@ def _with_gaps(mine: pd.DataFrame) -> pd.DataFrame:
 class ReplayContent(PageContent):
     """Everything the page shows.
 
-    series : `run`, `piece`, `t` [s], `model` (`measured`, `replayed`), `north`, `east` [m], `u`, `v` [m/s], `r`
-    [rad/s].
-    errors : `run` (`all` at first), root mean squares `u`, `v` [m/s], `r` [rad/s], `position` [m].
+    series : run, piece, t [s], model (`measured`, `replayed`), north, east [m], u, v [m/s], r [rad/s].
+    errors : run (`all` at first), root mean squares u, v [m/s], r [rad/s], position [m].
     ahead : length of each simulation [s]; 0 for whole runs.
     """
 

@@ -18,7 +18,6 @@ from jinja2 import Environment, StrictUndefined, Template
 from markupsafe import Markup
 from plotly.io.json import to_json_plotly
 
-from shipid.errors import ResultError
 from shipid.files import write_text
 from shipid.report.figure import PageFigure, Panel, page_colours
 from shipid.report.glossary import mark_short_names
@@ -56,19 +55,10 @@ class DrawnSection:
     items: Sequence[Item]
 
 
-def declared_anchors(sections: Mapping[str, Section]) -> set[str]:
-    """Ids that a sentence of a page with these sections may link to."""
-    return {name for section in sections.values() for name in section.items} | set(OF_EVERY_PAGE)
-
-
-def draw_sections(
-    sections: Mapping[str, Section], content: object, say: Callable[[str], object] | None = None
-) -> list[DrawnSection]:
-    """Draw the sections that have something to show, in order; `say` is called with the heading of each before."""
+def draw_sections(sections: Mapping[str, Section], content: object) -> list[DrawnSection]:
+    """Draw the sections that have something to show, in order."""
     result = []
     for name, section in sections.items():
-        if say and any(not need or _has_part(content, need) for _, need in section.items.values()):
-            say(f"drawing: {section.title}")
         items = [item for one in section.items if (item := section.draw_item(one, content)) is not None]
         result += [DrawnSection(name, section.title, items)] if items else []
     return result
@@ -81,26 +71,16 @@ def _has_part(content: object, name: str) -> bool:
 
 
 def render_page(
-    kind: str,
-    sections: Mapping[str, Section],
-    content: Any,
-    windows: Mapping[str, Any] | None = None,
-    say: Callable[[str], object] | None = None,
+    kind: str, sections: Mapping[str, Section], content: Any, windows: Mapping[str, Any] | None = None
 ) -> str:
     """Write the sections that have something to show as one page of HTML.
 
     kind : above the title. content : `PageContent` with an `answer`.
     windows : what page.js lets a reader browse, as `window_data` returns it.
-    say : called with the heading of each section that is about to be drawn.
-
-    Raises ValueError for a sentence that links to a figure which no section declares.
     """
-    parts = draw_sections(sections, content, say)
+    parts = draw_sections(sections, content)
     items = [item for part in parts for item in part.items]
     figures = [item for item in items if isinstance(item, PageFigure)]
-    known = {item.id for item in items} | declared_anchors(sections)
-    if unknown := {sentence.figure for sentence in content.answer} - known - {""}:
-        raise ValueError(f"no figure is called {min(unknown)!r}; valid: {', '.join(sorted(known))}")
     return _template().render(
         content=content,
         kicker=kind,
@@ -123,16 +103,8 @@ def render_page(
 
 
 def write_page(kind: str, sections: Mapping[str, Section], content: Any, file: Path) -> Path:
-    """Write a page as one HTML file that makes no request; returns the file. Raises ResultError if it cannot."""
-    return write_whole(render_page(kind, sections, content), file)
-
-
-def write_whole(text: str, file: Path) -> Path:
-    """Write text whole or not at all, making the folder if need be; ResultError if the place cannot be written."""
-    try:
-        write_text(file, text)
-    except OSError as error:
-        raise ResultError(f"cannot be written ({error.strerror})", file=file) from None
+    """Write a page as one HTML file that makes no request; returns the file. Raises OSError if it cannot."""
+    write_text(file, render_page(kind, sections, content))
     return file
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.errors import ShipidError, suggest_name
 from shipid.report.content import Floats, PathKey, ReportContent, WindowSnapshot
 from shipid.report.errors_over import close_up_chips, line_look
 from shipid.report.figure import (
@@ -29,41 +29,22 @@ from shipid.report.figure import (
     make_line,
 )
 from shipid.report.page import Section
-from shipid.report.selection import (
-    FEW_RUNS,
-    close_up_models,
-    data_driven,
-    drawn_source,
-    figure_sizes,
-    in_words,
-    spread_items,
-)
-from shipid.report.wording import counted_text, metres_text
+from shipid.report.selection import close_up_models, figure_sizes
+from shipid.report.wording import counted_text
 
-MOST_INSTANTS = 120  # per test run: one step of the slider is then a few pixels
-MOST_PATHS = 2400  # in all: with their bands about 0.7 MB of the page
 MOST_POINTS = 40  # of a path or of the outline of a band
 PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
 HOW_WINDOWS = (
     "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
-    "where the ship truly was at the end. The pale broad line is the true path. "
+    "where the ship truly was at the end. The pale broad line is the true path. Arrow keys move the slider."
 )
 
 
 def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
-    """Sort windows by test run and time, at most as many of each as the limits above."""
-    by_run: dict[str, list[WindowSnapshot]] = {}
-    for snapshot in content.snapshots:
-        by_run.setdefault(snapshot.run, []).append(snapshot)
-    shown = set(close_up_models(content))
-    paths = max((sum(key[0] in shown for key in window.paths) for window in content.snapshots), default=0)
-    runs = max(1, min(FEW_RUNS, len(by_run)))
-    result, most = {}, min(MOST_INSTANTS, max(1, MOST_PATHS // (runs * max(1, paths))))
-    for run in spread_items(sorted(by_run), FEW_RUNS):
-        ordered = sorted(by_run[run], key=lambda window: window.t)
-        result[run] = [ordered[i] for i in even_places(len(ordered), most)]
-    return result
+    """Sort windows by test run and time."""
+    ordered = sorted(content.snapshots, key=lambda window: (window.run, window.t))
+    return {run: list(mine) for run, mine in groupby(ordered, key=lambda window: window.run)}
 
 
 def window_sizes(content: ReportContent) -> list[int]:
@@ -79,9 +60,8 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
     return PageFigure(
         id="browser",
         title="Look at predictions",
-        takeaway=_takeaway_windows(content, counts[-1]),
-        how=f"{HOW_WINDOWS}{counted_text(sum(map(len, runs.values())), 'window')} of "
-        f"{counted_text(len(runs), 'test run')}; arrow keys move the slider.",
+        takeaway=f"{counted_text(sum(map(len, runs.values())), 'window')} of {counted_text(len(runs), 'test run')}.",
+        how=HOW_WINDOWS,
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
@@ -107,7 +87,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     def path_of(window: WindowSnapshot, key: PathKey) -> list[Any]:
         model, source, size = key
         which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
-        error = round(_end_error(window, window.paths[key]), 6)
+        error = round(float(np.linalg.norm(window.paths[key][-1] - window.truth[-1])), 6)
         band = _rounded_columns(window.bands[key], places) if key in window.bands else []
         at, path = counts.index(size) if source == "cooperative" else -1, _rounded_columns(window.paths[key], places)
         return [which, at, *path, error if math.isfinite(error) else None, *band]
@@ -177,26 +157,6 @@ def outline_at(outline: Floats, pose: Floats) -> Floats:
     return closed
 
 
-def find_window(
-    content: ReportContent, run: str | None, t: float | None, N_D: int | None
-) -> tuple[WindowSnapshot, int]:
-    """A window of a test run (default: the first), and the N_D to draw it with (default: the most).
-
-    t : instant of prediction [s], the nearest recorded one is taken; default: the middle of the run.
-    Raises ShipidError for a run or an N_D that no window holds.
-    """
-    runs, counts = windows_of(content), window_sizes(content)
-    if not runs:
-        raise ShipidError("there is nothing to draw: the results hold no windows", path="prediction")
-    if run is not None and run not in runs:
-        raise ShipidError(f"no window of run {run!r}; {suggest_name(run, runs)}", path="prediction")
-    if N_D is not None and N_D not in counts:
-        raise ShipidError(f"no window with N_D = {N_D}; valid: {', '.join(map(str, counts))}", path="prediction")
-    windows = runs[run or next(iter(runs))]
-    window = windows[len(windows) // 2] if t is None else min(windows, key=lambda shot: abs(shot.t - t))
-    return window, N_D or counts[-1]
-
-
 def _window_chips(content: ReportContent) -> list[Chip]:
     """Legend of the windows."""
     sources = {source for window in content.snapshots for _, source, _ in window.paths}
@@ -210,26 +170,6 @@ def _rounded_columns(path: Floats, places: int) -> list[list[float | None]]:
     with np.errstate(over="ignore"):
         columns = np.round(some.T, places).tolist()
     return [[value if math.isfinite(value) else None for value in column] for column in columns]
-
-
-def _end_error(window: WindowSnapshot, points: Floats) -> float:
-    return float(np.linalg.norm(np.asarray(points)[-1] - np.asarray(window.truth)[-1]))
-
-
-def _takeaway_windows(content: ReportContent, size: int) -> str:
-    """Mean end errors over all windows, per source."""
-    pure, drawn, windows = data_driven(content), close_up_models(content), content.snapshots
-    words = {"cooperative": "the compensated paths", "physics": "physics alone", "pure": in_words(pure or "")}
-    ends: dict[str, list[float]] = {source: [] for source in words}
-    for window, (model, source, N_D) in [(shot, key) for shot in windows for key in shot.paths]:
-        if model in drawn and N_D in ([size] if model == pure else [0, size]):
-            error = _end_error(window, window.paths[model, source, N_D])
-            ends["pure" if model == pure else drawn_source(content, model, source)].append(error)
-    means = {source: float(np.mean(some)) for source, some in ends.items() if some}
-    errors = [f"{words[source]} by {metres_text(mean)}" for source, mean in means.items() if math.isfinite(mean)]
-    where = f", N_D = {size}" if size else ""  # where no cell has a result there is physics alone
-    text = f"In the {counted_text(len(windows), 'window')} to look at{where}, the models drawn miss the true place at "
-    return f"{text}the end of the horizon on average: {'; '.join(errors)}."
 
 
 PREDICTIONS = Section("The predictions", {"browser": (browser_figure, "snapshots")})

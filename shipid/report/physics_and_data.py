@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter1d
 
 from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
 from shipid.report.figure import (
@@ -48,14 +48,13 @@ from shipid.report.selection import (
     spread_items,
     words_on_left_out,
 )
-from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text, shorten_name
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, shorten_name
 
 HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
 NAME_HEIGHT = 13  # of a row [px]
 INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
-NEIGHBOURS = (2.0, 1.0)  # models and N_D over which H is averaged before lines are drawn
-FEWEST_RADII = 6.0  # times these: rows or columns that are enough to average, else the bell reaches over all of them
+FEWEST_LINED = 12  # models with physics from which lines of equal H are drawn: fewer give a few crooked pieces
 ROUND_DIGITS = (1, 2, 5)  # of the ticks of A
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
     "mean": ("H", "mean"),
@@ -83,23 +82,23 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         return None
     rows, cells = shown
     hatched = f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
-    lined = " Lines of equal error follow H [m], averaged over neighbouring models where there are {:.0f} or more, and "
-    lined += "over neighbouring N_D where there are {:.0f} or more. No line is drawn beside a cell without a result."
+    lines = [_isolines(shown)] if rows.A.notna().sum() >= FEWEST_LINED else []
+    lined = " Lines of equal error follow H [m], averaged over neighbouring models; none passes a cell without result."
     return PageFigure(
         id="map",
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
         + (hatched if cells.worse.any() else "")
-        + lined.format(*(FEWEST_RADII * width for width in NEIGHBOURS))
+        + (lined if lines else "")
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
         alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
         "The numbers are in the table of cells.",
         height=HEIGHT,
-        draw=lambda: [draw_map(shown, [_isolines(shown)])],
-        chips=[Chip("iso", "lines of equal H", INK, width=1.5)],
+        draw=lambda: [draw_map(shown, lines)],
+        chips=[Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [],
         scale=ColourScale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
     )
 
@@ -147,18 +146,14 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
 
 def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
     """The lines of the hover box of one model and N_D, of which there are some cells."""
-    good = sorted((one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])), key=lambda one: one["H"])
+    good = [one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])]
     accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
     lines = [f"<b>{escape_name(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
     if not good:
-        first = cells[0]
-        return "<br>".join([*lines, escape_name(f"{first['status']}: {first['sentence']}".rstrip(": "))])
-    best, worst = good[0], good[-1]
-    spread = f"{number_text(best['H'])} to {metres_text(worst['H'])} over {counted_text(len(good), 'seed')}"
+        return "<br>".join([*lines, escape_name(f"{cells[0]['status']}: {cells[0]['sentence']}".rstrip(": "))])
+    lines.append(f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}")
     lost = f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result"
-    lines += [f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}"]
-    lines += [spread] * (len(cells) > 1) + [lost] * (len(good) < len(cells))
-    return "<br>".join(filter(None, [*lines, escape_name(best.get("hyperparameters", ""))]))
+    return "<br>".join([*lines, *[lost] * (len(good) < len(cells))])
 
 
 def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
@@ -232,7 +227,7 @@ def _isolines(shown: CellMap) -> Trace:
         "type": "contour",
         "x": sizes.tolist(),
         "y": physics.y.tolist(),
-        "z": smooth_cells(H.to_numpy(), NEIGHBOURS),
+        "z": smooth_rows(H.to_numpy()),
     }
     base |= {"ncontours": 5, "contours": lines, "line": {"color": INK, "width": 1.5, "smoothing": 0}, "meta": ["iso"]}
     return base | {
@@ -243,15 +238,11 @@ def _isolines(shown: CellMap) -> Trace:
     }  # Plotly draws bars over lines
 
 
-def smooth_cells(values: Floats, radius: tuple[float, float]) -> Floats:
-    """Positive values (m, n), each the geometric mean of its neighbours under a bell of `radius` rows and columns.
-
-    Values that are not finite stay so and have no weight. Rows or columns fewer than six radii are not smoothed along.
-    """
+def smooth_rows(values: Floats) -> Floats:
+    """Positive values (m, n), each the geometric mean of its column under a bell of two rows; others are left out."""
     finite = np.isfinite(values) & (values > 0)
-    widths = [width if count >= FEWEST_RADII * width else 0 for count, width in zip(values.shape, radius, strict=True)]
     logs = np.log(values, where=finite, out=np.zeros(values.shape))
-    total, weight = (gaussian_filter(part, widths, mode="constant") for part in (logs, finite.astype(float)))
+    total, weight = (gaussian_filter1d(part, 2.0, axis=0, mode="constant") for part in (logs, finite.astype(float)))
     return np.where(finite, np.exp(total / np.where(finite, weight, 1.0)), np.nan)
 
 

@@ -27,7 +27,7 @@ from shipid.report.figure import (
 from shipid.report.page import Section
 from shipid.report.selection import figure_sizes
 from shipid.report.tables import PageTable, frame_table
-from shipid.report.wording import counted_text, duration_text, fixed_text, number_text, scientific_text
+from shipid.report.wording import counted_text, duration_text, fixed_text, number_text
 
 MOST_DOTS = 1200  # of a kind in one panel: more hide each other
 MEDIAN_BINS = 9  # of the middle line
@@ -146,7 +146,7 @@ def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
 
 def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     """Axis of a hyperparameter: yes and no, logarithmic where its values are factors apart, or linear."""
-    if _yes_or_no(every):
+    if set(every.dropna()) == {0.0, 1.0}:
         return make_axis(escape_name(name.replace("_", " ")), tickvals=[0, 1], ticktext=["no", "yes"])
     ends = np.array([every.min(), every.max()], dtype=float)
     axis = log_axis if ends[0] > 0 and ends[1] / ends[0] > WIDE_RANGE else make_axis
@@ -154,10 +154,6 @@ def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:
     room = 0.04 * (high - low)
     title = f"{name.replace('_', ' ')} [{HYPERPARAMETER_UNITS.get(name, '1')}]"
     return axis(escape_name(title), range=[low - room, high + room], nticks=3)
-
-
-def _yes_or_no(values: pd.Series[float]) -> bool:
-    return set(values.dropna()) == {0.0, 1.0}
 
 
 def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
@@ -178,10 +174,11 @@ def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
 
 def search_table(content: ReportContent) -> PageTable:
     """Sum the trials up by N_D."""
-    frame, names = content.trials, searched_names(content)
+    frame = content.trials
     states = pd.crosstab(frame.N_D, frame.state).reindex(columns=["stopped", "diverged"], fill_value=0)
     groups = frame.groupby("N_D", sort=True)
-    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size(), epochs=groups.epochs.sum())
+    shown = states.assign(cells=groups.cell.nunique(), trials=groups.size())
+    shown = shown.assign(epochs=groups.epochs.sum()) if frame.epochs.any() else shown  # methods in closed form have 0
     columns = {
         "N_D [1]": "N_D",
         "cells [1]": "cells",
@@ -192,17 +189,11 @@ def search_table(content: ReportContent) -> PageTable:
         "time [s]": "seconds",
         "time per cell [s]": "each",
     }
-    tried = []
-    for name in names:
-        unit = f" {HYPERPARAMETER_UNITS[name]}" if name in HYPERPARAMETER_UNITS else ""
-        span = f"{scientific_text(frame[name].min(), 2)} to {scientific_text(frame[name].max(), 2)}{unit}"
-        tried.append(f"{name.replace('_', ' ')} {'yes or no' if _yes_or_no(frame[name]) else span}")
     stopped, diverged = (int(states[state].sum()) or "none" for state in ("stopped", "diverged"))
     takeaway = (
         f"{counted_text(len(frame), 'trial')} in {counted_text(frame.cell.nunique(), 'cell')}: {stopped} stopped "
     )
     takeaway += f"early, {diverged} diverged; {duration_text(float(frame.seconds.sum()))} of training."
-    takeaway += f" Tried: {', '.join(tried)}." if tried else ""
     shown = shown.assign(seconds=groups.seconds.sum(), each=groups.seconds.sum() / shown.cells).reset_index()
     return frame_table("search-table", "The search by N_D", takeaway, shown, columns)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
+from shipid.files import write_text
 from shipid.report import bands, cells, errors_over, factors, logs, methods, paths, physics_and_data, search
 from shipid.report.content import ReportContent
-from shipid.report.page import Section, render_page, write_whole
+from shipid.report.page import Section, render_page
 
 SECTIONS: dict[str, Section] = {
     "results": physics_and_data.WHAT_PHYSICS_AND_DATA_BUY,
@@ -22,7 +22,8 @@ SECTIONS: dict[str, Section] = {
 }
 
 
-def write_report(content: ReportContent, file: Path, say: Callable[[str], object] | None = None) -> Path:
-    """Write the page of a study as one HTML file that makes no request; returns the file, or raises ResultError."""
+def write_report(content: ReportContent, file: Path) -> Path:
+    """Write the page of a study as one HTML file that makes no request; returns the file. Raises OSError."""
     windows = paths.window_data(content) if content.snapshots else None
-    return write_whole(render_page("study", SECTIONS, content, windows, say), file)
+    write_text(file, render_page("study", SECTIONS, content, windows))
+    return file

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, ReportContent, rows_as_tuples
-from shipid.report.figure import INK, MARKERS, MUTED, OKABE_ITO, Chip, category_colour, colour_level, even_places
+from shipid.report.figure import INK, MARKERS, MUTED, Chip, category_colour, colour_level, even_places
 
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
@@ -71,18 +71,6 @@ def in_words(model: str) -> str:
     return f'"{model}"' if model.partition(" + ")[0] == NO_PHYSICS else model
 
 
-def middle_models(content: ReportContent) -> dict[str, str]:
-    """Per family, the model of middle A; families of many members first, then by rising A."""
-    frame = models_by_accuracy(content)
-    judged = frame.model.isin(content.models.model)
-    kept = frame[frame.A.notna() & judged | (frame.family == DATA_DRIVEN)]
-    groups = sorted(kept.groupby("family", sort=False), key=lambda group: -len(group[1]))
-    # Of the rivals without physics the first is meant wherever one is named.
-    return {
-        str(family): str(group.model.iloc[0 if family == DATA_DRIVEN else len(group) // 2]) for family, group in groups
-    }
-
-
 def overview_models(content: ReportContent) -> pd.DataFrame:
     """Rows of `models_by_accuracy` that overviews draw: of many methods the one judged, and all without physics."""
     frame = models_by_accuracy(content)
@@ -101,10 +89,11 @@ def words_on_left_out(content: ReportContent) -> str:
 
 @lru_cache(maxsize=4)
 def close_up_models(content: ReportContent) -> list[str]:
-    """Models drawn in close-ups: all of a few, else per family the one of middle A, and the best in validation."""
-    names = [str(name) for name in models_by_accuracy(content).model]
-    middle = {*middle_models(content).values(), content.best}
-    return names if len(names) <= FEW_MODELS else [name for name in names if name in middle]
+    """Models drawn in close-ups: all of a few, else some spread over A, no physics and the best in validation."""
+    frame = models_by_accuracy(content)
+    judged = frame.model[frame.A.notna() & frame.model.isin(content.models.model)]
+    kept = {*spread_items([*judged], FEW_MODELS - 2), data_driven(content), content.best}
+    return [str(name) for name in frame.model if len(frame) <= FEW_MODELS or name in kept]
 
 
 def accuracy_range(content: ReportContent) -> tuple[float, float] | None:
@@ -132,12 +121,12 @@ def model_styles(content: ReportContent) -> Mapping[str, Style]:
 
 @lru_cache(maxsize=4)
 def close_styles(content: ReportContent) -> Mapping[str, Style]:
-    """Style of the models of a close-up: a colour and a marker each (36 are told apart); no physics in ink."""
+    """Style of the models of a close-up: a colour and a marker each; no physics in ink."""
     of_family = dict(zip(*models_by_accuracy(content)[["model", "family"]].to_numpy().T, strict=True))
     physics = [name for name in close_up_models(content) if of_family[name] != DATA_DRIVEN]
     result = _styles_without_physics([name for name in close_up_models(content) if name not in physics])
     for index, name in enumerate(physics):
-        symbol = MARKERS[(index + index // len(OKABE_ITO)) % len(MARKERS)]
+        symbol = MARKERS[index % len(MARKERS)]
         result[name] = Style(category_colour(index), symbol, 2.0)
     return result
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 from shipid.report.cells import cells_table
 from shipid.report.content import AnswerSentence, ReportContent
 from shipid.report.errors_over import error_by_kind
 from shipid.report.factors import models_table
-from shipid.report.page import FIRST_SENTENCES, write_whole
+from shipid.report.page import FIRST_SENTENCES
 from shipid.report.wording import CONSTANT_MOTION, metres_text
 
 
@@ -19,7 +18,7 @@ def summary_text(content: ReportContent) -> str:
     mean, p90, rms = (metres_text(content.naive[name]) for name in ("mean", "p90", "rms"))
     more, findings = (
         content.answer[FIRST_SENTENCES:],
-        [[f.id, f.claim, f.verdict, f.evidence] for f in content.findings],
+        [[f["id"], f["claim"], f["verdict"], f["evidence"]] for f in content.findings],
     )
     parts = [
         f"# {_one_line(content.title)}",
@@ -36,11 +35,6 @@ def summary_text(content: ReportContent) -> str:
     parts += ["## Provenance", _markdown_table(["", ""], content.provenance.items())]
     parts.append("\n".join(f"    {line}" for line in content.command.splitlines()))
     return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def write_summary(content: ReportContent, file: Path) -> Path:
-    """Write the summary as Markdown; returns the file. Raises ResultError if it cannot."""
-    return write_whole(summary_text(content), file)
 
 
 def _bullet_list(sentences: Sequence[AnswerSentence]) -> str:

@@ -41,10 +41,8 @@ class PageTable:
 def frame_table(id: str, title: str, takeaway: str, frame: pd.DataFrame, columns: Mapping[str, str]) -> PageTable:
     """Make a table of a frame of values, or of cells as they are.
 
-    Lengths, whose heading ends with [m], have as many decimals as leave two digits to their median, two at least; whole
-    numbers none; others three digits of their median, three decimals at most.
-
-    columns : heading -> column of the frame; one that it lacks is left out.
+    Lengths, in [m], have two digits of their median and two decimals at least; whole numbers none; others three digits
+    of their median, three decimals at most. columns : heading -> column of the frame; one that it lacks is left out.
     """
     known = {heading: source for heading, source in columns.items() if source in frame}
     cells = [_column_cells(frame[source], heading.endswith("[m]")) for heading, source in known.items()]

@@ -100,15 +100,3 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     assert lost.pairs == 0
     assert np.isnan(lost.H)
     assert np.isnan(lost.difference)
-
-
-def test_who_is_ahead_over_the_cells_that_both_have() -> None:
-    """Errors of `other` are lower; without its easiest cell its mean is higher."""
-    made = cells(np.random.default_rng(2), -0.3, noise=0.01)
-    mine = made[made.method.eq("other") & made.family.eq("moderate")]
-    made.loc[mine.H.idxmin(), ["status", "H"]] = ["diverged", np.nan]
-    table = method_table(made, "drawn")
-    both = made[made.family.eq("moderate") & ~made.foundation.eq(mine.foundation[mine.H.idxmin()])]
-    assert both.groupby("method").H.mean()["other"] < both.groupby("method").H.mean()["drawn"]
-    assert (row(table, "drawn").ahead, row(table).ahead) == ("other", "")
-    assert set(method_table(cells(np.random.default_rng(2), 0.0, noise=0.0), "drawn").ahead) == {""}

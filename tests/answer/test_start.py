@@ -15,8 +15,12 @@ from tests.study.tiny import TINY
 
 
 def test_run_logs_its_progress_and_returns_results(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(logging.getLogger("shipid"), "handlers", [])  # a command run before leaves its own
     out = tmp_path / "run"
     with caplog.at_level(logging.INFO, logger="shipid"):
         results = run(TINY, set={"grid.N_D": [4]}, out=out, workers=1)

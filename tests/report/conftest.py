@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report import AnswerSentence, ReportContent, ReportFinding, WindowSnapshot
+from shipid.report import AnswerSentence, ReportContent, WindowSnapshot
 from shipid.report.page import DrawnSection, draw_sections
 from shipid.report.sections import SECTIONS
 
@@ -200,15 +200,24 @@ def _content(models: list[Model], sizes: list[int], seeds: int, runs: list[str],
             AnswerSentence("These data say nothing about waves."),
         ],
         findings=[
-            ReportFinding(
-                "R1", "Cooperative beats its physics model.", "confirmed", "2.10 m to 0.94 m; 5.20 m to 2.05 m."
-            ),
-            ReportFinding(
-                "R2", "Inaccurate and compensated is as good as accurate alone.", "undecided", "2.05 m, 2.10 m."
-            ),
-            ReportFinding(
-                "R4", "Pure data-driven is worst over the whole horizon.", "refuted", "Not in the first 2 s."
-            ),
+            {
+                "id": "R1",
+                "claim": "Cooperative beats its physics model.",
+                "verdict": "confirmed",
+                "evidence": "2.10 m to 0.94 m; 5.20 m to 2.05 m.",
+            },
+            {
+                "id": "R2",
+                "claim": "Inaccurate and compensated is as good as accurate alone.",
+                "verdict": "undecided",
+                "evidence": "2.05 m, 2.10 m.",
+            },
+            {
+                "id": "R4",
+                "claim": "Pure data-driven is worst over the whole horizon.",
+                "verdict": "refuted",
+                "evidence": "Not in the first 2 s.",
+            },
         ],
         cells=cells,
         factors=_factors(models, generator),

@@ -24,15 +24,8 @@ def test_the_model_without_physics_has_one_name(full_scale):
     ]
 
 
-def test_windows_and_further_frames_have_that_name(simulation):
-    old = {"no physics": "none"}
-    paths = [
-        {(old.get(model, model), source, size): path for (model, source, size), path in window.paths.items()}
-        for window in simulation.snapshots
-    ]
-    windows = [replace(window, paths=mine) for window, mine in zip(simulation.snapshots, paths, strict=True)]
+def test_further_frames_have_that_name(simulation):
     frame = pd.DataFrame({"model": ["none", "a"], "N_D": [1, 1]})
-    again = replace(simulation, snapshots=windows, frames={"memory": frame})
-    assert [[*window.paths] for window in again.snapshots] == [[*window.paths] for window in simulation.snapshots]
+    again = replace(simulation, frames={"memory": frame})
     assert list(again.frames["memory"].model) == ["no physics", "a"]
     assert list(frame.model) == ["none", "a"], "what was given is not changed"

@@ -25,13 +25,6 @@ def test_one_dot_per_number_at_its_factor(simulation):
     assert "Not perturbed: nominal." in figure.how, "what has no physics is no model that was spared"
 
 
-def test_the_row_tells_where_the_error_comes_from(simulation):
-    texts = [note.text for note in views(factors_figure(simulation))[""][0].layout.annotations]
-    assert texts[1] == "<b>moderate-2</b>  A 3.10 m: 2.17 along, 1.86 across"
-    bare = replace(simulation, models=simulation.models.drop(columns=["A_along", "A_across"]))
-    assert views(factors_figure(bare))[""][0].layout.annotations[1].text == "<b>moderate-2</b>  A 3.10 m"
-
-
 def test_takeaway_counts_and_finds_the_farthest(simulation):
     squared = np.log(simulation.factors.factor) ** 2
     away = np.exp(np.sqrt(squared.groupby(simulation.factors.model).mean()))

@@ -21,13 +21,6 @@ def test_a_section_needs_its_parts(need, shown):
     assert [one.id for one in draw_sections({"a": section}, content)] == ["a"] * shown
 
 
-def test_it_says_which_section_is_drawn():
-    said = []
-    sections = {"a": Section("First", {"a": (table, "")}), "b": Section("Second", {"b": (table, "absent")})}
-    draw_sections(sections, SimpleNamespace(), said.append)
-    assert said == ["drawing: First"]
-
-
 def test_order_and_gaps():
     sections = {
         "b": Section("B", {"none": (lambda _: None, ""), "b": (lambda _: table("b"), "")}),

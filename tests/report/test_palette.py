@@ -1,10 +1,7 @@
 import re
-from dataclasses import replace
-
-import pandas as pd
 
 from shipid.report.figure import page_colours
-from shipid.report.selection import accuracy_range, close_styles, model_styles
+from shipid.report.selection import accuracy_range, model_styles
 
 
 def luminance(colour: str) -> float:
@@ -49,10 +46,3 @@ def test_few_models_have_names_many_have_a_scale(simulation, full_scale):
     assert len(set(colours)) == len(colours)
     symbols = {name.split("-")[0]: style.symbol for name, style in model_styles(simulation).items()}
     assert len(set(symbols.values())) == len(symbols)
-
-
-def test_models_of_many_families_are_told_apart_in_close_ups(simulation):
-    mine = [frame[frame.model.eq("high-1")] for frame in (simulation.models, simulation.cells)]
-    many = [pd.concat([frame.assign(model=f"m-{i:02d}", family=f"m-{i:02d}") for i in range(36)]) for frame in mine]
-    looks = close_styles(replace(simulation, models=many[0], cells=many[1], best="m-00"))
-    assert len(looks) == len({(look.colour, look.symbol) for look in looks.values()}) == 36

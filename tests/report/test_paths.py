@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from shipid.report import paths
-from shipid.report.paths import browser_figure, windows_of
-from shipid.report.selection import FEW_RUNS
 
 window_data = lru_cache(maxsize=2)(paths.window_data)  # the same content is drawn once
 
@@ -40,36 +38,8 @@ def test_end_errors_of_a_ship_model_keep_the_digits_that_the_page_writes(full_sc
         assert run[0]["paths"][0][4] == pytest.approx(error, abs=1e-6)
 
 
-def test_many_instants_are_spread_with_both_ends(full_scale):
-    (run,) = window_data(full_scale)["runs"]
-    times = [window["t"] for window in run]
-    assert len(times) == 120
-    assert times == sorted(set(times))
-    assert (times[0], times[-1]) == (4150, 4329)
-
-
-def test_many_runs_share_the_room_of_the_page(simulation):
-    first = simulation.snapshots[0]
-    many = [replace(first, run=f"run-{i:02d}", t=float(t)) for i in range(60) for t in range(50)]
-    runs = windows_of(replace(simulation, snapshots=many))
-    assert len(runs) == FEW_RUNS
-    assert sum(map(len, runs.values())) <= 600
-    assert all(windows[0].t == 0 and windows[-1].t == 49 for windows in runs.values())
-
-
 def test_a_diverged_path_becomes_gaps(full_scale):
     first = full_scale.snapshots[0]
     paths = {key: np.where(np.arange(16)[:, None] > 7, np.inf, path) for key, path in first.paths.items()}
     text = json.dumps(window_data(replace(full_scale, snapshots=[replace(first, paths=paths)])), allow_nan=False)
     assert "null" in text
-
-
-def test_takeaway_is_the_mean_end_error(full_scale):
-    ends = {"cooperative": [], "physics": []}
-    for snapshot in full_scale.snapshots:
-        for (model, source, _), path in snapshot.paths.items():
-            if model != "no physics":
-                ends[source].append(np.linalg.norm(path[-1] - snapshot.truth[-1]))
-    text = browser_figure(full_scale).takeaway
-    assert f"compensated paths by {np.mean(ends['cooperative']):.2f} m" in text
-    assert f"physics alone by {np.mean(ends['physics']):.1f} m" in text

@@ -9,9 +9,9 @@ from shipid.report.selection import (
 )
 
 
-def test_few_models_are_all_drawn_many_by_their_middle(simulation, full_scale):
+def test_few_models_are_all_drawn_of_many_some(simulation, full_scale):
     assert close_up_models(full_scale) == list(models_by_accuracy(full_scale).model)
-    assert close_up_models(simulation) == ["nominal", "moderate-2", "high-2", "no physics"]
+    assert close_up_models(simulation) == ["nominal", "moderate-2", "moderate-3", "high-2", "no physics"]
     assert list(models_by_accuracy(simulation).model)[-1] == "no physics"
 
 

@@ -1,9 +1,8 @@
-from shipid.report import write_summary
 from shipid.report.summary import summary_text
 
 
-def test_summary_holds_answer_numbers_and_provenance(tmp_path, full_scale):
-    text = write_summary(full_scale, tmp_path / "summary.md").read_text(encoding="utf-8")
+def test_summary_holds_answer_numbers_and_provenance(full_scale):
+    text = summary_text(full_scale)
     assert text.startswith("# How much does the cooperative model gain")
     for part in ("0.94", "2.05", "4.30", "Mean error 5.01 m", "90th percentile 11.2 m", "09f6a2c1d4e5b7a8", "| R2 |"):
         assert part in text

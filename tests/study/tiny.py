@@ -77,7 +77,7 @@ def events_here(plan: Plan, folder: Path) -> Iterator[run.Event]:
 def without_figures() -> Iterator[None]:
     """Pages of studies are texts alone, where figures are not the point: these take most of the time of a page."""
     draw = page.draw_sections
-    with patch.object(page, "draw_sections", lambda parts, *rest: [] if parts is SECTIONS else draw(parts, *rest)):
+    with patch.object(page, "draw_sections", lambda parts, content: [] if parts is SECTIONS else draw(parts, content)):
         yield
 
 
