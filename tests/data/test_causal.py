@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.data.causal import causal_columns, last_known_rows
+from shipid.errors import DataError
 from tests.logs.conftest import as_dataset, turning
 
 
@@ -39,9 +40,43 @@ def test_a_later_fix_changes_no_earlier_row(seed: int) -> None:
     assert not np.array_equal(one, other)
 
 
+@pytest.mark.parametrize("even", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_fixes_between_rows_reach_no_row_before_them(seed: int, even: bool) -> None:
+    """Fixes on another clock: whatever comes at a fix and later, rows before it hold what they held."""
+    rng = np.random.default_rng(seed)
+    rows = np.arange(80.0) + (0.0 if even else rng.uniform(-0.4, 0.4, 80))
+    fixes = np.cumsum(rng.uniform(2.0, 6.0, 60)) - 3.0
+    heights = rng.normal(size=len(fixes))
+    one = causal_columns(as_dataset(turning(rows).assign(u=np.interp(rows, fixes, heights))), ["u"]).frame["u"]
+    for first in np.flatnonzero((fixes > 10.0) & (fixes < 70.0)):
+        changed = np.where(np.arange(len(fixes)) < first, heights, heights + rng.normal(size=len(fixes)))
+        data = as_dataset(turning(rows).assign(u=np.interp(rows, fixes, changed)))
+        before = rows < fixes[first]
+        np.testing.assert_array_equal(causal_columns(data, ["u"]).frame["u"][before], one[before])
+
+
 def test_what_holds_still_is_known_and_other_columns_stay() -> None:
     data = as_dataset(turning(np.arange(30.0)).assign(u=4.0))
     held = causal_columns(data, ["u"])
     np.testing.assert_array_equal(held.frame["u"], 4.0)
     np.testing.assert_array_equal(held.frame["psi"], data.frame["psi"])
     assert held.metadata["causal"] == ["u"]
+
+
+def test_a_column_that_is_not_there_is_named() -> None:
+    with pytest.raises(DataError, match="missing column"):
+        causal_columns(as_dataset(turning(np.arange(30.0))), ["V_w"])
+
+
+def test_what_holds_still_is_known_until_it_moves() -> None:
+    """The row that moves lies on a line to a later fix, so the last one before it is what is known."""
+    assert last_known_rows(np.arange(7.0), np.array([4.0, 4.0, 4.0, 4.0, 5.0, 6.0, 7.0])).tolist() == [
+        0,
+        1,
+        2,
+        3,
+        3,
+        3,
+        3,
+    ]

@@ -6,8 +6,10 @@ import math
 import os
 import signal
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,12 +18,15 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.identification import outcome
+from shipid.identification.design import Candidate, InformedCandidate, candidate_manoeuvres
 from shipid.identification.free_run import ALL, simulate_free_runs
 from shipid.identification.outcome import (
     AFTER,
     BEFORE,
     Identification,
+    pick_runs,
     read_settings,
+    residual_spacing,
     run_identification,
     write_patch,
 )
@@ -84,6 +89,14 @@ def test_a_fit_sees_no_moment_of_a_run_held_out(log: Dataset) -> None:
     everything = Dataset(log.frame, metadata)  # each run from 0 s on the same clock
     with pytest.raises(DataError, match="every run shares its moments"):
         run_identification(off(), everything, settings(), held_out=["M05"])
+
+
+def test_a_run_of_a_single_row_is_named_and_left_out(log: Dataset) -> None:
+    whole = log.select(["M01", "M02"])
+    single = Dataset(pd.concat([whole.frame, log.select(["M03"]).frame.head(1)], ignore_index=True), log.metadata)
+    _, runs, warnings = outcome.without_shared(single, single.runs, [])
+    assert runs == ("M01", "M02")
+    assert warnings == ("run M03 has a single row: it takes no part in the fit",)
 
 
 def test_it_tells_what_the_parts_tell(identified: Identification, log: Dataset) -> None:
@@ -163,12 +176,58 @@ def test_a_patch_is_the_identified_vessel_and_says_where_it_is_from(identified: 
         write_patch(mine, file)
 
 
+def test_a_patch_on_a_bundled_vessel_names_it(identified: Identification, tmp_path: Path) -> None:
+    assert tomllib.loads(replace(identified, vessel=SHIP).patch(tmp_path / "a.toml"))["base"] == "gunnerus-28.9"
+
+
+def test_a_patch_holds_what_was_changed_after_the_base_was_read(identified: Identification, tmp_path: Path) -> None:
+    """It was refused where it was read: the base was said to have changed."""
+    changed = SHIP.with_values({"inertia.m": 1.1 * SHIP.parameters["inertia.m"], FEW[0]: 1.0})
+    again = load_vessel(write_patch(replace(identified, vessel=changed), tmp_path / "patch.toml"))
+    assert again.parameters == changed.parameters | dict(identified.solution.values)
+    other = replace(identified, vessel=SHIP.with_values({"current.kind": "uniform"}))
+    with pytest.raises(ShipidError, match="more than numbers of it were changed"):
+        write_patch(other, tmp_path / "other.toml")
+    assert not (tmp_path / "other.toml").exists()
+
+
+def test_a_patch_names_estimates_that_contradict_others_and_is_read(identified: Identification, tmp_path: Path) -> None:
+    """A force of the rudder ahead of midships, a rudder aft: the patch was written, and refused where it was read."""
+    tanker, odd = load_vessel("kvlcc2-l7"), "thruster.rudder.x_H"
+    found = replace(identified, vessel=tanker, solution=replace(identified.solution, values={odd: 4.4}))
+    again = load_vessel(write_patch(found, tmp_path / "patch.toml"))
+    assert again.parameters == tanker.parameters | {odd: 4.4}
+    assert again.document["unusual"] == [odd]
+    assert "unusual" not in tomllib.loads(identified.patch(tmp_path / "usual.toml"))
+
+
 def test_the_profile_agrees_with_the_interval(identified: Identification) -> None:
     curve = identified.profiles[0]
     row = identified.estimates.set_index("path").loc[curve.path]
     assert curve.path == FEW[0]
     assert curve.low == pytest.approx(row["factor_low"], abs=0.3 * row["factor_error"])
     assert curve.high == pytest.approx(row["factor_high"], abs=0.3 * row["factor_error"])
+
+
+def test_a_fit_stays_where_manoeuvres_to_run_next_cannot_be_performed(
+    log: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before, one that diverged ended the command without a word of the fit."""
+    every, some = outcome.design.information_of_candidates, candidate_manoeuvres(SHIP, [3.0])[4:9:4]
+
+    def informed(vessel: Vessel, choice: Sequence[Candidate], *args: Any, **how: Any) -> list[InformedCandidate]:
+        if any(one.title.startswith("turning") for one in choice):
+            raise ShipidError("she diverges")
+        return every(vessel, choice, *args, **how)
+
+    monkeypatch.setattr(outcome, "TRIED", outcome.TRIED[:1])
+    monkeypatch.setattr(outcome.design, "candidate_manoeuvres", lambda *_: some)
+    monkeypatch.setattr(outcome.design, "information_of_candidates", informed)
+    done = run_identification(off(), log.select(["M01", "M02"]), settings(parameters=FEW[:1]), programme=True)
+    assert done.solution.status == "ok"
+    assert done.programme is not None
+    assert not done.programme["manoeuvre"].str.startswith("turning").any()
+    assert any(line.startswith("not among the manoeuvres to run next") for line in done.warnings)
 
 
 def test_the_programme_is_ranked(identified: Identification) -> None:
@@ -178,6 +237,14 @@ def test_the_programme_is_ranked(identified: Identification) -> None:
     assert (table["after"] <= table["before"]).all()
     assert (table["after"] < table["before"]).iloc[0]
     assert set(table["narrows"]) <= set(FEW)
+
+
+def test_free_runs_take_what_is_set_for_a_run(log: Dataset) -> None:
+    calm = simulate_free_runs({BEFORE: SHIP}, log, ["M01", "M02"], settings()).errors.set_index("run")["u"]
+    windy = settings(runs={"M02": {"environment": {"V_w": 15.0}}})
+    errors = simulate_free_runs({BEFORE: SHIP}, log, ["M01", "M02"], windy).errors.set_index("run")["u"]
+    assert errors["M01"] == calm["M01"]
+    assert errors["M02"] != calm["M02"]
 
 
 def test_a_free_run_that_diverges_is_no_number(log: Dataset) -> None:
@@ -268,6 +335,12 @@ def test_ctrl_c_is_ctrl_c_wherever_it_comes(log: Dataset) -> None:
         run_identification(off(), log, settings(), progress=pressed)
 
 
+def test_patterns_pick_runs_in_the_order_of_the_log(log: Dataset) -> None:
+    assert pick_runs(log) == (("M01", "M02", "M03", "M04", "M05"), ())
+    assert pick_runs(log, ["M04", "M01"], ["M0[12]", "M05"][1:]) == (("M01", "M04"), ("M05",))
+    assert pick_runs(log, ["*"], ["*5", "M01"]) == (("M02", "M03", "M04"), ("M01", "M05"))
+
+
 def test_settings_are_read_and_changed(tmp_path: Path) -> None:
     file = tmp_path / "settings.toml"
     file.write_text('[identify]\nparameters = ["hull.*"]\nhorizon = 20\nweights = {u = 0.1, r = 0.01}\n')
@@ -296,6 +369,13 @@ def test_a_bad_settings_file_is_one_line(text: str, message: str, tmp_path: Path
     assert str(error.value).startswith(str(file))
 
 
+def test_a_change_of_settings_that_reaches_nothing_is_one_line() -> None:
+    """Before, `--set horizon.x=1` ended in a traceback."""
+    with pytest.raises(DocumentError, match=r"there is no .x.") as error:
+        read_settings(None, {"horizon": 20, "horizon.x": 1})
+    assert error.value.path == "identify.horizon.x"
+
+
 def test_a_profile_holds_its_factor_whatever_bounds_it_has(
     identified: Identification, log: Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -316,6 +396,32 @@ def test_a_profile_holds_its_factor_whatever_bounds_it_has(
     assert all(low == high for low, high in tried)
 
 
+def test_the_time_between_residuals_is_that_of_most_rows_whatever_the_order_of_the_runs() -> None:
+    """A run with rows 5 s apart beside one with rows 1 s apart: correlation times [s] are those of the many rows."""
+    fine, coarse = (rows for _, rows in trials(SHIP, runs=2, steps=60).frame.groupby("run"))
+    for runs in ((fine, coarse[::5]), (coarse[::5], fine)):
+        data = Dataset(pd.concat(runs, ignore_index=True), {"clock": "run", "flags": []})
+        assert residual_spacing(identify(SHIP, data, data.runs, settings())) == 1.0
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
+def test_free_runs_that_are_worse_name_the_nuisances_that_they_leave_out() -> None:
+    """The numbers are right, but a free run is compared with an antenna 15 m ahead as if it were at the origin."""
+    log = trials(SHIP, runs=3, steps=60)
+    psi, r, v = (log.frame[name] for name in ("psi", "r", "v"))
+    ahead = changed(
+        log, v=v + 15 * r, north=log.frame["north"] + 15 * np.cos(psi), east=log.frame["east"] + 15 * np.sin(psi)
+    )
+    named = run_identification(off(), ahead, settings(horizon=0)).warnings
+    assert [line for line in named if line.startswith("the log looks like that of an antenna about 15 m ahead of ")]
+    result = run_identification(off(), ahead, settings(horizon=0, nuisance={"lever_arm": 15.0}))
+    assert not [line for line in result.warnings if "antenna" in line]
+    assert result.solution.factors[0] == pytest.approx(1 / 0.7, rel=0.02)
+    said = [warning for warning in result.warnings if "worse than before" in warning]
+    assert said
+    assert said[0].startswith("free runs of the fit runs, which leave out lever_arm, are worse than before in ")
+
+
 @pytest.mark.parametrize(
     ("v", "position", "worse"),
     [(1.003, 0.5, []), (1.003, 1.04, ["position by 4 %"]), (1.234, 2.5, ["v by 23 %", "position by 150 %"])],
@@ -327,6 +433,19 @@ def test_free_runs_that_are_worse_say_by_how_much_and_a_little_more_is_not_worse
     before = {"u": 0.2, "v": 0.1, "r": 0.002, "position": 8.0}
     after = {**before, "v": v * before["v"], "position": position * before["position"]}
     assert outcome._worse_signals(pd.DataFrame([before, after], index=[BEFORE, AFTER])) == worse
+
+
+@pytest.mark.usefixtures("one_manoeuvre")
+def test_a_profile_of_a_factor_that_ends_at_a_bound_is_left_out_and_the_fit_stays() -> None:
+    """Nobody knows before the fit which factor will end at a bound."""
+    bounds = {FEW[0]: (1.6, 2.0)}  # the true factor is 1 / 0.7
+    result = run_identification(off(), trials(SHIP, runs=2), settings(bounds=bounds), profiles=FEW[:2])
+    assert [curve.path for curve in result.profiles] == FEW[1:2]
+    assert f"no profile of {FEW[0]}: it is at a bound, fixed or dropped" in result.warnings
+    said = (
+        f"at a bound, so without an interval: {FEW[0]}; the intervals of the others hold if the bound is the true value"
+    )
+    assert said in result.warnings
 
 
 @pytest.mark.usefixtures("one_manoeuvre")

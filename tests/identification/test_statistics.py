@@ -16,6 +16,7 @@ from shipid.identification.statistics import (
     _Drift,
     _signal_drift,
     against_priors,
+    block_clusters,
     factors_of_single_runs,
     fit_statistics,
     open_to_drift,
@@ -56,6 +57,32 @@ def test_which_form_is_chosen() -> None:
     )  # 3 runs are under 4 degrees of freedom
     assert fit_statistics(few).chosen == "blocks"
     assert "mislead" in fit_statistics(few).covariances["sandwich"].reason
+
+
+def test_residuals_of_a_signal_that_says_nothing_of_a_factor_do_not_count() -> None:
+    """The yaw rate of straight runs: its drift made a fit by two runs doubtful."""
+    of_r = np.array(NAMES) == "r"
+    error = np.where(
+        of_r, noise(np.random.default_rng(1), RUNS, SAMPLES, 0.95), noise(np.random.default_rng(0), RUNS, SAMPLES, 0.0)
+    )
+    jacobian = np.where(of_r[:, None], 0.0, JACOBIAN)
+    fit = fitted(jacobian, error, CLUSTERS, NAMES)
+    assert not residual_whiteness(fit)["r"].white
+    assert fit_statistics(fit).chosen == "fisher"
+    assert fit_statistics(fitted(JACOBIAN, error, CLUSTERS, NAMES)).chosen == "sandwich"
+
+
+def test_factors_that_priors_alone_hold_lend_no_trust() -> None:
+    """Four that the data do not see made the sandwich of three runs trusted, and of one run: without a warning."""
+    error, names = noise(np.random.default_rng(0), 3, 400, 0.8), labels(3, 400)
+    jacobian = design(3, 400, 7) * np.where(np.arange(7) < 3, 1.0, 1e-6)
+    widths = np.full(7, 0.3)
+    few = fit_statistics(fitted(jacobian[:, :3], error, *names, prior_widths=widths[:3]))
+    more = fit_statistics(fitted(jacobian, error, *names, prior_widths=widths))
+    assert not more.covariances["sandwich"].trusted
+    assert more.chosen == few.chosen
+    np.testing.assert_allclose(more.high[:3] - more.low[:3], few.high - few.low, rtol=1e-3)
+    np.testing.assert_allclose(more.errors[3:], widths[3:], rtol=1e-3)
 
 
 def test_fisher_is_the_textbook_formula() -> None:
@@ -101,6 +128,19 @@ def test_sandwich_is_the_jackknife_over_runs() -> None:
     expected = np.array(again).T @ np.array(again)
     np.testing.assert_allclose(matrix / matrix[0, 0], expected / expected[0, 0], rtol=1e-6, atol=1e-6)
     assert matrix[0, 0] / expected[0, 0] == pytest.approx((RUNS - 1) / RUNS, rel=0.1)
+
+
+def test_intervals_cover_what_one_run_alone_excites() -> None:
+    """That run has no residuals along such a factor: they say nothing of its error."""
+    runs, samples = 10, 40
+    jacobian, (clusters, signals) = design(runs, samples, COUNT), labels(runs, samples)
+    jacobian[clusters > 0, 0] = 0.0
+    rng, covered = np.random.default_rng(1), np.zeros(COUNT)
+    for _ in range(60):
+        estimates = fit_statistics(fitted(jacobian, noise(rng, runs, samples, 0.8), clusters, signals))
+        assert estimates.chosen == "sandwich"
+        covered += (estimates.low <= 1) & (estimates.high >= 1)
+    assert covered.min() / 60 >= 0.9
 
 
 def test_a_run_that_alone_decides_a_factor_is_named() -> None:
@@ -227,6 +267,15 @@ def test_autocorrelation_is_the_mean_product_of_all_pairs() -> None:
     np.testing.assert_allclose(rho, [np.mean(each) / np.mean(products[0]) for each in products], rtol=1e-9)
 
 
+@pytest.mark.parametrize("phi", [0.0, 0.8])
+def test_a_prior_much_narrower_than_the_data_is_the_error_in_every_form(phi: float) -> None:
+    widths = 1e-5 * np.arange(1, COUNT + 1)
+    estimates = fit_statistics(one(phi, prior_widths=widths))
+    assert {"fisher", "sandwich"} <= set(estimates.covariances)
+    for form in estimates.covariances.values():
+        np.testing.assert_allclose(form.errors, widths, rtol=1e-3)
+
+
 @pytest.mark.parametrize(("phi", "width"), [(0.0, 1.0), (0.8, 1e-3)])
 def test_what_the_data_alone_say_is_not_changed_by_priors(phi: float, width: float) -> None:
     """Correlated residuals widen it as without priors: tight priors hid them, and factors were called identified."""
@@ -252,6 +301,18 @@ def test_what_has_no_effect_is_named() -> None:
     assert not estimates.identifiable[2]
     assert estimates.identifiable.sum() == COUNT - 1
     assert "p2 has no effect" in estimates.sentences[2]
+
+
+@pytest.mark.parametrize(("size", "why"), [(1.0, "others do a part of the same"), (0.01, "hardly excited")])
+def test_a_wide_interval_has_its_reason(size: float, why: str) -> None:
+    """p1 and p0 at an angle of 8 deg are no set, but each would be known without the other; it was 'hardly excited'."""
+    jacobian = np.linalg.qr(np.random.default_rng(3).normal(size=(3000, 3)))[0] * 10
+    jacobian[:, 1] = size * (np.cos(np.radians(8)) * jacobian[:, 0] + np.sin(np.radians(8)) * jacobian[:, 1])
+    error = np.random.default_rng(0).normal(size=3000)
+    estimates = fit_statistics(fitted(jacobian, error, np.repeat(np.arange(6), 500), ("u",) * 3000))
+    assert not estimates.combinations
+    assert estimates.identifiable[2]
+    assert estimates.sentences[1].endswith(f"% of its base value, {why}")
 
 
 def test_a_prior_narrows_the_interval_but_identifies_nothing() -> None:
@@ -303,6 +364,15 @@ def test_nuisances_cost_degrees_of_freedom() -> None:
     plain = {name: colour.level for name, colour in fit_statistics(replace(fit, spent=None)).whiteness.items()}
     assert levels["u"] == pytest.approx(1.3, abs=0.15)
     assert levels["u"] / plain["u"] == pytest.approx(np.sqrt(8 / 7), rel=0.01)
+
+
+def test_blocks_cut_all_signals_at_the_same_times() -> None:
+    numbers = block_clusters(one(), 20)
+    assert len(np.unique(numbers)) == RUNS * 4
+    for run in range(RUNS):
+        u, v, r = (numbers[(run == CLUSTERS) & (np.array(NAMES) == name)] for name in SIGNALS)
+        assert (u == v).all()
+        assert (v == r).all()
 
 
 def test_fits_without_a_meaning_are_refused() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.amounts import split_amounts, without_prefix
 from shipid.logs.guess.columns import Guess, guess
@@ -52,6 +53,23 @@ def test_units_in_cells_are_those_of_their_columns(decimal: str, separator: str,
     np.testing.assert_allclose(rows["north"], LOG["north"], atol=1e-3)
     np.testing.assert_allclose(rows["u"].drop([7, 8, 9]), LOG["u"].drop([7, 8, 9]), atol=0.01)
     np.testing.assert_allclose(rows["r"], LOG["r"], atol=1e-5)
+
+
+@pytest.mark.parametrize(("first", "second"), [("°M", "°T"), (" deg true", " mag")])
+def test_true_and_magnetic_north_in_a_column_are_refused(first: str, second: str, tmp_path: Path) -> None:
+    """Both are degrees, but in places 20 deg apart: headings of a half of the log were wrong."""
+    frame = written()
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    _, mapping = drafted(tmp_path / "log.csv")
+    mapping.write_text(mapping.read_text().replace("sha256", "# sha256"))
+    frame["psi"] = BRIDGE["psi"].astype(str) + np.where(BRIDGE.index < 300, first, second)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=r"no column can be the heading: 'psi' holds .*, and other units: write one"):
+        guess(tmp_path / "log.csv")
+    kind = "magnetic" if "M" in first else "true"
+    said = rf"row 301: .* is not of {kind} north, as .* \(column 'psi'; {len(frame) - 300} such rows\): write one north"
+    with pytest.raises(DataError, match=said):
+        import_log(read_mapping(mapping), tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize(

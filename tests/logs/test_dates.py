@@ -149,6 +149,47 @@ def test_times_of_day_in_columns_of_numbers() -> None:
     assert time_texts([np.array([8.0]), np.array([5.0])]).tolist() == ["08:05:00.000000"]
 
 
+DAYS = ("%Y%m%d", "%d%m%Y", "%d%m%y", "%y%m%d", "day of Excel")
+
+
+@pytest.mark.parametrize(("numbers", "time"), [(True, "%H%M%S"), (False, "%H:%M:%S")])
+@pytest.mark.parametrize("day", DAYS)
+def test_a_date_in_one_number_beside_a_time_of_day(
+    day: str, time: str, numbers: bool, log: pd.DataFrame, tmp_path: Path
+) -> None:
+    """Two sessions on two days, drawn: a day goes over, and numbers lose their leading zeros."""
+    random = np.random.default_rng([DAYS.index(day), numbers])
+    first = pd.Timestamp("2024-01-01") + pd.Timedelta(days=int(random.integers(0, 360)), seconds=86_385)
+    later = np.where(np.arange(len(T)) < 60, 0, int(random.integers(3, 9)) * 86_400 - 3_600)
+    moments = pd.Series(first + pd.to_timedelta(10 * T + later, unit="s"))
+    days, times = moments.dt.strftime(day), moments.dt.strftime(time)
+    if day == "day of Excel":
+        since = (moments - pd.Timestamp("1899-12-30")) / pd.Timedelta("1D")
+        days, times = np.floor(since).astype(int), (since % 1).round(12)
+    log = log.assign(Date=days.astype(int) if numbers else days)
+    log["time"] = times.astype(int) if numbers and time == "%H%M%S" and day != DAYS[-1] else times
+    log.to_parquet(tmp_path / "log.parquet") if numbers else log.to_csv(tmp_path / "log.csv", index=False)
+    file, form = (tmp_path / "log.parquet", 'kind = "parquet"') if numbers else (tmp_path / "log.csv", "")
+    since = (moments - pd.Timestamp(0)) / pd.Timedelta("1s")
+    mapping = mapping_with(tmp_path, form, ('from = "time"', 'from = "time"\nunit = "date"\ndate = "Date"'))
+    np.testing.assert_allclose(import_log(read_mapping(mapping), file).frame["t"], since, atol=1e-5)
+    sniffed = recognise_log(file)
+    assert sniffed.clock == {"from": "time", "unit": "date", "date": "Date"}
+    np.testing.assert_allclose(sniffed.t, since, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("day", "other"), [("140524", "2014-05-24"), ("240514", "2024-05-14"), ("50624", "2024-05-06")]
+)
+def test_a_date_of_six_digits_that_may_be_another_is_asked(
+    day: str, other: str, log: pd.DataFrame, tmp_path: Path
+) -> None:
+    times = pd.to_datetime(T, unit="s").strftime("%H:%M:%S.%f")
+    log.assign(time=times, Date=day).to_csv(tmp_path / "log.csv", index=False)
+    (asked,) = recognise_log(tmp_path / "log.csv").doubts
+    assert other in asked
+
+
 def test_times_of_day_that_go_back_are_of_the_next_day() -> None:
     """Trials of three days in one file, each from eight in the morning; a minute back is an error, and stays one."""
     hours = pd.Series(["08:00:00", "11:30:00", "08:15:00", "16:00:00", "08:05:00", "08:04:00"])
@@ -162,6 +203,14 @@ def test_a_moment_and_its_date() -> None:
     assert format_date(t) == text
     assert format_moment(t) == f"{text} UTC"
     assert format_span(t, t + 60.0) == f"{text} to 2022-11-30 09:16:02 UTC"
+
+
+@pytest.mark.parametrize("t", [-5.0, 12.5, 9.99e7, 1e13, float("nan")])
+def test_a_moment_without_a_date_is_seconds(t: float) -> None:
+    """A damaged clock too: no date is beyond the year 9999."""
+    assert format_moment(t) == f"{t:.10g} s"
+    assert format_span(0.0, t) == f"0 to {t:.10g} s"
+    assert format_span(t, 1.7e9).endswith(" s")
 
 
 @pytest.mark.parametrize("style", ["%d.%m.%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%Y-%m-%d %I:%M:%S.%f %p"])

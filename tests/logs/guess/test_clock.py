@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,14 @@ def test_seconds_that_may_not_count_from_1970_are_asked(
     assert [words in doubt for doubt in doubts] == [True] * bool(words)
 
 
+def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> None:
+    moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(np.arange(200), "s")
+    log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match="'time' is a date and a time of day in one number, 140524081320: write 2024"):
+        recognise_log(tmp_path / "log.csv")
+
+
 @pytest.mark.parametrize(("name", "step"), [("utc", 0.2), ("t", 10.0)])
 def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step: float, tmp_path: Path) -> None:
     t = step * np.arange(900)
@@ -97,6 +106,18 @@ DAYS_OF = {
     "excel": (START - pd.Timestamp(1899, 12, 30)) / pd.Timedelta("1D"),
 }
 DAYS_OF["datenum"] += 5 / 86400
+
+
+@pytest.mark.parametrize("unit", DAYS_OF)
+@pytest.mark.parametrize(("name", "step"), [("time", 0.5), ("Time [d]", 10.0)])
+def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, step: float, tmp_path: Path) -> None:
+    """A double has such a day to 1e-5 s, a table to as much as it writes."""
+    t = step * np.arange(60)
+    table = pd.DataFrame({name: [f"{DAYS_OF[unit] + one / 86400:.10f}" for one in t], "N": t, "psi": t})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = recognise_log(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": name, "unit": unit}
+    np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=3e-5)
 
 
 @pytest.mark.parametrize(
@@ -237,6 +258,77 @@ def test_clocks_that_begin_again_and_days_of_the_year(
     np.testing.assert_allclose(np.diff(read), 0.5, atol=1e-4)
 
 
+@pytest.mark.parametrize("write", ["{:g} sec", lambda t: f"0 days 00:{t // 60:02.0f}:{t % 60:09.6f}"])
+def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) -> None:
+    """As MATLAB writes those of a timetable, and pandas its own."""
+    times = [write.format(0.5 * k) if isinstance(write, str) else write(0.5 * k) for k in range(600)]
+    with_clock("Time", times).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = recognise_log(tmp_path / "log.csv")
+    assert sniffed.clock == {"from": "Time", "unit": "date"}
+    np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "digits"), [("Decimal year", 12), ("time", 4)])
+def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp_path: Path) -> None:
+    """With four digits an hour has one number, which repeats."""
+    with_clock(name, [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]).to_csv(
+        tmp_path / "log.csv", index=False
+    )
+    with pytest.raises(DataError, match=rf"'{name}' is a year with decimals, 2024.3655.*: write a date"):
+        recognise_log(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(("size", "step"), [(2**16, 500), (2**32, 500_000)])
+def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: Path) -> None:
+    """As of milliseconds in 16 bits, or microseconds in 32."""
+    values = [(size - 100 * step + 7 + step * k) % size for k in range(600)]
+    with_clock("time", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(DataError, match=rf"'time' is a counter that begins again at {size} in row 101: add {size}"):
+        recognise_log(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("# operator, zigzag,2", "holds '# operator' in row 31, a comment: remove the line"),
+        ("2016-12-31T23:59:60Z,1,2", "a leap second: remove the line"),
+        ("later,1,2", "holds 'later' in row 31, no time: remove the line"),
+    ],
+)
+def test_a_line_without_a_time_is_named(line: str, words: str, tmp_path: Path) -> None:
+    lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
+    with pytest.raises(DataError) as caught:
+        recognise_log(log_of(tmp_path, [*lines[:31], line, *lines[31:]]))
+    assert words in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (
+            [f"14/05/2024 08.{k // 60:02}.{k % 60:02}" for k in range(90)],
+            "holds '14/05/2024 08.00.00' in row 1, no number",
+        ),
+        ([f'"{k:,.1f}"' for k in range(680, 1070)], "'1,000.0' in row 321: take the mark of thousands out of the log"),
+        ([str(k) if k % 9 != 8 else "late" for k in range(90)], "'late' in row 9, no time: remove the 10 such lines"),
+        ([f"{1.715e12 + 500 * k:.5E}" for k in range(90)], "'1.71500E+12' in row 1, with too few digits: export it"),
+        (
+            [f"{k // 60:02}:{k % 60:02}.5" for k in range(90)],
+            "'00:00.5' in row 1, without the hour, as Excel shows times",
+        ),
+        (
+            [str(1000 * (k + (604_755 if k < 45 else 5000))) for k in range(90)],
+            "goes back from 604799 s to 5045 s in row 46",
+        ),
+    ],
+)
+def test_a_clock_that_cannot_be_read_says_its_text(times: list[str], words: str, tmp_path: Path) -> None:
+    lines = ["GPS time [ms],north,heading", *(f"{time},{200 - k},{k % 7}" for k, time in enumerate(times))]
+    with pytest.raises(DataError, match="no column can be the clock: 'GPS time") as caught:
+        recognise_log(log_of(tmp_path, lines))
+    assert words in caught.value.message
+
+
 def in_columns(frame: pd.DataFrame, fields: dict[str, str], begin: str = "2024-02-29T23:59:57.5") -> pd.DataFrame:
     """A log with its moments in columns: name -> what `strftime` makes of a moment, as a number."""
     moments = pd.Timestamp(begin) + pd.to_timedelta(frame["time"], "s")
@@ -270,6 +362,30 @@ def test_a_date_in_columns_is_the_clock(
     np.testing.assert_allclose(sniffed.t, zero + T, atol=1e-5)
     assert sniffed.clock.items() >= clock.items()
     assert list(sniffed.columns) == ["N", "psi"]
+
+
+@pytest.mark.parametrize(
+    ("second", "asked"),
+    [
+        ({"Time 2": 2.0 * T}, True),
+        ({"Time 2": np.where(np.arange(len(T)) < 15, 2.0 * T, np.nan)}, True),
+        ({"Time 2": 1e3 * T}, False),  # milliseconds of the same clock
+        ({"timestamp": 1.7e9 + T}, False),
+        ({"Time received": T + 0.05 * np.sin(T)}, False),
+    ],
+)
+def test_a_second_clock_that_goes_otherwise_is_asked(
+    second: dict[str, np.ndarray], asked: bool, tmp_path: Path
+) -> None:
+    """Each channel of some recorders has a time beside it, and a row then holds moments that do not belong together."""
+    long = np.arange(0.0, 100.0, 5.0)
+    log = TABLE.assign(
+        time=long, **{name: 10.0 * values if name != "timestamp" else values for name, values in second.items()}
+    )
+    log = log.assign(timestamp=1.7e9 + long) if "timestamp" in second else log
+    log.to_csv(tmp_path / "log.csv", index=False)
+    doubts = recognise_log(tmp_path / "log.csv").doubts
+    assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
 
 
 @pytest.mark.parametrize(

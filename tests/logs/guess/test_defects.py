@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.logs.guess import sniff
 from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess
-from shipid.logs.guess.draft import draft_text
+from shipid.logs.guess.draft import draft_mapping, draft_text
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.simulated import as_bridge, guess_of, si_log
+from tests.logs.simulated import as_bridge, globe, guess_of, import_draft, si_log
 
 CLEAN = as_bridge(si_log()).round(4)
 
@@ -123,6 +124,19 @@ def test_positions_that_are_late_do_not_jump_at_an_end_of_the_log(delay: float, 
     assert kinds == {"late position" if delay > 0 else "late velocity"}
 
 
+@pytest.mark.parametrize("angle", [0.0, 4.0])
+def test_a_heading_along_which_the_velocities_are_not_the_track_is_asked(angle: float, tmp_path: Path) -> None:
+    """u and v were measured in the ship, so that they are right; a repair that turns them is none."""
+    result = guess_of(tmp_path, CLEAN.assign(psi=(CLEAN["psi"] - angle) % 360.0))
+    asked = [one.sentence for one in result.questions if "track is turned" in one.sentence]
+    assert len(asked) == (angle != 0.0)
+    assert "heading offset" not in result.kinds
+    for sentence in asked:
+        offset = re.search(r"offset = (\S+) \(deg\) for psi", sentence)
+        assert offset is not None
+        assert float(offset[1]) == pytest.approx(angle, abs=0.3)
+
+
 @pytest.mark.parametrize(("factor", "delay"), [(0.9, 0.0), (1.0, 2.0), (10 / 9, 2.0)])
 def test_a_yaw_rate_times_a_factor_is_scaled(factor: float, delay: float, tmp_path: Path) -> None:
     """As in gon/s, or of a gyro that is off; a heading that is late has no other factor."""
@@ -169,3 +183,56 @@ def test_a_log_with_drawn_spikes_is_healed_by_its_draft(tmp_path: Path) -> None:
     healed, clean = (import_log(read_mapping(mapping), file).frame for file in (drafted.file, tmp_path / "clean.csv"))
     for name, most in (("u", 0.5), ("v", 0.5), ("r", 0.02), ("north", 6.0), ("east", 6.0)):
         assert (healed[name] - clean[name]).abs().max() < most, name
+
+
+def test_what_was_not_looked_at_is_no_hole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a large log only samples are read: the clock jumps from one to the next."""
+    rows = len(CLEAN.to_csv(index=False))
+    monkeypatch.setattr(sniff, "SAMPLE", rows // 2)
+    monkeypatch.setattr(sniff, "BLOCK", rows // 30)
+    seen = guess_of(tmp_path, CLEAN)
+    assert "places of" in draft_mapping(seen)
+    assert "holes in time" not in seen.kinds
+    with_a_hole = CLEAN.drop(CLEAN.index[20:60])  # in the head, which is read
+    assert "holes in time" in guess_of(tmp_path, with_a_hole).kinds
+
+
+def test_a_speed_of_0_far_from_the_others_is_no_speed(tmp_path: Path) -> None:
+    """Before, one speed in twenty-five that was 0 was drafted as a factor of 1.04."""
+    drawn = np.random.default_rng(0).random(len(CLEAN)) < 0.04
+    lost = {name: CLEAN[name].mask(drawn, 0.0) for name in ("u",)}
+    proposal = guess_of(tmp_path, CLEAN.assign(**lost))
+    assert proposal.kinds == {"spikes"}
+    assert import_draft(tmp_path, proposal).frame["u"].to_numpy() == pytest.approx(CLEAN["u"], abs=0.1)
+
+
+@pytest.mark.parametrize("where", [{"Lat": [300]}, {"Lat": [300], "Lon": [304, 1500]}])
+def test_one_coordinate_of_0_is_no_fix(where: dict[str, list[int]], tmp_path: Path) -> None:
+    """Before, five rows in which the latitude alone is 0 turned the heading into radians, and mirrored all the rest."""
+    clean = globe(0)
+    frame = clean.copy()
+    for name, places in where.items():
+        for place in places:
+            frame.loc[place : place + 4, name] = 0.0
+    expected, proposal = guess_of(tmp_path, clean), guess_of(tmp_path, frame)
+    assert "no fix" not in expected.kinds
+    drafted = [(one.name, one.source, one.unit, one.extra) for one in proposal.columns]
+    assert drafted == [(one.name, one.source, one.unit, one.extra) for one in expected.columns]
+    assert proposal.kinds == expected.kinds | {"no fix"}
+    sentence = next(one.sentence for one in proposal.findings if one.kind == "no fix")
+    assert all(f"{name!r} is 0" in sentence for name in where)
+    dataset = import_draft(tmp_path, proposal).frame
+    log = si_log(0)
+    kept = log["t"].isin(dataset["t"]).to_numpy()
+    assert 5 <= np.sum(~kept) <= 15
+    for name in ("north", "east"):
+        assert np.ptp(dataset[name].to_numpy() - log[name].to_numpy()[kept]) < 1.0
+
+
+@pytest.mark.parametrize(("name", "value"), [("Lat", 91.0), ("Lon", 181.0)])
+def test_a_coordinate_that_no_place_has_is_a_missing_value(name: str, value: float, tmp_path: Path) -> None:
+    frame = globe(0)
+    frame.loc[300:304, name] = value
+    proposal = guess_of(tmp_path, frame)
+    assert proposal.kinds == {"missing values"}
+    assert {("latitude", "Lat"), ("longitude", "Lon")} <= {(one.name, one.source) for one in proposal.columns}

@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.errors import DataError
 from shipid.logs.formats import TextFormat
 from shipid.logs.guess.clock import name_without_unit
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.readers import read_log_table
-from tests.logs.guess.conftest import TABLE, T, text
+from tests.logs.guess.conftest import TABLE, T, log_of, text
 
 
 @pytest.mark.parametrize(
@@ -142,6 +143,20 @@ def test_blanks_in_positions_separate_nothing(style: str, separator: str, others
     np.testing.assert_allclose(np.stack([sniffed.columns["Lat"], sniffed.columns["Lon"]]).T, places, atol=1e-6)
 
 
+def test_the_header_again_and_lines_of_words_are_left_out(tmp_path: Path) -> None:
+    lines = ["time,north,heading", *(f"{k},{2 * k},0.1" for k in range(60))]
+    file = log_of(tmp_path, [*lines[:20], "# zigzag", *lines[20:40], lines[0], *lines[40:]])
+    sniffed = recognise_log(file)
+    assert sniffed.form["ragged"] == "drop"
+    assert sniffed.notes == (
+        "2 lines repeat the header or have another number of cells, the first is line 21: left out",
+    )
+    np.testing.assert_array_equal(sniffed.t, np.arange(60.0))
+    with pytest.raises(DataError, match="repeats the header: remove the line") as caught:
+        read_log_table(log_of(tmp_path, [*lines[:40], lines[0], *lines[40:]]), TextFormat(), "time")
+    assert caught.value.path == "line 41"
+
+
 @pytest.mark.parametrize(
     ("above", "names"),
     [
@@ -162,6 +177,25 @@ def test_names_in_several_lines(above: str, names: list[str] | None, tmp_path: P
     assert sniffed.form.get("names") == names
     assert [sniffed.clock["from"], *sniffed.columns] == (names or ["time", "North", "Heading"])
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+@pytest.mark.parametrize(
+    "below", [[["Summary"], ["mean", "4.5"]], [["run", "start", "end"], ["1", "0", "300"], ["2", "300", "600"]]]
+)
+@pytest.mark.parametrize("kind", ["csv", "xlsx"])
+def test_a_table_below_the_log_is_named_with_its_line(below: list[list[str]], kind: str, tmp_path: Path) -> None:
+    """Before, the remedy was to remove a line, with the number of a row that no editor shows."""
+    log = [line.split(",") for line in text().splitlines()]
+    frame = pd.DataFrame([[*row, "", "", ""][:3] for row in [*log, [], [], *below]])
+    file = tmp_path / f"log.{kind}"
+    if kind == "csv":
+        frame.to_csv(file, index=False, header=False)
+    else:
+        frame.to_excel(file, index=False, header=False)
+    place, other = ("line", "file") if kind == "csv" else ("row", "sheet")
+    begins = f"{place} {len(log) + 3}: another table begins below the log, with '{below[0][0]}': .* another {other}"
+    with pytest.raises(DataError, match=begins):
+        recognise_log(file)
 
 
 @pytest.mark.parametrize(
@@ -188,3 +222,24 @@ def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, di
     assert sniffed.form.items() >= {"decimal": decimal, "thousands": mark, "separator": separator}.items()
     np.testing.assert_allclose(sniffed.columns["N"], large)
     np.testing.assert_allclose(sniffed.columns["lat"], table["lat"])
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
+    """1,800 is 1.8 where nothing in the log says that it is 1800."""
+    table = TABLE.assign(time=TABLE["time"] + 1.0)
+    table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal, float_format="%.3f")
+    sniffed = recognise_log(tmp_path / "log.csv")
+    assert "thousands" not in sniffed.form
+    np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
+
+
+@pytest.mark.parametrize("more", ["", ",192"])
+def test_a_row_for_each_value_is_named(more: str, tmp_path: Path) -> None:
+    """As historians write: what the value is stands in a cell beside it."""
+    tags = ("GPS1.LAT", "GPS1.LON", "GYRO1.HDG", "STG.RUDDER")
+    rows = [f"2024-05-14 08:00:{t:02},{tag},{t + k / 7:.3f}{more}" for t in range(50) for k, tag in enumerate(tags)]
+    with pytest.raises(
+        DataError, match=r"a row for each value, called 'GPS1.LAT', 'GPS1.LON', .*: write a row for each"
+    ):
+        recognise_log(log_of(tmp_path, [f"Timestamp,Tag,Value{',Quality' * bool(more)}", *rows]))

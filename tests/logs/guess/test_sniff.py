@@ -97,6 +97,42 @@ def test_a_word_for_nothing_is_declared_as_a_missing_value(tmp_path: Path, word:
     assert all(np.flatnonzero(np.isnan(values)).tolist() == [40] for values in sniffed.columns.values())
 
 
+@pytest.mark.parametrize(("name", "value"), [("heading", 511), ("SOG [kn]", 102.3), ("lat", 91), ("Longitude", 181)])
+def test_what_ais_writes_for_nothing_is_a_missing_value(tmp_path: Path, name: str, value: float) -> None:
+    """Before, a speed over ground was taken for one with a factor of 0.64."""
+    held = [f"{12 + 5 * np.sin(k / 9):.1f}" if k % 20 else str(value) for k in range(80)]
+    sniffed = recognise_log(
+        log_of(tmp_path, [f"time,{name},rpm", *(f"{k},{one},{k % 3}" for k, one in enumerate(held))])
+    )
+    assert sniffed.form["missing"][-1] == str(value)
+    assert np.isnan(sniffed.columns[name]).sum() == 4
+
+
+@pytest.mark.parametrize(
+    ("value", "others", "row", "lost"),
+    [
+        ("4095", [7.201, 6.12], 3, True),  # a counter of 12 bits at its end
+        ("409.5", [*np.round(np.linspace(8.0, 12.0, 41), 1)], 3, True),
+        ("409.5", [*np.round(np.linspace(108.0, 312.0, 41), 1)], 3, False),
+        ("1023", [*np.round(np.linspace(0.0, 0.5, 41) ** 4, 4)], 3, True),  # a helm in rad, mostly amidships
+        ("80", [0.0], 3, False),  # a thruster that is switched on
+        ("80", [5.0], 3, False),
+        ("80", [*np.round(np.linspace(0.0, 5.0, 41), 1)], 79, False),  # once
+    ],
+)
+def test_a_number_far_beyond_all_others_again_and_again_is_a_missing_value(
+    value: str, others: list[float], row: int, lost: bool, tmp_path: Path
+) -> None:
+    rows = [
+        f"{k / 2},{k % 7},{value if k % 20 == row % 20 and k >= row else others[k % len(others)]}" for k in range(80)
+    ]
+    sniffed = recognise_log(log_of(tmp_path, ["time,psi,n", *rows]))
+    assert np.isnan(sniffed.columns["n"]).any() == lost
+    assert (value in sniffed.form.get("missing", [])) == lost
+    rows[9] = f"4.5,{value},{others[0]}"  # of another column it is a value
+    assert "missing" not in recognise_log(log_of(tmp_path, ["time,psi,n", *rows])).form
+
+
 @pytest.mark.parametrize(
     ("name", "values", "words"),
     [
@@ -137,6 +173,14 @@ def test_a_shaft_speed_of_99_rpm_is_no_missing_value(others: tuple[int, ...], tm
     assert sniffed.columns["rpm"].tolist() == speeds.tolist()
 
 
+@pytest.mark.parametrize("name", ["log.csv.xz", "log.zip"])
+def test_a_packed_log_is_named_as_one(name: str, tmp_path: Path) -> None:
+    TABLE.to_csv(tmp_path / name, index=False)
+    with pytest.raises(DataError, match=r"packed by|a ZIP archive") as caught:
+        recognise_log(tmp_path / name)
+    assert "unpack it" in caught.value.message
+
+
 @pytest.mark.parametrize(
     ("names", "columns"),
     [
@@ -160,3 +204,63 @@ def test_degrees_and_minutes_in_columns(
     if columns is not None:
         np.testing.assert_allclose(sniffed.columns[" + ".join(names)], -size)
         assert not set(names) & set(sniffed.columns)
+
+
+@pytest.mark.parametrize(
+    ("names", "made"),
+    [
+        (("Latitude", "Longitude"), {}),
+        (("Position",), {"Position latitude": ("Position",), "Position longitude": ("Position",)}),
+        (("Latitude", "remark"), {}),
+    ],
+)
+@pytest.mark.parametrize("nothing", ["", "---"])
+def test_positions_as_text(
+    names: tuple[str, ...], made: dict[str, tuple[str, ...]], nothing: str, tmp_path: Path
+) -> None:
+    degrees = -33.3 + 1e-4 * T
+    south = [f"{-one:.0f}°{-one % 1 * 60:.5f}'S" for one in degrees]
+    texts = [south, [f"010°{one % 1 * 60:.5f}'E" for one in degrees]]
+    texts = [[f"{one} {other}" for one, other in zip(*texts, strict=True)]] if len(names) == 1 else texts
+    texts[0][3] = nothing
+    TABLE.assign(**dict(zip(names, texts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
+    sniffed = recognise_log(tmp_path / "log.csv")
+    assert sniffed.in_parts == made
+    assert sniffed.sides == ({"S", "E"} if names[-1] != "remark" else {"S"})
+    latitude = sniffed.columns["Position latitude" if made else "Latitude"]
+    np.testing.assert_allclose(np.delete(latitude, 3), np.delete(degrees, 3), atol=1e-7)
+    assert np.isnan(latitude[3])
+    assert ("remark" in sniffed.words) == ("remark" in names)
+    assert not any("Latitude" in note or "Position" in note for note in sniffed.notes)
+
+
+@pytest.mark.parametrize("value", ["32767", "-999.25", "9.96921e+36", "327.67"])
+def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path) -> None:
+    """The largest number of an integer of 16 or 32 bits, perhaps in tenths, and what netCDF and well logs have."""
+    table = TABLE.assign(rudder=np.sin(T)).astype(object)
+    table.loc[4:7, "rudder"] = value
+    table.to_csv(tmp_path / "log.csv", index=False)
+    sniffed = recognise_log(tmp_path / "log.csv")
+    assert value in sniffed.form["missing"]
+    assert np.flatnonzero(np.isnan(sniffed.columns["rudder"])).tolist() == [4, 5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("name", "others", "asked"),
+    [
+        ("SOG", 5.0 + 0.1 * T, True),
+        ("SOG", np.floor(T), False),  # one knot astern
+        ("heading", 300.0 + T, True),
+        ("heading", 3.0 + T, False),
+        ("shaft rpm", 140.0 + T, True),
+        ("shaft rpm", T, False),
+        ("rudder", 5.0 + T, False),
+    ],
+)
+def test_minus_one_is_asked_where_nothing_else_is_negative(
+    name: str, others: np.ndarray, asked: bool, tmp_path: Path
+) -> None:
+    values = np.where(np.isin(np.arange(len(T)), (3, 11)), -1.0, others)
+    TABLE.drop(columns="psi").assign(**{name: values}).to_csv(tmp_path / "log.csv", index=False)
+    doubts = recognise_log(tmp_path / "log.csv").doubts
+    assert [doubt.partition(" and ")[0] for doubt in doubts] == [f"{name!r} is -1 in 2 rows"] * asked
