@@ -44,7 +44,7 @@ def test_an_unknown_argument_is_one_line(kind: Any) -> None:
         (Memory, {"error": True}, "Memory.error: True: must be a number"),
         (Memory, {"history": (2.0, -1.0)}, "Memory.history: -1.0: must be above 0"),
         (Identify, {"parameters": "hull.*"}, "Identify.parameters: 'hull.*': must be a list"),
-        (Family, {"name": "a", "perturb": [{"parameters": ["hull.*"]}]}, "Family.perturb.0: `parameters` and"),
+        (Family, {"name": "a", "perturb": [{"parameters": ["hull.*"]}]}, "Family.perturb.0: give `parameters`"),
         (
             Perturbation,
             {"parameters": ["hull.*"], "factor": "x"},

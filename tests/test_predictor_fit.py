@@ -439,7 +439,7 @@ def test_what_is_no_level_is_refused(predictor: Predictor, level: Any) -> None:
         ({"seed": -1}, "seed must be a whole number"),
         ({"seed": np.random.default_rng(0)}, "seed must be a whole number"),
         ({"refits": 1.5}, "refits must be a whole number"),
-        ({"method": PathDrawn}, r"method must be a Method, such as PathDrawn\(\), not the class PathDrawn"),
+        ({"method": PathDrawn}, r"method must be a Method, such as PathDrawn\(\), not <class"),
         ({"method": "path-drawn"}, "method must be a Method, such as PathDrawn\\(\\), not 'path-drawn'"),
         ({"physics": load_vessel("gunnerus-28.9")}, "physics must be a Physics, such as Physics.*, not Vessel"),
         ({"windows": WINDOWS.instants()}, "windows must be a Windows, as of `cut_windows`, not Instants"),

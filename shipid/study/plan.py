@@ -456,13 +456,13 @@ def _of_part(name: str, part: Plan, stored: Mapping[str, str] | None) -> Mapping
 def _changed_document(document: Document, changes: Mapping[str, Any], where: str, blocks: Collection[str]) -> Document:
     """A document with changes; DocumentError that names `where` and the path of a change that reaches nothing."""
     for path, value in changes.items():
-        head = path.split(".", 1)[0]
+        head = str(path).split(".", 1)[0]
         try:
             if head not in blocks:
                 raise DocumentError(f"no such block: {suggest_name(head, blocks)}")
             document = documents.replace_values(document, {path: value})
         except DocumentError as error:
-            raise DocumentError(error.message, path=where + path) from None
+            raise DocumentError(error.message, path=f"{where}{path}") from None
     return document
 
 
