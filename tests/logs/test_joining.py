@@ -103,6 +103,15 @@ def test_clocks_that_overlap_follow_each_other_unless_they_have_dates() -> None:
     assert joined(*dated)[0].frame["t"].min() == 1.7e9
 
 
+def test_a_clock_for_each_run_stays_one() -> None:
+    whole, _ = joined(recording(1, clock="run"), recording(2, ("c", "d")))
+    assert whole.metadata["clock"] == "run"
+    over = recording(2, ("c", "d"))
+    over = Dataset(over.frame.assign(t=over.frame.groupby("run").cumcount().astype(float)), over.metadata)
+    with pytest.raises(DataError, match="run 'd' shares moments"):
+        joined(recording(1, clock="run"), over)
+
+
 def test_what_not_all_have_is_left_out_and_said() -> None:
     windy = recording(2, ("c",), begin=900.0)
     windy = Dataset(windy.frame.assign(V_w=3.0, beta_w=1.0), windy.metadata)

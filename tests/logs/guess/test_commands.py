@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipid.logs.guess.clues import State
+from shipid.logs.guess.clues import LIKELY, State
 from shipid.logs.guess.commands import choose_commands, likely_unit
 from tests.logs.simulated import si_log, state_with_pose
 
@@ -118,6 +118,16 @@ def test_the_unit_of_a_shaft(name: str, values: np.ndarray, unit: str, asked: bo
     assert {finding.kind for finding in state.findings} == kinds
 
 
+@pytest.mark.parametrize("idle", [0.0, 0.01])
+@pytest.mark.parametrize("name", ["shaft [rpm]", "shaft speed"])
+def test_a_shaft_that_hardly_turns_for_most_of_the_log_keeps_its_unit(name: str, idle: float) -> None:
+    """A ship that drifts, coasts or is in port: her rpm were read as rev/s, 60 times too fast, or asked."""
+    state = chosen({"rudder": RUDDER, name: np.where(0.6 * T[-1] > T, idle * RPM, RPM)})
+    assert described(state)["propeller.n"][:2] == (name, "rpm")
+    assert not state.findings
+    assert not state.questions
+
+
 def test_a_shaft_that_counts_the_other_way_has_its_sign() -> None:
     """Before, the shaft of a left-handed screw ran astern while the ship went ahead, without a word."""
     state = chosen({"rudder": RUDDER, "rpm_port": RPM, "rpm_stbd": -RPM})
@@ -136,6 +146,36 @@ def test_a_unit_is_the_one_in_the_name_or_else_the_likely_one() -> None:
     assert [likely_unit(state, name, "delta") for name in state.columns] == ["deg", "rad", "rad"]
 
 
+def test_an_azimuth_that_jumps_at_a_whole_turn_is_one_about_zero() -> None:
+    state = chosen({"azimuth": -RUDDER % 360.0})
+    assert described(state) == {"thruster.alpha": ("azimuth", "deg", 1)}
+    assert state.suggestions[0].extra["wrap"]
+
+
+@pytest.mark.parametrize("name", ["n_bow", "bow thruster speed"])
+def test_the_unit_of_a_tunnel_thruster_is_that_of_the_shafts_and_asked(name: str) -> None:
+    state = chosen({"rudder": RUDDER, name: 13.0 * np.sin(T), "shaft speed": RPM})
+    assert described(state)["bow.n"] == (name, "rpm", 1)
+    assert described(state)["propeller.n"] == ("shaft speed", "rpm", 1)
+    assert [question.about for question in state.questions] == [("n",)]
+
+
+@pytest.mark.parametrize(
+    ("name", "top", "asked"),
+    [("Engine RPM", 1800, True), ("motor rpm port", 900, True), ("ME rpm", 110, False), ("shaft rpm", 1800, False)],
+)
+def test_a_fast_engine_is_asked_for_its_gear(name: str, top: float, asked: bool) -> None:
+    """Before, 1800 rpm of an engine were those of the shaft."""
+    state = chosen({name: top * (0.9 + 0.1 * np.sin(T))})
+    assert any("is there a gear? Write factor = 1 / its ratio" in one.sentence for one in state.questions) == asked
+
+
+@pytest.mark.parametrize("name", ["engineRPM", "propellerpm", "MERPM"])
+def test_turns_of_an_engine_are_not_electrical(name: str) -> None:
+    state = chosen({name: 400 + 50 * np.sin(T)})
+    assert not any("poles" in question.sentence for question in state.questions)
+
+
 @pytest.mark.parametrize(
     ("name", "factor"),
     [
@@ -150,3 +190,16 @@ def test_a_rudder_that_is_no_angle_is_asked_for_its_largest_angle(name: str, fac
     """Before, per mille, per cent and pulses were degrees without a word: an angle 2.9 or 29 times too large."""
     state = chosen({name: factor * RUDDER})
     assert any("angle" in question.sentence for question in state.questions)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "column"),
+    [("Rudder [mV]", 100.0 * RUDDER, "rudder.delta"), ("Shaft [counts]", 100.0 * N, "propeller.n")],
+)
+def test_a_unit_that_is_not_known_is_asked(name: str, values: np.ndarray, column: str) -> None:
+    state = chosen({name: values})
+    (found,) = (one for one in state.suggestions if one.name == column)
+    assert found.confidence < LIKELY
+    assert [one.sentence.partition(":")[0] for one in state.questions if name in one.sentence] == [
+        f"{name!r} says {name.partition('[')[2][:-1]!r}, no unit that is known here"
+    ]
