@@ -178,29 +178,28 @@ def replay_summary(played: Replay) -> list[SummaryLine]:
 
 
 def _errors_ahead(played: Replay) -> list[str]:
-    """Lines of a table: errors [m] at some moments ahead, and with a band its median half axes there."""
+    """Lines of a table: errors [m] at some moments ahead, and with a band its median half axes [m] there.
+
+    A band that is wider than a ship can go in that time has none.
+    """
     points = played.points.merge(played.instants[["run", "t", "outside"]], on=["run", "t"])
-    head = "error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"
-    lines = [head if played.band is None else f"{head}   band along   across"]
-    for moment in points["ahead"].quantile(MOMENTS_OF_SUMMARY, interpolation="nearest").unique():
-        here = points[points["ahead"].eq(moment)]
-        error, alarmed = here["error"], here["error"][here["outside"]]
-        if error.notna().any():
-            median, most, worst, inside = map(
-                _metres, (error.median(), error.quantile(0.9), error.max(), alarmed.median())
-            )
-            line = f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}"
-            if played.band is not None:
-                axes = here[["band_along", "band_across"]].median()
-                axes[axes > SPEED_LIMIT * moment] = np.nan
-                line += " {:>19} {:>8}".format(*map(_metres, axes))
-            lines.append(line)
-    return lines
-
-
-def _metres(value: float) -> str:
-    """A length [m]; "-" for none, as for a band that is wider than a ship can go in that time."""
-    return "-" if np.isnan(value) else length_text(value)
+    moments = points["ahead"].quantile(MOMENTS_OF_SUMMARY, interpolation="nearest")
+    points = points[points["ahead"].isin(moments) & points["error"].notna()]
+    by_moment = points.groupby("ahead")
+    columns = {
+        "median": by_moment["error"].median(),
+        "90 %": by_moment["error"].quantile(0.9),
+        "worst": by_moment["error"].max(),
+        "in alarm": points[points["outside"]].groupby("ahead")["error"].median(),
+    }
+    if played.band is not None:
+        for name in ("along", "across"):
+            half = by_moment[f"band_{name}"].median()
+            columns[f"band {name}"] = half[half <= SPEED_LIMIT * half.index]
+    table = pd.DataFrame(columns).rename_axis("s ahead").reset_index()
+    formats = {"s ahead": "{:g}".format} | dict.fromkeys(columns, length_text)
+    text = table.to_string(index=False, col_space=11, na_rep="-", formatters=formats)
+    return ["error where the log goes on, and band [m]:", *text.splitlines()]
 
 
 def _band_in_words(played: Replay, band: BandSettings) -> str:

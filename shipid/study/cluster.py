@@ -142,7 +142,7 @@ def _results(
     left: dict[str, tuple[Task, Any]] = {}
     killed: list[str] = []
     mistake: Exception | None = None
-    given, lonely = None, False
+    lonely = False
     try:
         given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         for key, task in tasks:
@@ -173,9 +173,7 @@ def _results(
                 yield task, results
                 del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
-        if given is not None and given.status == "error":  # the work was refused, and all that needs it with it
-            raise ShipidError(_unread(given)) from None
-        raise ShipidError(f"the Dask scheduler is gone; {KEPT}") from None
+        raise ShipidError(f"the Dask scheduler is gone, or cannot read the work: {REMEDY}; {KEPT}") from None
     if mistake is not None:
         raise mistake
     if killed:
@@ -185,14 +183,6 @@ def _results(
 
 def _return_shared(shared: Shared) -> Shared:
     return shared
-
-
-def _unread(given: Any) -> str:
-    """Why what is shared could not be sent, in one line: the scheduler unpacks it, and may lack a module."""
-    error = given.exception(timeout=SILENT)
-    while error.__cause__ is not None:
-        error = error.__cause__
-    return f"the Dask scheduler cannot read the work ({str(error).splitlines()[0]}): {REMEDY}"
 
 
 def _has_no_workers(client: Any, before: bool) -> bool:

@@ -134,8 +134,6 @@ def _rows_of_block(
 def _equal_lags(base: Vessel, values: Array) -> list[Array]:
     """Members in groups whose actuators lag alike: equal hidden states at the start of a window."""
     lags = [place for place, path in enumerate(base.parameters) if ".actuator." in path]
-    if not lags:
-        return [np.arange(len(values))]
     _, group = np.unique(values[:, lags], axis=0, return_inverse=True)
     return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
 
@@ -149,12 +147,9 @@ def join_blocks(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 def accuracy_quantiles(frame: pd.DataFrame) -> pd.DataFrame:
     """A row per family: members, how many diverged, and quantiles of A [m] over the others."""
-    rows = []
-    for name, part in frame.groupby("family", sort=False):
-        A = part["A"].dropna()
-        row = {"family": name, "members": len(part), "diverged": len(part) - len(A)}
-        rows.append(row | {share: A.quantile(share) for share in QUANTILES_OF_A})
-    return pd.DataFrame(rows)
+    A = frame.groupby("family", sort=False)["A"]
+    counts = {"members": A.size(), "diverged": A.size() - A.count()}
+    return pd.DataFrame(counts | {share: A.quantile(share) for share in QUANTILES_OF_A}).reset_index()
 
 
 def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:

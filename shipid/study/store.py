@@ -52,8 +52,9 @@ PREFIXES = {
 ENTRIES: dict[str, type] = {
     **dict.fromkeys(("digest", "name", "file"), str),
     **dict.fromkeys(("sources", "changes"), dict),
+    **dict.fromkeys(("sessions", "notes"), list),
+    "wall_seconds": float,
 }
-ENTRIES |= {**dict.fromkeys(("sessions", "notes"), list), "wall_seconds": float}
 """Kinds of the entries of the provenance; a run has more of them."""
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
