@@ -34,15 +34,13 @@ ORDERS_UNKNOWN = "later orders were not known as they were in calibration"
 class Replay:
     """What would have been seen at sea.
 
-    instants : a row for each prediction: run, t, outside (the alarm), latency [s], and the error at the end of the
-        horizon [m]. With a band also factor, by which it was wider than calibrated, and reach, the greatest error of
-        the whole path over the band as calibrated; not a number where the log ends before.
-    points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m] where
-        the log goes on. With a band also band_along, band_across [m], band_course [rad, clockwise from north].
-    track : run, t [s], north, east [m] as measured.
-    skipped : instants at which a prediction was due before there was a past.
-    plan : whether orders were taken as held where the predictor knows a plan.
-    limits : what limits the comparison, in words. band : what was asked of the band; None: none was asked.
+    instants : a row for each prediction: run, t, outside (the alarm), latency [s], error at the end of the horizon [m];
+        with a band factor, by which it was wider than calibrated, and reach, the greatest error of the whole path over
+        the band as calibrated (not a number where the log ends before).
+    points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m];
+        with a band band_along, band_across [m], band_course [rad, clockwise from north].
+    track : run, t [s], north, east [m] as measured. skipped : instants that were due before there was a past.
+    plan : whether orders were taken as held where the predictor knows a plan. limits : of the comparison, in words.
     """
 
     instants: pd.DataFrame
@@ -66,10 +64,8 @@ def play_aboard(
 ) -> Replay:
     """Predict at every instant of a log from the rows up to then; the rows after it only judge.
 
-    every : seconds between predictions; default the step of the predictor. An instant is a row. A predictor that takes
-    known commands is given the present orders as the plan: at sea the log's later orders are not known.
-    level : share of whole paths that the band is to hold. kind : of the manoeuvre. rate : with one, the band adapts
-    along each unbroken stretch by the paths that have ended by then.
+    every : seconds between predictions; default the step of the predictor.
+    level : share of whole paths that the band is to hold. kind : of the manoeuvre. rate : with one, the band adapts.
 
     Raises DataError where a command is missing, no run is as long as the past that is needed, or no band of the level
     can be promised.

@@ -89,19 +89,13 @@ def on_dask(
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks and what `work(shared, task, line)` makes of them, in the order in which they finish.
 
-    A task whose worker dies is done by another one. While there is no worker at all it waits for one, and says so.
+    A task whose worker dies is done by another one; while there is no worker at all it waits for one.
 
-    Parameters
-    ----------
-    scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
-    shared : sent once to each worker. tasks : with a key each. name : of the whole work; beside it the keys name this
-        client, since a scheduler computes a key once for all its clients.
+    shared : sent once to each worker. tasks : with a key each. name : of the whole work.
     receive : called in this thread with the key of a task and each message that it sends by its line.
 
-    Raises
-    ------
-    ShipidError : the scheduler does not answer, or dies; a task has killed worker after worker. All other tasks are
-        done before that. What `work` raises is raised here.
+    Raises ShipidError where the scheduler does not answer, and, when all others are done, for a task that has killed
+    worker after worker. What `work` raises is raised here.
     """
     try:
         import dask
@@ -121,8 +115,6 @@ def on_dask(
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
         try:
             yield from _results(client, work, shared, tasks, f"shipid-{name}-{client.id}", receive)
-        except ShipidError as error:
-            raise ShipidError(error.message, file=error.file, path=error.path or f"--scheduler {scheduler}") from error
         finally:
             with suppress(Exception):  # a client whose scheduler is gone complains in many ways
                 client.close(timeout=2)

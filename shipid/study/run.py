@@ -1,7 +1,6 @@
 """The way of a study: document -> plan -> dataset -> windows -> foundation -> method -> cell -> stored evidence.
 
-`read_plan` makes a plan of a document. The arrows from there to what is stored are the calls in `_run_one`, and those
-within a unit of work the calls in `run_unit`. Results are stored as they come, so that an interrupted run resumes.
+`_run_one` has the calls from a plan to what is stored, `run_unit` those within a unit of work.
 """
 
 from __future__ import annotations
@@ -75,19 +74,15 @@ def run_study(
 ) -> Generator[Event, None, None]:
     """Run what is not finished yet of a plan and store it in the folder; yields events.
 
-    Numbers do not depend on the workers or on interruptions: an interrupted unit of work is done again, its searches go
-    on from their journal. One process at a time writes into a folder.
+    Numbers do not depend on the workers or on interruptions.
 
-    Parameters
-    ----------
-    workers : local processes, one thread each; default: one per core, no more than units of work.
+    workers : local processes, one thread each; default: one per core.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
     device : PyTorch device of rollouts and training.
     shard : (i, n), i from 1: every n-th unit of the plan from the i-th on, into `shards/i-of-n` of a folder that
         `prepare_study` has made. The next run without a shard takes it in.
 
-    Raises ShipidError before any work for a plan that is none, for a number of workers below 1, and where another
-    process works in the folder; later where workers lack the code that a user wrote, such as that of a notebook.
+    Raises ShipidError where another process works in the folder, and where workers lack code that a user wrote.
     """
     check_class("plan", plan, Plan, "as of `read_plan`")
     folder = as_path("folder", folder)

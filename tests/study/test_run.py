@@ -330,7 +330,7 @@ def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "photos"
     folder.mkdir()
     (folder / "cat.jpg").write_bytes(b"")
-    with pytest.raises(ResultError, match="holds no run of shipid"):
+    with pytest.raises(ResultError, match=r"cannot be made \(Directory not empty\): choose another"):
         next(run_study(tiny_plan(tmp_path), folder))
     with pytest.raises(ResultError, match="cannot be made"):
         next(run_study(tiny_plan(tmp_path), folder / "cat.jpg" / "run"))
@@ -351,8 +351,8 @@ def _half(content: bytes) -> bytes:
 
 DAMAGES = {
     "no study": (lambda folder: (folder / "study.toml").unlink(), "holds no study.toml"),
-    "study is no TOML": (_damage(lambda _: b"[[", "study.toml"), "damaged"),
-    "study is no text": (_damage(lambda _: b"\xff\xfe", "study.toml"), "damaged"),
+    "study is no TOML": (_damage(lambda _: b"[[", "study.toml"), "not valid TOML"),
+    "study is no text": (_damage(lambda _: b"\xff\xfe", "study.toml"), "not UTF-8 text"),
     "study was edited": (_damage(lambda text: text.replace(b"seed = 3", b"seed = 4"), "study.toml"), "changed by hand"),
     "no provenance": (lambda folder: (folder / "provenance.json").unlink(), "is this the folder of a run"),
     "half a provenance": (_damage(_half, "provenance.json"), "damaged"),
