@@ -200,20 +200,18 @@ def _errors_ahead(played: Replay) -> list[str]:
 
 def _band_in_words(played: Replay, band: BandSettings) -> str:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
-    instants = played.instants[played.instants["reach"].notna()]
-    held, promised = (instants["reach"] <= instants["factor"]).to_numpy(), ~instants["outside"].to_numpy(dtype=bool)
-    if not len(held):
+    judged = played.instants[played.instants["reach"].notna()]
+    if judged.empty:
         return f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"
+    held, promised = (judged["reach"] <= judged["factor"]).to_numpy(), ~judged["outside"].to_numpy(dtype=bool)
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
-    adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {instants['factor'].max():.2f} times"
-    inside = "all in alarm, where nothing is promised"
-    if promised.any():
-        inside = f"{percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
-    line = (
-        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held.mean())} of the {len(held)} whole "
-        f"paths that can be judged, {inside}"
-    )
-    if promised.any() and share_interval(held[promised], instants["run"].to_numpy()[promised])[1] < band.level:
+    adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {judged['factor'].max():.2f} times"
+    share = f"it held {percent_text(held.mean())} of the {len(held)} whole paths that can be judged"
+    line = f"band of {level_text(band.level)}{of}{adapts}: {share}"
+    if not promised.any():
+        return f"{line}, all in alarm, where nothing is promised"
+    line += f", {percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
+    if share_interval(held[promised], judged["run"].to_numpy()[promised])[1] < band.level:
         why = f"{ORDERS_UNKNOWN}, or {SHIP_CHANGED}" if played.plan else SHIP_CHANGED
         line += f"; that is fewer than {level_text(band.level)} by more than chance: {why}"
     return line
