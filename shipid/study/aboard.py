@@ -34,15 +34,13 @@ ORDERS_UNKNOWN = "later orders were not known as they were in calibration"
 class Replay:
     """What would have been seen at sea.
 
-    instants : a row for each prediction: run, t, outside (the alarm), latency [s], and the error at the end of the
-        horizon [m]. With a band also factor, by which it was wider than calibrated, and reach, the greatest error of
-        the whole path over the band as calibrated; not a number where the log ends before.
-    points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m] where
-        the log goes on. With a band also band_along, band_across [m], band_course [rad, clockwise from north].
-    track : run, t [s], north, east [m] as measured.
-    skipped : instants at which a prediction was due before there was a past.
-    plan : whether orders were taken as held where the predictor knows a plan.
-    limits : what limits the comparison, in words. band : what was asked of the band; None: none was asked.
+    instants : a row for each prediction: run, t, outside (the alarm), latency [s], error at the end of the horizon [m];
+        with a band factor, by which it was wider than calibrated, and reach, the greatest error of the whole path over
+        the band as calibrated (not a number where the log ends before).
+    points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m];
+        with a band band_along, band_across [m], band_course [rad, clockwise from north].
+    track : run, t [s], north, east [m] as measured. skipped : instants that were due before there was a past.
+    plan : whether orders were taken as held where the predictor knows a plan. limits : of the comparison, in words.
     """
 
     instants: pd.DataFrame
@@ -66,10 +64,8 @@ def play_aboard(
 ) -> Replay:
     """Predict at every instant of a log from the rows up to then; the rows after it only judge.
 
-    every : seconds between predictions; default the step of the predictor. An instant is a row. A predictor that takes
-    known commands is given the present orders as the plan: at sea the log's later orders are not known.
-    level : share of whole paths that the band is to hold. kind : of the manoeuvre. rate : with one, the band adapts
-    along each unbroken stretch by the paths that have ended by then.
+    every : seconds between predictions; default the step of the predictor.
+    level : share of whole paths that the band is to hold. kind : of the manoeuvre. rate : with one, the band adapts.
 
     Raises DataError where a command is missing, no run is as long as the past that is needed, or no band of the level
     can be promised.
@@ -178,47 +174,44 @@ def replay_summary(played: Replay) -> list[SummaryLine]:
 
 
 def _errors_ahead(played: Replay) -> list[str]:
-    """Lines of a table: errors [m] at some moments ahead, and with a band its median half axes there."""
+    """Lines of a table: errors [m] at some moments ahead, and with a band its median half axes [m] there.
+
+    A band that is wider than a ship can go in that time has none.
+    """
     points = played.points.merge(played.instants[["run", "t", "outside"]], on=["run", "t"])
-    head = "error where the log goes on [m]:  ahead   median   90 %   worst   median in alarm"
-    lines = [head if played.band is None else f"{head}   band along   across"]
-    for moment in points["ahead"].quantile(MOMENTS_OF_SUMMARY, interpolation="nearest").unique():
-        here = points[points["ahead"].eq(moment)]
-        error, alarmed = here["error"], here["error"][here["outside"]]
-        if error.notna().any():
-            median, most, worst, inside = map(
-                _metres, (error.median(), error.quantile(0.9), error.max(), alarmed.median())
-            )
-            line = f"{moment:>36g} s {median:>8} {most:>6} {worst:>7} {inside:>10}"
-            if played.band is not None:
-                axes = here[["band_along", "band_across"]].median()
-                axes[axes > SPEED_LIMIT * moment] = np.nan
-                line += " {:>19} {:>8}".format(*map(_metres, axes))
-            lines.append(line)
-    return lines
-
-
-def _metres(value: float) -> str:
-    """A length [m]; "-" for none, as for a band that is wider than a ship can go in that time."""
-    return "-" if np.isnan(value) else length_text(value)
+    moments = points["ahead"].quantile(MOMENTS_OF_SUMMARY, interpolation="nearest")
+    points = points[points["ahead"].isin(moments) & points["error"].notna()]
+    by_moment = points.groupby("ahead")
+    columns = {
+        "median": by_moment["error"].median(),
+        "90 %": by_moment["error"].quantile(0.9),
+        "worst": by_moment["error"].max(),
+        "in alarm": points[points["outside"]].groupby("ahead")["error"].median(),
+    }
+    if played.band is not None:
+        for name in ("along", "across"):
+            half = by_moment[f"band_{name}"].median()
+            columns[f"band {name}"] = half[half <= SPEED_LIMIT * half.index]
+    table = pd.DataFrame(columns).rename_axis("s ahead").reset_index()
+    formats = {"s ahead": "{:g}".format} | dict.fromkeys(columns, length_text)
+    text = table.to_string(index=False, col_space=11, na_rep="-", formatters=formats)
+    return ["error where the log goes on, and band [m]:", *text.splitlines()]
 
 
 def _band_in_words(played: Replay, band: BandSettings) -> str:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
-    instants = played.instants[played.instants["reach"].notna()]
-    held, promised = (instants["reach"] <= instants["factor"]).to_numpy(), ~instants["outside"].to_numpy(dtype=bool)
-    if not len(held):
+    judged = played.instants[played.instants["reach"].notna()]
+    if judged.empty:
         return f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"
+    held, promised = (judged["reach"] <= judged["factor"]).to_numpy(), ~judged["outside"].to_numpy(dtype=bool)
     of = "" if band.kind is None else f" of the kind {band.kind!r}"
-    adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {instants['factor'].max():.2f} times"
-    inside = "all in alarm, where nothing is promised"
-    if promised.any():
-        inside = f"{percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
-    line = (
-        f"band of {level_text(band.level)}{of}{adapts}: it held {percent_text(held.mean())} of the {len(held)} whole "
-        f"paths that can be judged, {inside}"
-    )
-    if promised.any() and share_interval(held[promised], instants["run"].to_numpy()[promised])[1] < band.level:
+    adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {judged['factor'].max():.2f} times"
+    share = f"it held {percent_text(held.mean())} of the {len(held)} whole paths that can be judged"
+    line = f"band of {level_text(band.level)}{of}{adapts}: {share}"
+    if not promised.any():
+        return f"{line}, all in alarm, where nothing is promised"
+    line += f", {percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
+    if share_interval(held[promised], judged["run"].to_numpy()[promised])[1] < band.level:
         why = f"{ORDERS_UNKNOWN}, or {SHIP_CHANGED}" if played.plan else SHIP_CHANGED
         line += f"; that is fewer than {level_text(band.level)} by more than chance: {why}"
     return line

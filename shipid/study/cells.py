@@ -93,10 +93,9 @@ def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None
 
 
 def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -> Errors:
-    """(Foundation, method) -> errors (T, S, 2) [m] by cells fitted without these runs, and seconds that they took.
+    """(Foundation, method) -> errors (T, S, 2) [m] by `bands.refits` cells fitted without these runs, and seconds.
 
-    Of the pairs that have no such errors for nothing: methods that learn step by step, and foundations fitted to the
-    runs of the batch. None of them unless the study has `bands.refits`.
+    Of methods that learn step by step, and foundations fitted to the runs of the batch: others have them for nothing.
     """
     prepared, batch, windows = work.prepared, work.batch, work.windows
     adapted = {one.name for one in prepared.foundations if one.fitted}

@@ -89,19 +89,13 @@ def on_dask(
 ) -> Iterator[tuple[Task, Result]]:
     """Tasks and what `work(shared, task, line)` makes of them, in the order in which they finish.
 
-    A task whose worker dies is done by another one. While there is no worker at all it waits for one, and says so.
+    A task whose worker dies is done by another one; while there is no worker at all it waits for one.
 
-    Parameters
-    ----------
-    scheduler : address of a Dask scheduler, such as `tcp://host:8786`.
-    shared : sent once to each worker. tasks : with a key each. name : of the whole work; beside it the keys name this
-        client, since a scheduler computes a key once for all its clients.
+    shared : sent once to each worker. tasks : with a key each. name : of the whole work.
     receive : called in this thread with the key of a task and each message that it sends by its line.
 
-    Raises
-    ------
-    ShipidError : the scheduler does not answer, or dies; a task has killed worker after worker. All other tasks are
-        done before that. What `work` raises is raised here.
+    Raises ShipidError where the scheduler does not answer, and, when all others are done, for a task that has killed
+    worker after worker. What `work` raises is raised here.
     """
     try:
         import dask
@@ -121,8 +115,6 @@ def on_dask(
             raise ShipidError(f"no Dask scheduler answers there ({error})", path=f"--scheduler {scheduler}") from None
         try:
             yield from _results(client, work, shared, tasks, f"shipid-{name}-{client.id}", receive)
-        except ShipidError as error:
-            raise ShipidError(error.message, file=error.file, path=error.path or f"--scheduler {scheduler}") from error
         finally:
             with suppress(Exception):  # a client whose scheduler is gone complains in many ways
                 client.close(timeout=2)
@@ -142,7 +134,7 @@ def _results(
     left: dict[str, tuple[Task, Any]] = {}
     killed: list[str] = []
     mistake: Exception | None = None
-    given, lonely = None, False
+    lonely = False
     try:
         given = client.submit(_return_shared, shared, key=f"{name}-shared", pure=False)  # made again if its worker dies
         for key, task in tasks:
@@ -173,9 +165,7 @@ def _results(
                 yield task, results
                 del future, results  # a worker may forget them
     except (OSError, TimeoutError, CancelledError):
-        if given is not None and given.status == "error":  # the work was refused, and all that needs it with it
-            raise ShipidError(_unread(given)) from None
-        raise ShipidError(f"the Dask scheduler is gone; {KEPT}") from None
+        raise ShipidError(f"the Dask scheduler is gone, or cannot read the work: {REMEDY}; {KEPT}") from None
     if mistake is not None:
         raise mistake
     if killed:
@@ -185,14 +175,6 @@ def _results(
 
 def _return_shared(shared: Shared) -> Shared:
     return shared
-
-
-def _unread(given: Any) -> str:
-    """Why what is shared could not be sent, in one line: the scheduler unpacks it, and may lack a module."""
-    error = given.exception(timeout=SILENT)
-    while error.__cause__ is not None:
-        error = error.__cause__
-    return f"the Dask scheduler cannot read the work ({str(error).splitlines()[0]}): {REMEDY}"
 
 
 def _has_no_workers(client: Any, before: bool) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
-from math import inf
 from pathlib import Path
 
 from shipid.study import seals
@@ -15,34 +14,26 @@ BEGUN, COUNTED, TRIED = 0, 2, 4  # entries of Optuna's journal: a study, an attr
 
 
 def search_words(plan: Plan, folder: Path) -> str:
-    """The search of a run, or of its parts, that was written to last, in a few words; empty where there is none."""
+    """Cell and trial of the search of a run, or of its parts, that was written to last; empty where there is none."""
     places = [part_folder(folder, name) for name in plan.parts] or [folder]
     journals = [
         file for place in places for file in (place / JOURNALS).glob("*.log") if not seals.is_sealed(place, file.stem)
     ]
-    with suppress(OSError, ValueError):  # taken away, or there is none
+    with suppress(OSError, ValueError, KeyError, IndexError, TypeError):  # taken away, damaged, or there is none
         return _words_of_journal(plan, max(journals, key=lambda file: file.stat().st_mtime))
     return ""
 
 
 def _words_of_journal(plan: Plan, file: Path) -> str:
-    """Cell, number of the trial and best value [m rms] of the last search of a journal."""
-    cells, cell = [], ""
-    counts: dict[str, int | None] = {}
-    values: dict[str, list[float]] = {}
-    for line in file.read_bytes().splitlines():
-        with suppress(ValueError, KeyError, IndexError, TypeError, AttributeError):  # half a line, or of someone else
-            entry = json.loads(line)
-            if entry["op_code"] == BEGUN:
-                cells.append(entry["study_name"])
-            elif entry["op_code"] == COUNTED and "trials" in entry["user_attr"]:
-                counts[cells[entry["study_id"]]] = entry["user_attr"]["trials"]
-            elif entry["op_code"] == TRIED:
-                cell = cells[entry["study_id"]]
-                values.setdefault(cell, []).append(inf if entry["value"] is None else entry["value"])
-    if not cell:
-        return ""
-    planned = next((way.method.num_trials() for way in plan.methods if f"{WITH}{way.name}-N" in cell), None)
-    count, best = counts.get(cell, planned), min(values[cell])
-    of, reached = f"/{count}" if count else "", f", best so far {best**0.5:.3g} m rms" if best < inf else ""
-    return f"{cell}: trial {len(values[cell])}{of}{reached}"
+    *whole, _ = file.read_bytes().split(b"\n")  # the last line may be half written
+    entries = [json.loads(line) for line in whole]
+    tried = [entry["study_id"] for entry in entries if entry["op_code"] == TRIED]
+    cell = [entry["study_name"] for entry in entries if entry["op_code"] == BEGUN][tried[-1]]
+    planned = [way.method.num_trials() for way in plan.methods if f"{WITH}{way.name}-N" in cell]
+    noted = [
+        entry["user_attr"]["trials"]  # of a budget
+        for entry in entries
+        if entry["op_code"] == COUNTED and entry["study_id"] == tried[-1] and "trials" in entry["user_attr"]
+    ]
+    counts = [f"/{count}" for count in (*planned, *noted) if count]
+    return f"{cell}: trial {tried.count(tried[-1])}{''.join(counts[-1:])}"

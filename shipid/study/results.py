@@ -124,12 +124,12 @@ class Results:
 
 
 def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
-    """Read one row per finished cell of a run, without its predictors: the quick way from a folder to a table.
+    """Read one row per finished cell of a run, without its predictors.
 
     Columns: cell, foundation, family, member, method, model (foundation, with the method where several learn), N_D,
     runs, minutes [min], seed, status, sentence, A, A_90, A_rms, H, H_90, rms, width [m], coverage [1], seconds [s],
-    trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError for a folder
-    without a finished cell, and where a row is not as it was written.
+    trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError where there is no
+    finished cell, or a row is not as it was written.
     """
     folder = as_path("folder", folder)
     plan = store.stored_plan(folder)

@@ -1,7 +1,6 @@
 """The way of a study: document -> plan -> dataset -> windows -> foundation -> method -> cell -> stored evidence.
 
-`read_plan` makes a plan of a document. The arrows from there to what is stored are the calls in `_run_one`, and those
-within a unit of work the calls in `run_unit`. Results are stored as they come, so that an interrupted run resumes.
+`_run_one` has the calls from a plan to what is stored, `run_unit` those within a unit of work.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from shipid.arguments import as_path, check_class, check_whole_number
 from shipid.capacity import usable_cores
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.engine.engines import check_device
-from shipid.engine.native import engine_description, noted_engine
+from shipid.engine.native import engine_description
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads
 from shipid.hybrid.journal import Journal
@@ -32,7 +31,7 @@ from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import Plan, Unit, own_code
 from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
-from shipid.study.sessions import Code, Sessions, code_at_worker, machine, session_on
+from shipid.study.sessions import Code, code_at_worker, machine, note_sessions, session_by_now, session_on
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
 
@@ -75,19 +74,15 @@ def run_study(
 ) -> Generator[Event, None, None]:
     """Run what is not finished yet of a plan and store it in the folder; yields events.
 
-    Numbers do not depend on the workers or on interruptions: an interrupted unit of work is done again, its searches go
-    on from their journal. One process at a time writes into a folder.
+    Numbers do not depend on the workers or on interruptions.
 
-    Parameters
-    ----------
-    workers : local processes, one thread each; default: one per core, no more than units of work.
+    workers : local processes, one thread each; default: one per core.
     scheduler : address of a Dask scheduler to use instead, such as `tcp://host:8786`.
     device : PyTorch device of rollouts and training.
     shard : (i, n), i from 1: every n-th unit of the plan from the i-th on, into `shards/i-of-n` of a folder that
         `prepare_study` has made. The next run without a shard takes it in.
 
-    Raises ShipidError before any work for a plan that is none, for a number of workers below 1, and where another
-    process works in the folder; later where workers lack the code that a user wrote, such as that of a notebook.
+    Raises ShipidError where another process works in the folder, and where workers lack code that a user wrote.
     """
     check_class("plan", plan, Plan, "as of `read_plan`")
     folder = as_path("folder", folder)
@@ -106,36 +101,36 @@ def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "
         for name, part in plan.parts.items():
             yield from prepare_study(part.plan, store.check_part(folder, name, part.plan), device=device)
         if not plan.parts:
-            sessions = Sessions(folder, session_on(device, own_code(plan)))
-            sessions.note(sessions.now)
-            yield from _prepare_folder(plan, folder, sessions, device)
+            begun = session_on(device, own_code(plan))
+            store.note_session(folder, begun)
+            yield from _prepare_folder(plan, folder, folder, begun)
     yield Event("end", text=str(folder))
 
 
 def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     """Run a study of one part, or a shard of it, alone in its folder."""
-    begun, shard = time.perf_counter(), means.shard
+    start, shard = time.perf_counter(), means.shard
     place = folder if shard is None else shard_folder(folder, shard)
     if shard is not None:
         check_prepared(folder, plan, (DATA, COMMON))
     with store.open_folder(place, plan):
         for words in (*seals.unseal_missing(place), *(take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
-        sessions = Sessions(place, session_on(means.device, own_code(plan)))
-        if changed := sessions.note(sessions.now):
+        begun = session_on(means.device, own_code(plan))
+        if changed := store.note_session(place, begun):
             yield Event("note", f"earlier results were computed otherwise: {'; '.join(changed)}")
-        prepared = yield from _prepare_folder(plan, folder, sessions, means.device)
+        prepared = yield from _prepare_folder(plan, folder, place, begun)
         mine, left = _units(plan, folder, shard)
         total, done = _cells(mine), _cells(mine) - _cells(left)
         yield Event("start", done=done, total=total)
-        for unit, results in _compute(plan, prepared, left, place, sessions, means):
+        for unit, results in _compute(plan, prepared, left, place, begun, means):
             store.check_place(place, plan.digest)
             store.write_unit(place, unit, results)
             for cell in results:
                 done += 1
                 yield Event("cell", done=done, total=total, row=cell.row)
         if shard is None:
-            _finish(plan, folder, prepared, means.device, begun)
+            _finish(plan, folder, prepared, means.device, start)
     yield Event("end", text=str(place), done=done, total=total)
 
 
@@ -152,29 +147,33 @@ def run_unit(
     return [evaluate_cell(work, pair, fitted, left_out, origin) for pair in unit.pairs]
 
 
-def _prepare_folder(plan: Plan, folder: Path, sessions: Sessions, device: str) -> Generator[Event, None, PreparedStudy]:
-    """Make what all units share, from the runs of a study, which are obtained where they are not stored."""
+def _prepare_folder(
+    plan: Plan, folder: Path, place: Path, begun: dict[str, Any]
+) -> Generator[Event, None, PreparedStudy]:
+    """Make what all units share, from the runs of a study, which are obtained where they are not stored.
+
+    place : the folder, or that of a shard, where the session is noted.
+    """
     if not seals.is_sealed(folder, DATA):
         yield Event("note", _obtaining_words(plan))
         dataset = obtain_runs(plan)
         store.check_place(folder, plan.digest)
-        sessions.note_engine(noted_engine())
+        note_sessions(place, session_by_now(begun))
         write_dataset(dataset, folder / store.DATASET)
         seals.write_seal(folder, DATA, [folder / store.DATASET])
     yield Event("note", "rolling out the foundations")
-    prepared = prepare(plan, read_dataset(folder / store.DATASET), device)
-    _write_common(plan, folder, prepared, sessions)
+    prepared = prepare(plan, read_dataset(folder / store.DATASET), begun["device"])
+    store.check_place(place, plan.digest)
+    note_sessions(place, session_by_now(begun))
+    if not seals.is_sealed(folder, COMMON):
+        _write_common(plan, folder, prepared)
     for note in prepared.notes:
         yield Event("note", note)
     return prepared
 
 
-def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy, sessions: Sessions) -> None:
+def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy) -> None:
     """Store what all batches share, so that a report needs nothing else."""
-    store.check_place(sessions.folder, plan.digest)
-    sessions.note_engine(noted_engine())
-    if seals.is_sealed(folder, COMMON):
-        return
     test, fixed = prepared.test, [one for one in prepared.foundations if not one.fitted]
     paths = {one.name: prepared.test_paths[one.name] for one in fixed}
     store.write_test(folder, test, paths, prepared.naive)
@@ -187,15 +186,15 @@ def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy, sessions: S
 
 
 def _compute(
-    plan: Plan, prepared: PreparedStudy, units: Iterable[Unit], place: Path, sessions: Sessions, means: Means
+    plan: Plan, prepared: PreparedStudy, units: Iterable[Unit], place: Path, begun: dict[str, Any], means: Means
 ) -> Computed:
     """Units and their results in the order in which they finish; what they were computed with is noted before."""
     journals = partial(open_journal, place.absolute() / store.JOURNALS, plan.digest)
     make_folder(place / store.JOURNALS)
     if means.scheduler is None:
-        work = partial(_on_pool, plan, prepared, journals, sessions.now)
-        for unit, (noted, results) in on_workers(work, units, means.workers or usable_cores()):
-            sessions.note_others(*noted)
+        work = partial(_on_pool, plan, prepared, journals, begun)
+        for unit, (session, results) in on_workers(work, units, means.workers or usable_cores()):
+            note_sessions(place, session)
             yield unit, results
         return
     writer, kept = cache(journals), {file.stem: file.read_bytes() for file in (place / store.JOURNALS).glob("*.log")}
@@ -206,7 +205,7 @@ def _compute(
 
     shared = plan, prepared, means.device, own_code(plan)
     for (unit, _), (noted, results) in on_dask(means.scheduler, _on_cluster, shared, tasks, plan.digest, write):
-        sessions.note_others(*noted)
+        note_sessions(place, *noted)
         yield unit, results
 
 
@@ -216,12 +215,12 @@ def open_journal(folder: Path, digest: str, unit: str) -> Journal:
 
 
 def _on_pool(
-    plan: Plan, prepared: PreparedStudy, journals: Callable[[str], Journal], now: dict[str, Any], unit: Unit
-) -> tuple[list[dict[str, Any]], list[store.Cell]]:
+    plan: Plan, prepared: PreparedStudy, journals: Callable[[str], Journal], begun: dict[str, Any], unit: Unit
+) -> tuple[dict[str, Any], list[store.Cell]]:
     """A unit on a worker of this machine: what it was computed with, and the results."""
-    session = {**now, **code_at_worker(plan, {})}
-    results = run_unit(plan, prepared, unit, now["device"], journals(unit.key))
-    return [{**session, "engine": noted_engine() or now["engine"]}], results
+    session = {**begun, **code_at_worker(plan, {})}
+    results = run_unit(plan, prepared, unit, begun["device"], journals(unit.key))
+    return session_by_now(session), results
 
 
 def _on_cluster(
@@ -236,13 +235,13 @@ def _on_cluster(
     return [session, {**session, "engine": engine_description()}], results
 
 
-def _finish(plan: Plan, folder: Path, prepared: PreparedStudy, device: str, begun: float) -> None:
+def _finish(plan: Plan, folder: Path, prepared: PreparedStudy, device: str, start: float) -> None:
     """Write what only the end of a run knows: the tables, and in the provenance notes, machine and time."""
     record = store.provenance(folder)
     if seals.is_sealed(folder, store.RESULTS) and record["wall_seconds"]:
         return
     record |= {"notes": list(prepared.notes), "machine": {**machine(), "device": device}}
-    record["wall_seconds"] += time.perf_counter() - begun
+    record["wall_seconds"] += time.perf_counter() - start
     write_json(folder / store.PROVENANCE, record)
     with sole_writer(folder, PAGES, wait=True):
         store.write_results(folder, plan, store.read_rows(folder, plan))

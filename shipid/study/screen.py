@@ -1,7 +1,6 @@
 """Screening: how accurate each of many members of a family is on every window, before any training is paid for.
 
-Nothing that grows with the members is kept but their rows: they run in blocks, and their errors are summed and tallied
-on the way.
+Members run in blocks, and their errors are summed and tallied on the way.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import kendalltau
 
-from shipid.arguments import check_choice, check_class, check_whole_number
+from shipid.arguments import check_choice, check_whole_number
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
@@ -65,17 +64,13 @@ def screen(
 ) -> Iterator[pd.DataFrame]:
     """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
 
-    A row has family, member, accuracy A (method, eq. 14) and A_90 [m] over all windows, the share of windows on which
-    the member diverged (A is NaN then), and a column per drawn parameter: its factor on the base. Members are those
-    that the study itself draws, none redrawn. A_90 comes from a tally and is exact to 0.2 %.
+    A row has family, member, accuracy A (method, eq. 14) and A_90 [m] over all windows (exact to 0.2 %), the share of
+    windows on which the member diverged (A is NaN then), and the factor on the base of each drawn parameter. Members
+    are those that the study itself draws, none redrawn.
 
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
     cut : the windows of the study as of `partition`, where they are cut already.
-
-    Raises ShipidError for a plan or a dataset that is none, and an engine that does not exist.
     """
-    check_class("plan", plan, Plan, "as of `read_plan`")
-    check_class("dataset", dataset, Dataset, "as of `read_dataset`")
     for family in wanted:
         check_choice(f"base of the family {family.name!r}", family.base, plan.vessels)
     count = check_whole_number("count", count, 1)
@@ -134,8 +129,6 @@ def _rows_of_block(
 def _equal_lags(base: Vessel, values: Array) -> list[Array]:
     """Members in groups whose actuators lag alike: equal hidden states at the start of a window."""
     lags = [place for place, path in enumerate(base.parameters) if ".actuator." in path]
-    if not lags:
-        return [np.arange(len(values))]
     _, group = np.unique(values[:, lags], axis=0, return_inverse=True)
     return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
 
@@ -149,20 +142,16 @@ def join_blocks(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 def accuracy_quantiles(frame: pd.DataFrame) -> pd.DataFrame:
     """A row per family: members, how many diverged, and quantiles of A [m] over the others."""
-    rows = []
-    for name, part in frame.groupby("family", sort=False):
-        A = part["A"].dropna()
-        row = {"family": name, "members": len(part), "diverged": len(part) - len(A)}
-        rows.append(row | {share: A.quantile(share) for share in QUANTILES_OF_A})
-    return pd.DataFrame(rows)
+    A = frame.groupby("family", sort=False)["A"]
+    counts = {"members": A.size(), "diverged": A.size() - A.count()}
+    return pd.DataFrame(counts | {share: A.quantile(share) for share in QUANTILES_OF_A}).reset_index()
 
 
 def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
     """What drives A in each family: rank correlations of A with a factor and with how far the factor is from 1.
 
-    The `MOST_DRIVERS` largest of those that chance hardly makes, a row each: family, paths (those drawn together count
-    once), factor, away. Chance is judged by Kendall's rank correlation, whose p-values are exact for few members,
-    corrected for the number of pairs in a family.
+    A row each for the largest that chance hardly makes: family, paths (those drawn together count once), factor, away.
+    Chance is judged by Kendall's rank correlation, exact for few members, corrected for the pairs of a family.
     """
     rows: list[tuple[Any, ...]] = []
     for name, part in frame[frame["A"].notna()].groupby("family", sort=False):

@@ -76,11 +76,9 @@ def named_files(folder: Path, name: str) -> list[str]:
 
 
 def sealed_faults(folder: Path, among: str = "", names: Collection[str] = ()) -> list[Fault]:
-    """Every sealed file that is not as it was written; a seal that is damaged itself is one.
+    """Every sealed file that is not as it was written, and every seal; OSError for one that cannot be read.
 
-    OSError for one that the system does not give: on a file server, or of another user, it may be whole.
-
-    among : how the paths in the folder of the files begin that are looked at. names : of the seals; by default all.
+    among : how the paths in the folder begin that are looked at. names : of the seals; by default all.
     """
     return [fault for name in sorted(names or seal_names(folder)) for fault in _faults(folder, name, among)]
 

@@ -7,13 +7,13 @@ import platform
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from shipid.capacity import processor_name, usable_cores
-from shipid.engine.native import engine_description
+from shipid.engine.native import engine_description, noted_engine
 from shipid.errors import ShipidError
 from shipid.hybrid.device import vector_instructions
 from shipid.study import store
@@ -32,35 +32,17 @@ MAIN = "__main__"  # module of a script, a cell or a console
 log = logging.getLogger(__name__)
 
 
-@dataclass
-class Sessions:
-    """The sessions that a process notes in the folder of a run, each kind once.
+def note_sessions(folder: Path, *sessions: Mapping[str, Any]) -> None:
+    """Note what this process or a worker computes with by now; a warning for a session that is new to the folder."""
+    for session in sessions:
+        known = session in store.provenance(folder)["sessions"]
+        if not known and (changed := store.note_session(folder, session)):
+            log.warning("computed otherwise in this process or a worker: %s", "; ".join(changed))
 
-    now : that of this process as it begins. Its engine, or that of a worker, is another one from the moment on at which
-        a model cannot be compiled.
-    """
 
-    folder: Path
-    now: dict[str, Any]
-    noted: list[Mapping[str, Any]] = field(default_factory=list)
-
-    def note(self, session: Mapping[str, Any]) -> list[str]:
-        """Note a session; returns a sentence per difference to the one before."""
-        if session in self.noted:
-            return []
-        self.noted.append(session)
-        return store.note_session(self.folder, session)
-
-    def note_others(self, *sessions: Mapping[str, Any]) -> None:
-        """Note sessions of workers, or of this process by now; a warning where one differs from that before."""
-        for session in sessions:
-            if changed := self.note(session):
-                log.warning("computed otherwise in this process or a worker: %s", "; ".join(changed))
-
-    def note_engine(self, name: str | None) -> None:
-        """Note by which engine this process or a worker computes by now; None: it has not computed yet."""
-        if name is not None:
-            self.note_others({**self.now, "engine": name})
+def session_by_now(begun: Mapping[str, Any]) -> dict[str, Any]:
+    """A session of this process with its engine of now: another one from when on a model could not be compiled."""
+    return {**begun, "engine": noted_engine() or begun["engine"]}
 
 
 def session_on(device: str, code: Code) -> dict[str, Any]:

@@ -38,8 +38,7 @@ def check_prepared(folder: Path, plan: Plan, names: Sequence[str]) -> None:
 def take_in(folder: Path, plan: Plan) -> Iterator[str]:
     """Take the units of all shards into the folder of their run and remove the shards; yield a sentence each.
 
-    Raises ResultError for a shard of another study or of another code of shipid, for one at work, for a file that was
-    changed, and for a unit whose results differ from those that are there.
+    Raises ResultError for a shard of another study or code of shipid, or at work, and for a unit whose results differ.
     """
     for place in sorted((folder / SHARDS).glob("*-of-*")):
         with sole_writer(place):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -52,8 +51,9 @@ PREFIXES = {
 ENTRIES: dict[str, type] = {
     **dict.fromkeys(("digest", "name", "file"), str),
     **dict.fromkeys(("sources", "changes"), dict),
+    **dict.fromkeys(("sessions", "notes"), list),
+    "wall_seconds": float,
 }
-ENTRIES |= {**dict.fromkeys(("sessions", "notes"), list), "wall_seconds": float}
 """Kinds of the entries of the provenance; a run has more of them."""
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
@@ -73,11 +73,7 @@ class Cell(NamedTuple):
 
 @contextmanager
 def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
-    """Work alone in the folder of a run, which is made, or is that of the same study already.
-
-    It appears with all that says what it is. ResultError for the folder of another study, for one that cannot be made,
-    and where another process works in it.
-    """
+    """Work alone in the folder of a run, which is made, or is that of the same study already; else ResultError."""
     try:
         make_folder(folder.parent)
         sweep_temporary(folder.parent)
@@ -108,12 +104,7 @@ def in_place(folder: Path, plan: Plan) -> Iterator[None]:
 
 
 def check_place(folder: Path, digest: str) -> None:
-    """Raise ResultError where the folder is no longer that of a run: it may be moved, removed or replaced meanwhile.
-
-    Call it before each write: else the results of two plans mix, or a part of them appears at the old place.
-
-    digest : of the plan of the run.
-    """
+    """Raise ResultError where the folder is no longer that of a run of this digest; call it before each write."""
     if not (folder / STUDY).exists() or seals.study_digest(folder) not in (None, digest):
         message = "was moved, removed or replaced while this run worked in it: what was finished is where it is now"
         raise ResultError(f"{message}; `shipid study resume` goes on there", file=folder)
@@ -129,20 +120,16 @@ def _make(folder: Path, plan: Plan) -> None:
     """Make the folder at once; nothing happens where another run has just made it."""
     folder = Path(os.path.realpath(folder))  # a folder takes the place of an empty one, not of a link to it
     with temporary_folder(folder.parent) as above:
-        _describe(above / folder.name, plan)
+        _write_plan(above / folder.name, plan)
         try:
             os.rename(above / folder.name, folder)
             sync_to_disk(folder.parent)
-        except OSError as error:
-            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
-                raise
+        except OSError:
             if not (folder / STUDY).exists():
-                raise ResultError(
-                    "is not empty and holds no run of shipid: choose another --out", file=folder
-                ) from None
+                raise
 
 
-def _describe(folder: Path, plan: Plan) -> None:
+def _write_plan(folder: Path, plan: Plan) -> None:
     """Write what a folder is: provenance, vessels and, last, the study."""
     origin: dict[str, Any] = {"name": plan.name, "file": str(Path(plan.file).absolute()), "sources": dict(plan.sources)}
     own = {"program": program_of(plan), **own_code(plan)} if own_code(plan) else {}
@@ -155,15 +142,11 @@ def _describe(folder: Path, plan: Plan) -> None:
 def stored_plan(folder: Path) -> Plan:
     """The plan of a run from its folder alone: the study and the vessels as they were when the run began.
 
-    Raises ResultError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
+    Raises ShipidError where it is no folder of a run, is damaged or cannot be read, `NotTaken` where it may be whole.
     """
     if not (folder / STUDY).is_file():
         raise ResultError("is not the folder of a run: it holds no study.toml", file=folder)
-    record = provenance(folder)
-    try:
-        document = documents.read_document(folder / STUDY)
-    except DocumentError as error:
-        raise ResultError(f"damaged ({error.message}): run the study again", file=folder / STUDY) from None
+    record, document = provenance(folder), documents.read_document(folder / STUDY)
     stored, file = read_json(folder / VESSELS), folder / VESSELS
     try:
         vessels = {name: check_document(entry["document"], entry["file"]) for name, entry in stored.items()}
@@ -263,11 +246,7 @@ def write_unit(folder: Path, unit: Unit, results: Sequence[Cell]) -> None:
 
 
 def note_session(folder: Path, session: Mapping[str, Any]) -> list[str]:
-    """Note in the provenance what a run is computed with; returns a sentence per difference to the session before.
-
-    session : entries such as `shipid`, `engine`, `processor` and `packages`, as plain data; each kind is noted once,
-        the latest last.
-    """
+    """Note in the provenance what a run is computed with, each kind once; a sentence per difference to the last."""
     record, now = provenance(folder), dict(session)
     before = record["sessions"]
     if now not in before[-1:]:
@@ -303,9 +282,7 @@ def read_rows(folder: Path, plan: Plan | None = None) -> pd.DataFrame:
 
 
 def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = True) -> Path:
-    """`results.parquet`: one row per cell and metric, and `trials.parquet`: one row per cell and trial.
-
-    `trials.log` holds the journals of all units of the plan.
+    """`results.parquet`: a row per cell and metric; `trials.parquet`: per cell and trial; `trials.log`: all journals.
 
     whole : whether all cells are there; only then the tables have a seal, which says that a run has ended.
     """

@@ -31,10 +31,9 @@ Result = TypeVar("Result")
 
 
 def import_for_workers() -> None:
-    """Let a separate process import all that workers need, while this one goes on; they fork from it.
+    """Let a separate process, which ignores Ctrl-C, import all that workers need; they fork from it.
 
-    The workers ignore Ctrl-C, as their source does: this process stops them. Nothing happens where workers are not
-    forked, or in a thread, which cannot set signals; then each worker imports for itself.
+    Nothing happens where workers are not forked, or in a thread, which cannot set signals.
     """
     _check_guard()
     if _method() != "forkserver" or threading.current_thread() is not threading.main_thread():

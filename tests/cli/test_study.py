@@ -127,7 +127,7 @@ def test_check_ends_with_1_where_a_file_is_wrong(tmp_path: Path, tiny_run: Path)
     assert "missing: `shipid study resume` computes it again" in result.output
 
 
-def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
+def test_a_run_whose_lines_cannot_be_printed_gives_its_lock_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Standard output on a full disk: the events end before the process does."""
@@ -142,4 +142,3 @@ def test_a_run_whose_lines_cannot_be_printed_gives_its_claims_back(
     code, _, error = ended("study", "run", TINY, "--out", tmp_path / "run", "--workers", "1")
     assert (code, error) == (1, "error: system: No space left on device\n")
     assert taken[0].gi_frame is None, "the generator is closed"
-    assert not (tmp_path / "run" / "claims").exists()

@@ -101,7 +101,7 @@ def test_a_scheduler_that_dies_or_falls_silent_is_one_line(
         next(results)
         scheduler.send_signal(sent)
         killed = time.monotonic()
-        with pytest.raises(ShipidError, match="scheduler is gone; what is finished is kept") as caught:
+        with pytest.raises(ShipidError, match=r"scheduler is gone, or .*; what is finished is kept") as caught:
             list(results)
         assert time.monotonic() - killed < 60  # on a loaded machine: docs/cluster.md has what was measured
         scheduler.send_signal(signal.SIGCONT)
@@ -134,17 +134,14 @@ def test_a_worker_dies_and_another_joins(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_cannot_read_the_work_is_not_said_to_be_gone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_scheduler_that_cannot_read_the_work_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It unpacks what workers get, and needs the module of a user's method as they do."""
     (tmp_path / "own_method_here.py").write_text("class Own:\n    pass\n")
     (tmp_path / "there").mkdir()
     with a_cluster(tmp_path / "there") as (address, _):
         monkeypatch.syspath_prepend(str(tmp_path))
         own = importlib.import_module("own_method_here").Own()
-        words = r"the Dask scheduler cannot read the work \(No module named 'own_method_here'\): start scheduler and"
-        with pytest.raises(ShipidError, match=words) as caught:
+        with pytest.raises(ShipidError, match="cannot read the work: start scheduler and workers where") as caught:
             list(on_dask(address, lambda *_: 0, own, [("t", 1)], "x"))
     assert "\n" not in str(caught.value)
 

@@ -30,15 +30,14 @@ def test_a_search_is_followed_trial_by_trial_until_its_unit_is_finished(tmp_path
     journal = Journal(file)
     assert search_words(plan, tmp_path) == ""
     journal.add({ONE: [row(0, 0.25)]}, SPACE)
-    assert search_words(plan, tmp_path) == f"{ONE}: trial 1/5, best so far 0.5 m rms"
+    assert search_words(plan, tmp_path) == f"{ONE}: trial 1/5"
     journal.add({OTHER: [row(0, float("nan"))]}, SPACE)
     assert search_words(plan, tmp_path) == f"{OTHER}: trial 1/5"
     journal.decide([ONE], 12)  # of a budget
     journal.add({ONE: [row(1, 0.04)]}, SPACE)
-    assert search_words(plan, tmp_path) == f"{ONE}: trial 2/12, best so far 0.2 m rms"
     with file.open("a") as stream:
-        stream.write('no json\n[1]\n{"op_code": 4}\n{"op_code": 2, "study_id": 9, "user_attr": {"trials": 3}}\n{"op_')
-    assert search_words(plan, tmp_path).startswith(f"{ONE}: trial 2/12")
+        stream.write('{"op_')  # half a line, by another process
+    assert search_words(plan, tmp_path) == f"{ONE}: trial 2/12"
     write_json(rows_file(tmp_path, "unit"), [])
     seals.write_seal(tmp_path, "unit", [rows_file(tmp_path, "unit")])
     assert search_words(plan, tmp_path) == ""

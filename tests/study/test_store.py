@@ -55,10 +55,6 @@ def test_a_stored_plan_knows_what_was_changed(tmp_path: Path) -> None:
     assert [run_command(part.plan) for part in stored.parts.values()] == [
         run_command(part.plan) for part in plan.parts.values()
     ]
-    provenance = tmp_path / "run" / store.PROVENANCE
-    write_json(provenance, {**read_json(provenance), "changes": [3]})
-    with pytest.raises(ResultError, match="changes: is not what shipid writes there"):
-        store.stored_plan(tmp_path / "run")
 
 
 @pytest.mark.parametrize("key", ["digest", "sessions"])

@@ -53,23 +53,17 @@ def ended(folder: Path, *command: str) -> str:
     return (done.stdout + done.stderr).splitlines()[-1]
 
 
-NOT_IN_A_WORKER = "import multiprocessing\nif multiprocessing.parent_process():\n    raise OSError('no camera')\n"
-
-
 @pytest.mark.parametrize(
-    ("mine", "cells", "words"),
+    ("cells", "words"),
     [
-        ("", METHOD + LISTED + RUN, "there it does not go (AttributeError: "),
-        ("", TERM + RUN_TERM, "workers lack the term 'hull.skeg': write its line TERMS[...] = ... into a script"),
-        (METHOD + NOT_IN_A_WORKER, "from mine import Linear" + LISTED + RUN, "(OSError: no camera): write methods and"),
+        (METHOD + LISTED + RUN, "there it does not go (AttributeError: "),
+        (TERM + RUN_TERM, "workers lack the term 'hull.skeg': write its line TERMS[...] = ... into a script"),
     ],
 )
-def test_code_that_workers_lack_is_one_line(mine: str, cells: str, words: str, tmp_path: Path) -> None:
-    """Cells of a notebook, a line below the guard, a file that fails where workers import it."""
-    for name, text in {"ship.toml": SHIP, "mine.py": mine, "helper.py": ""}.items():
-        (tmp_path / name).write_text(text)
-    (tmp_path / "my.py").write_text(cells)
-    line = ended(tmp_path, *(["my.py"] if "__main__':" in cells else ["-c", cells]))
+def test_code_that_workers_lack_is_one_line(cells: str, words: str, tmp_path: Path) -> None:
+    """A method and a term of cells of a notebook."""
+    (tmp_path / "ship.toml").write_text(SHIP)
+    line = ended(tmp_path, "-c", cells)
     assert line.startswith("shipid.errors.ShipidError: ")
     assert words in line
 
@@ -82,7 +76,6 @@ def test_a_method_in_a_file_needs_no_script(tmp_path: Path) -> None:
 
 
 def test_a_script_from_standard_input_is_named(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text("")
     alone = RUN.replace('"linear", "trials": 2', '"alone"')
     piped = f"import subprocess, sys; subprocess.run([sys.executable, '-'], input={alone!r}, text=True)"
     words = "a script from standard input cannot start workers: save it as a file, and run that"
