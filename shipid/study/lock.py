@@ -39,3 +39,14 @@ def sole_writer(folder: Path, name: str = WRITER, *, wait: bool = False) -> Iter
         yield
     finally:
         lock.release()
+
+
+def has_writer(folder: Path) -> bool:
+    """Whether a process works in a folder; False where the folder cannot be locked, such as one that is read only."""
+    try:
+        with FileLock(folder / f".{WRITER}.lock", blocking=False, fallback_to_soft=False):
+            return False
+    except Timeout:
+        return True
+    except OSError:
+        return False
