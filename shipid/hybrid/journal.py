@@ -86,7 +86,10 @@ class Journal:
         """The study of a cell to be written to, made where there is none."""
         self.check()
         if cell not in self._studies:
-            self._studies[cell] = optuna.create_study(study_name=cell, storage=self.storage)
+            try:
+                self._studies[cell] = optuna.create_study(study_name=cell, storage=self.storage)
+            except AssertionError:  # of Optuna, which does not find the study that it has just written
+                raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=self.file) from None
             self._studies[cell].set_user_attr(DIGEST, self.digest)
         return self._studies[cell]
 

@@ -48,16 +48,12 @@ def _count_words(faults: list[Fault]) -> str:
 
 
 def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> list[str]:
-    """Lines on how far one folder is, who works in it, what killed runs left, and by what it was computed."""
+    """Lines on how far one folder is, who works in it, and by what it was computed."""
     store.stored_plan(folder)  # reports what was edited
     done = sum(len(unit.pairs) for unit in store.finished_units(folder, plan.units))
     lines = [] if plan.parts else [f"{name}{done} of {plan.cells} cells finished, {_count_words(faults)}"]
     if has_writer(folder):
         lines.append(f"{name}a process works in it")
-    left = [place for place in folder.rglob(f"{TEMPORARY}*") if place.is_dir()]
-    if left:
-        folders = f"{len(left)} {plural_word(len(left), 'temporary folder')}"
-        lines.append(f"{folders} of killed runs: the next run removes {plural_word(len(left), 'it', 'them')}")
     for before, after in pairwise(store.provenance(folder).get("sessions", [])):
         lines.append(f"{name}computed in parts: {'; '.join(store.differences(before, after))}")
     return lines
