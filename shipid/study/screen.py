@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import kendalltau
 
-from shipid.arguments import check_choice, check_whole_number
+from shipid.arguments import check_choice, check_class, check_whole_number
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows
 from shipid.engine.engines import REPEATED
@@ -71,6 +71,8 @@ def screen(
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
     cut : the windows of the study as of `partition`, where they are cut already.
     """
+    check_class("plan", plan, Plan, "as of `read_plan`")
+    check_class("dataset", dataset, Dataset, "as of `read_dataset`")
     for family in wanted:
         check_choice(f"base of the family {family.name!r}", family.base, plan.vessels)
     count = check_whole_number("count", count, 1)

@@ -32,7 +32,7 @@ def test_options_are_read_before_anything_is_loaded(tmp_path: Path) -> None:
     ("arguments", "remedy"),
     [
         (["mgm"], "structures: 'mgm' is no structure: did you mean 'mmg'?"),
-        (["mmg,modulus", "--folds", "1"], "folds: 1: give two folds or more"),
+        (["mmg,modulus", "--folds", "1"], "folds: 1 folds of 3 runs: give 2 or more"),
         (["mmg,modulus", "--runs", "M01"], "runs: only one run"),
         (["mmg,modulus", "--ahead", "-3"], "ahead: a free run of -3 s"),
     ],
