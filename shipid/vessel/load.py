@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+LONGEST_CHAIN = 20  # documents that extend or patch one another
+
 
 @dataclass(frozen=True)
 class Vessel:
@@ -234,6 +236,9 @@ def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Pat
         other = documents.find_document(str(name), "models", file.parent)
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
+    if len(above) >= LONGEST_CHAIN:
+        message = f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out"
+        raise DocumentError(message, file=file, path=path)
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
