@@ -147,7 +147,7 @@ BAD: dict[str, tuple[dict[str, Any], str, str]] = {
     ),
     "an unknown block": ({"repeat": {"sead": [1]}}, "repeat.sead", "did you mean 'seed'"),
     "a part of parts": ({"repeat": {"repeat.seed": [1]}}, "repeat.repeat.seed", "no such block"),
-    "a path into a number": ({"repeat": {"truth.seed.x": [1]}}, "repeat.truth.seed.x", "truth.seed is no table"),
+    "a path into a number": ({"repeat": {"truth.seed.x": [1]}}, "repeat.truth.seed.x", "there is no .x."),
     "a wrong value": ({"repeat": {"prediction.step": [-1.0]}}, "prediction.step", "must be above 0"),
 }
 
