@@ -92,8 +92,6 @@ def _draft_mapping(
     from shipid.files import write_new
     from shipid.logs.guess.draft import NOT_YET, draft_mapping
 
-    if out is not None:
-        check_output(out, endings=(".toml",))
     guessed = shipid.guess(log, names, shipid.load_vessel(vessel) if vessel else None, frame)
     file = check_output(out or Path(f"{guessed.file.resolve().stem}.toml"), endings=(".toml",))
     text = draft_mapping(guessed)

@@ -101,8 +101,6 @@ def identify_command(
 
     if structures is None and folds is not None:
         raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
-    if band is not None and not 0 < band < 1:
-        raise ShipidError(f"{band:g}: must be between 0 and 1, such as 0.9", path="--band")
     default = Path(f"{document_stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     file = check_output(out or default, endings=(".toml",))
     given: dict[str, Any] = {
@@ -160,9 +158,9 @@ def _errors_of_settings(settings: Path | None) -> Iterator[None]:
     try:
         yield
     except DocumentError as error:
-        if error.file is not None or not (error.path or "").startswith("identify"):
-            raise
-        raise DocumentError(error.message, file=settings, path=error.path) from None
+        if settings is not None and error.file is None and (error.path or "").startswith("identify"):
+            error.file = str(settings)
+        raise
 
 
 def _split_paths(given: Sequence[str]) -> list[str]:

@@ -12,7 +12,6 @@ import typer
 
 from shipid.errors import DocumentError, ShipidError
 
-HIGHEST = 0.99  # level of the bands of a predictor; `shipid.hybrid.bands.LEVELS` ends there
 VesselName = Annotated[
     str,
     typer.Argument(help="bundled name, or path of a vessel or patch document"),
@@ -58,10 +57,9 @@ Adaptive = Annotated[
 
 
 def check_band(level: float | None, kind: str | None, adaptive: float | None) -> None:
-    """Raise ShipidError for a level or a rate out of range, and where --kind or --adaptive come without --level."""
-    for number, most, option in ((level, HIGHEST, "--level"), (adaptive, 1.0, "--adaptive")):
-        if number is not None and not 0 < number <= most:
-            raise ShipidError(f"{number:g}: must be above 0 and up to {most:g}", path=option)
+    """Raise ShipidError for a rate out of range, and where --kind or --adaptive come without --level."""
+    if adaptive is not None and not 0 < adaptive <= 1:
+        raise ShipidError(f"{adaptive:g}: must be above 0 and up to 1", path="--adaptive")
     if level is None and (kind is not None or adaptive is not None):
         raise ShipidError("goes with a band: give --level too, such as --level 0.9", path="--kind or --adaptive")
 

@@ -6,7 +6,6 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
 
 import typer
 
@@ -61,15 +60,6 @@ def end_on_interrupt(interrupted: str = NOTHING) -> Iterator[None]:
         sys.exit(130)
 
 
-def count_blocks(blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = NOTHING) -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; show how many of `total` rows are there."""
-    count = 0
-    with end_on_interrupt(interrupted), show_steps(look=lambda: f"{count} of {total} {what}"):
-        for block in blocks:
-            count += len(block)
-            yield block
-
-
 @contextmanager
 def show_steps(first: str = "", look: Callable[[], str] | None = None) -> Iterator[Callable[[str], None]]:
     """Give a function that takes the step of a long calculation: it is printed to standard error every 15 s, if new.
@@ -103,8 +93,6 @@ def log_to_stderr(verbose: bool) -> None:
     import logging
 
     logger, handler = logging.getLogger("shipid"), logging.StreamHandler()
-    handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s" if verbose else "warning: %(message)s"))
     logger.handlers = [handler]
-    if verbose:
-        logger.setLevel(logging.DEBUG)
+    logger.setLevel(logging.DEBUG if verbose else logging.WARNING)
