@@ -101,6 +101,8 @@ def identify_command(
 
     if structures is None and folds is not None:
         raise ShipidError("goes with --structures: name structures to compare, or leave it out", path="--folds")
+    if band is not None and not 0 < band < 1:
+        raise ShipidError(f"{band:g}: must be between 0 and 1, such as 0.9", path="--band")
     default = Path(f"{document_stem(vessel)}-{'structure' if structures else 'identified'}.toml")
     file = check_output(out or default, endings=(".toml",))
     given: dict[str, Any] = {
