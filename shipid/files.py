@@ -203,18 +203,6 @@ def read_arrow(source: Path | BinaryIO) -> Table:
     return pyarrow.parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
 
 
-def read_table(file: Path) -> DataFrame:
-    """Read a Parquet table that `write_table` wrote; OSError if it cannot be opened, ValueError for anything else."""
-    import pyarrow
-
-    try:
-        with open_file(file) as stream:
-            table: DataFrame = read_arrow(stream).to_pandas(use_threads=False)
-            return table
-    except (pyarrow.ArrowException, LookupError, TypeError, AttributeError, ArithmeticError) as error:
-        raise ValueError(f"{file} is not a whole table") from error  # such as a word of pandas' notes that is another
-
-
 def write_arrays(file: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False) -> None:
     """Write arrays by name as one `.npz` without pickles."""
     import numpy as np

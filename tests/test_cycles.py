@@ -1,34 +1,23 @@
 """No module of the package imports itself by way of others."""
 
 import grimp
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 
 def cycles(graph: grimp.ImportGraph) -> list[set[str]]:
-    """Sets of two modules or more that reach each other (Tarjan's strongly connected components)."""
-    index: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    result: list[set[str]] = []
-
-    def visit(module: str) -> None:
-        index[module] = low[module] = len(index)
-        stack.append(module)
-        for other in graph.find_modules_directly_imported_by(module):
-            if other not in index:
-                visit(other)
-                low[module] = min(low[module], low[other])
-            elif other in stack:
-                low[module] = min(low[module], index[other])
-        if low[module] == index[module]:
-            place = stack.index(module)
-            component, stack[place:] = set(stack[place:]), []
-            if len(component) > 1:
-                result.append(component)
-
-    for module in sorted(graph.modules):
-        if module not in index:
-            visit(module)
-    return result
+    """Sets of two modules or more that reach each other."""
+    modules = sorted(graph.modules)
+    imports = [
+        (row, modules.index(other))
+        for row, one in enumerate(modules)
+        for other in graph.find_modules_directly_imported_by(one)
+    ]
+    ends = tuple(zip(*imports, strict=True))
+    edges = coo_array(([1] * len(imports), ends), shape=(len(modules), len(modules)))
+    count, labels = connected_components(edges, connection="strong")
+    parts = [{module for module, label in zip(modules, labels, strict=True) if label == part} for part in range(count)]
+    return [part for part in parts if len(part) > 1]
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:

@@ -31,5 +31,5 @@ def test_a_wheel_has_no_link_into_the_repository(tmp_path: Path) -> None:
     (author,) = re.findall(r'^  - name: "(.*)"$', (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE)
     assert metadata["Author"] == author
     assert {"dask", "docs", "export", "forest"} <= set(metadata.get_all("Provides-Extra"))
-    assert "shipid/_bundled/studies/quick.toml" in files
+    assert {"shipid/_bundled/studies/quick.toml", "shipid/_bundled/models/mariner.toml"} <= set(files)
     assert not [file for file in files if file.startswith(("tests/", "docs/"))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -43,7 +43,9 @@ GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
 def main() -> None:
     """Run the command line: an error that the user can correct is one line, never a traceback."""
     try:
-        _check_encoding(sys.argv[1:])
+        for argument in sys.argv[1:]:  # documents, pages and tables could not name such a file
+            if not is_utf_8(argument):
+                raise ShipidError("is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8", path=argument)
         app()
     except BrokenPipeError:
         sys.exit(141)
@@ -77,13 +79,6 @@ def error_line(error: Exception) -> str | None:
         remedy = NAMELESS.get(error.errno or 0) if not error.filename else None
         return f"{error.filename or 'system'}: {words}" + (f": {remedy}" if remedy else "")
     return None
-
-
-def _check_encoding(arguments: Sequence[str]) -> None:
-    """Raise ShipidError for an argument that is not UTF-8: documents, pages and tables could not name such a file."""
-    for argument in arguments:
-        if not is_utf_8(argument):
-            raise ShipidError("is not UTF-8: rename the file or folder, or set LC_ALL=C.UTF-8", path=argument)
 
 
 def _configure_output(

@@ -160,9 +160,9 @@ def _errors_of_settings(settings: Path | None) -> Iterator[None]:
     try:
         yield
     except DocumentError as error:
-        if error.file is not None or not (error.path or "").startswith("identify"):
-            raise
-        raise DocumentError(error.message, file=settings, path=error.path) from None
+        if settings is not None and error.file is None and (error.path or "").startswith("identify"):
+            error.file = str(settings)
+        raise
 
 
 def _split_paths(given: Sequence[str]) -> list[str]:

@@ -64,13 +64,8 @@ def check_output(file: Path, read: Iterable[Path] = (), endings: tuple[str, ...]
         fault, named = "is a file, not a folder: name another place to write", folder
     elif not os.access(folder.parent if folder.is_file() else folder, os.W_OK | os.X_OK):
         fault = "is in a folder that this user may not write into: name another place to write"
-    elif file.is_file() and (results := results_folder(file)) is not None:
-        fault = f"belongs to the results in {results}, and would be written over: name another file to write"
+    elif file.is_file() and any(all((one / name).is_file() for name in RESULTS) for one in file.absolute().parents):
+        fault = "belongs to the results of a study, and would be written over: name another file to write"
     if fault is not None:
         raise ShipidError(fault, file=named, path=option)
     return file
-
-
-def results_folder(file: Path) -> Path | None:
-    """The folder of results that a file belongs to, if it does."""
-    return next((one for one in file.absolute().parents if all((one / name).is_file() for name in RESULTS)), None)

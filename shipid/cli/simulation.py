@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -14,9 +14,6 @@ from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA, MEASURE_FORMATS, MEASURES
 from shipid.errors import DocumentError, ShipidError
 from shipid.files import TABLES
-
-if TYPE_CHECKING:
-    pass
 
 
 def simulate_command(

@@ -14,7 +14,7 @@ import shipid
 from shipid.cli.answer import Answer, Json, open_answer
 from shipid.cli.options import Changes, Device, Folder, Scheduler, StudyName, Workers, document_stem, parse_changes
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import count_blocks, end_on_interrupt, share_text, show_steps
+from shipid.cli.terminal import end_on_interrupt, share_text, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES
 from shipid.units import level_text
@@ -93,18 +93,25 @@ def study_screen(
     as_json: Json = False,
 ) -> None:
     """Show how accurate many members of a study's families are on all its windows, and which factors drive that."""
-    from shipid.engine.engines import REPEATED
+    from shipid.engine.engines import REPEATED, check_device
     from shipid.study import screen
+    from shipid.study.plan import input_files
     from shipid.study.prepare import obtain_runs, partition
 
     engine = "single" if single else REPEATED
-    plan, file = _prepare_command(study, changes, device, out, "screen")
+    check_device(device)
+    plan = shipid.read_plan(study, parse_changes(changes))
+    file = check_output(out or Path(f"{plan.name}-screen.csv"), input_files(plan), TABLES)
     wanted, dataset = screen.drawn_families(plan, family), obtain_runs(plan)
     cut = partition(plan, dataset)
     for note in screen.notes_on_windows(plan, cut, wanted):
         typer.echo(note, err=True)
-    blocks = count_blocks(screen.screen(plan, dataset, wanted, members, device, engine, cut), members * len(wanted))
-    frame = screen.join_blocks(list(blocks))
+    blocks: list[DataFrame] = []
+    with end_on_interrupt(), show_steps() as say:
+        for block in screen.screen(plan, dataset, wanted, members, device, engine, cut):
+            blocks.append(block)
+            say(f"{sum(map(len, blocks))} of {members * len(wanted)} members")
+    frame = screen.join_blocks(blocks)
     correlations = screen.drivers_of_accuracy(frame)
     with open_answer(as_json) as answer:
         answer.say("accuracy A [m] that so many of the members reach:")
@@ -260,18 +267,6 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
         numbers = {name: what, f"{name}_low": "least", f"{name}_high": "greatest", "worlds": "worlds"}
         answer.records("errors", errors, CELL | numbers, shown=errors.dropna(subset=name))
     return errors
-
-
-def _prepare_command(
-    study: str, changes: list[str] | None, device: str, out: Path | None, command: str
-) -> tuple[Plan, Path]:
-    """The plan of a study and the file of a command's table, after all that can be refused before anything is done."""
-    from shipid.engine.engines import check_device
-    from shipid.study.plan import input_files
-
-    check_device(device)
-    plan = shipid.read_plan(study, parse_changes(changes))
-    return plan, check_output(out or Path(f"{plan.name}-{command}.csv"), input_files(plan), TABLES)
 
 
 def _run_to_report(

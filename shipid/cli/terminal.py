@@ -6,7 +6,6 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
 
 import typer
 
@@ -59,15 +58,6 @@ def end_on_interrupt(interrupted: str = NOTHING) -> Iterator[None]:
     except KeyboardInterrupt:
         sys.stderr.write(f"{interrupted}\n")
         sys.exit(130)
-
-
-def count_blocks(blocks: Iterable[Any], total: int, what: str = "members", interrupted: str = NOTHING) -> Iterator[Any]:
-    """Yield the blocks of rows unchanged; show how many of `total` rows are there."""
-    count = 0
-    with end_on_interrupt(interrupted), show_steps(look=lambda: f"{count} of {total} {what}"):
-        for block in blocks:
-            count += len(block)
-            yield block
 
 
 @contextmanager

@@ -96,7 +96,7 @@ def test_no_file_of_results_is_written_over(there: Path) -> None:
         (results / name).write_text("sealed")
     status, _, error = ended("data", "measures", "log.parquet", "--csv", "results/quick/cells/a.parquet")
     assert status == 1
-    assert "--csv: belongs to the results in" in error
+    assert "--csv: belongs to the results of a study" in error
     assert (results / "cells/a.parquet").read_text() == "sealed"
 
 

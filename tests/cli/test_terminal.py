@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 
 import pytest
 
@@ -52,13 +51,9 @@ def test_long_cells_are_no_silence(capsys: pytest.CaptureFixture[str], monkeypat
 
 
 def test_an_interruption_says_what_is_kept(capsys: pytest.CaptureFixture[str]) -> None:
-    from shipid.cli.terminal import count_blocks
+    from shipid.cli.terminal import end_on_interrupt
 
-    def blocks() -> Iterator[list[int]]:
-        yield [1]
+    with pytest.raises(SystemExit) as end, end_on_interrupt("what is finished is kept"):
         raise KeyboardInterrupt
-
-    with pytest.raises(SystemExit) as end:
-        list(count_blocks(blocks(), 3, "cells", "what is finished is kept"))
     assert end.value.code == 130
     assert capsys.readouterr().err == "what is finished is kept\n"
