@@ -9,7 +9,7 @@ nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
@@ -24,7 +24,7 @@ from shipid.hybrid.features import MOTIONS, count_steps, feature_table
 from shipid.hybrid.method import Array, Index
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale
-from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths
+from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths, true_motion
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs, apply_blocks, solve_ridges
 
@@ -119,8 +119,8 @@ class HankelCorrector(StoredData):
 class HankelProblem(StepProblem):
     """A foundation whose missing accelerations are the targets of linear laws."""
 
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> HankelCorrector:  # noqa: ARG002
-        """Return the law on the steps of some windows for all ridges; one ridge has no axis in front."""
+    def solve(self, number: int, point: Point, windows: Index) -> HankelCorrector:  # noqa: ARG002
+        """Return the law on the steps of some windows."""
         delays = count_steps(point["delays"], self.task.windows.step)
         chosen, table = self.steps.of(windows), self.table(delays)
         here = {key: values[chosen] for key, values in table.items()}
@@ -131,15 +131,14 @@ class HankelProblem(StepProblem):
         full = np.concatenate([values, np.ones((len(values), 1))], axis=1)
         size = np.maximum(missing.std(axis=0), 1e-12)
         penalty = np.r_[np.ones(values.shape[1]), 1e-3]
-        weights = solve_ridges(full, missing / size, ridges, penalty) * size
-        law = LinearLaw(self.task.commands, delays, seen.normaliser, weights[0] if len(ridges) == 1 else weights)
-        return HankelCorrector(law, point["delays"], point)
+        weights = solve_ridges(full, missing / size, point["ridge"], penalty) * size
+        return HankelCorrector(LinearLaw(self.task.commands, delays, seen.normaliser, weights), point["delays"], point)
 
     def table(self, delays: int) -> dict[str, Array]:
         """Return inputs (N,) at the true steps: before them are the past and the horizon of their windows."""
         windows, steps, physics = self.task.windows, self.steps, self.case.physics
         past = past_rows(physics, self.task.instants(self.name), delays, self.task.commands)
-        motion = {key: np.concatenate([windows.columns[key][None], windows.states[key]]) for key in (*MOTIONS, "psi")}
+        motion = true_motion(windows)
         later = {**motion, **windows.planned}
         if physics.vessel is not None:
             instants = windows.instants(known=True, hidden=self.task.hidden.get(self.name))
@@ -184,10 +183,6 @@ class HankelDMD(StepMethod):
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
         return ("delays", *self.ranges())
-
-    def num_trials(self) -> int | None:
-        """Return how many delays are tried; None where the budget decides it."""
-        return None if self.budget else len(self.delays)
 
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: the delays."""

@@ -138,17 +138,9 @@ class LearnedForce(SearchedAlone):
             return f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}"
         return ""
 
-    def num_trials(self) -> int | None:
-        """Return how many ridges are tried; None where the budget decides it."""
-        return None if self.budget else len(self.ridges())
-
-    def ridges(self) -> list[float]:
-        """Return the values of the ridge that are tried."""
-        return ridge_values(self.ridge, self.trials)
-
     def points(self) -> list[Point]:
         """Return the trials: from stiff to soft, for each starts from the one before."""
-        return [{"ridge": ridge} for ridge in self.ridges()[::-1]]
+        return [{"ridge": ridge} for ridge in ridge_values(self.ridge, self.trials)[::-1]]
 
 
 def first_output_weights(
@@ -165,7 +157,7 @@ def first_output_weights(
     initial = dict(block)
     for key, limit, axis, features in zip(OUTPUT, LIMITS, range(3), (even, odd, odd), strict=True):
         goal = np.arctanh(np.clip(force[:, axis] / block[limit], -LARGEST_START, LARGEST_START))
-        initial[key] = solve_ridges(features, goal[:, None], [START_RIDGE])[0, :, 0]
+        initial[key] = solve_ridges(features, goal[:, None], START_RIDGE)[:, 0]
     return initial
 
 

@@ -11,7 +11,7 @@ the closed form is ours.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
 
@@ -156,8 +156,8 @@ class ModulesProblem(StepProblem):
             physics_without_modules(self.case.physics), self.steps.at, self.steps.free, self.steps.step
         )
 
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> ModulesCorrector:
-        """Return factors on the steps of some windows for all ridges; one ridge has no axis in front."""
+    def solve(self, number: int, point: Point, windows: Index) -> ModulesCorrector:
+        """Return factors on the steps of some windows."""
         task, method, steps, modules = self.task, self.method, self.steps, self.modules
         chosen = steps.of(windows)
         table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
@@ -168,10 +168,9 @@ class ModulesProblem(StepProblem):
         size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
         rows = np.einsum("skj,sm->sjkm", acting / size, even).reshape(missing.size, -1)
         penalty = np.tile(np.r_[0.1, np.ones(method.units)], len(modules))
-        weights = solve_ridges(rows, (missing / size).reshape(-1, 1), ridges, penalty)
-        weights = weights.reshape(len(ridges), len(modules), -1)
+        weights = solve_ridges(rows, (missing / size).reshape(-1, 1), point["ridge"], penalty)
+        weights = weights.reshape(*weights.shape[:-2], len(modules), -1)
         alarm = Alarm.fit(table, units.normaliser, method.centres, task.windows.run[steps.window[chosen]])
-        weights = weights[0] if len(ridges) == 1 else weights
         return ModulesCorrector(task.commands, modules, units, weights, alarm, method.limit, method.fade, dict(point))
 
 

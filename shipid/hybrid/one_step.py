@@ -70,8 +70,8 @@ class OneStepProblem(StepProblem):
         super().__init__(method, task, name)
         self.table = feature_table(self.steps.at.columns, task.commands)
 
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> OneStepCorrector:
-        """Return networks on the steps of some windows for all ridges; one ridge has no axis in front."""
+    def solve(self, number: int, point: Point, windows: Index) -> OneStepCorrector:
+        """Return networks on the steps of some windows."""
         chosen = self.steps.of(windows)
         here = {key: values[chosen] for key, values in self.table.items()}
         units = VaryingInputs.of(here, self.method.mirror).draw(
@@ -80,10 +80,9 @@ class OneStepProblem(StepProblem):
         missing = self.steps.missing[chosen]
         size = np.maximum(missing.std(axis=0), 1e-12)
         even, odd = units.parts(here)
-        surge = solve_ridges(even, missing[:, :1] / size[:1], ridges) * size[:1]
-        sway_yaw = solve_ridges(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
-        head = OutputWeights(units, surge, sway_yaw) if len(ridges) > 1 else OutputWeights(units, surge[0], sway_yaw[0])
-        return OneStepCorrector(self.task.commands, (head,), point)
+        surge = solve_ridges(even, missing[:, :1] / size[:1], point["ridge"]) * size[:1]
+        sway_yaw = solve_ridges(odd, missing[:, 1:] / size[1:], point["ridge"]) * size[1:]
+        return OneStepCorrector(self.task.commands, (OutputWeights(units, surge, sway_yaw),), point)
 
     def corrector(self, best: Sequence[Row]) -> OneStepCorrector:
         """Return the mean of the networks of the best trials."""

@@ -25,7 +25,7 @@ from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task, Tra
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
-Point = Mapping[str, float]
+Point = Mapping[str, Any]
 """A trial: values of hyperparameters by name."""
 Any_ = TypeVar("Any_")
 TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
@@ -334,6 +334,10 @@ class SearchedAlone(SearchMethod):
     def points(self) -> Iterable[Point]:
         """Return the trials: a value of everything searched, evenly spread."""
         return trial_points(self, self.IDLE)
+
+    def num_trials(self) -> int | None:
+        """Return how many trials there are for each foundation; None where the budget decides it."""
+        return None if self.budget else len(list(self.points()))
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Search for every foundation; where its physics is not finite on windows of a fold, all trials diverged."""

@@ -82,8 +82,10 @@ def apply_blocks(features: Array, weights: Array) -> Array:
     return blocks.reshape(len(features), -1)
 
 
-def solve_ridges(features: Array, targets: Array, ridges: Sequence[float], penalty: Array | None = None) -> Array:
-    """Weights (R, M, K) that minimise mean |targets - features W|^2 + ridge |penalty W|^2 for R ridges.
+def solve_ridges(
+    features: Array, targets: Array, ridge: float | Sequence[float], penalty: Array | None = None
+) -> Array:
+    """Weights (M, K) that minimise mean |targets - features W|^2 + ridge |penalty W|^2; of R ridges (R, M, K).
 
     features : (N, M). targets : (N, K). penalty : (M,) relative weights of the ridge, all above 0; default 1.
     """
@@ -91,5 +93,5 @@ def solve_ridges(features: Array, targets: Array, ridges: Sequence[float], penal
     scaled = features / scale
     values, axes = np.linalg.eigh(scaled.T @ scaled / len(scaled))
     product = axes.T @ (scaled.T @ targets) / len(scaled)
-    values = np.maximum(values, 0.0)
-    return np.stack([axes @ (product / (values + ridge)[:, None]) / scale[:, None] for ridge in ridges])
+    damped = np.add.outer(ridge, np.maximum(values, 0.0))[..., None]
+    return np.asarray(axes @ (product / damped) / scale[:, None])
