@@ -11,7 +11,7 @@ Everything here is arrays and formulas, so that a band can be exported with its 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -61,8 +61,7 @@ class Region:
 
     def holds(self, errors: Array) -> NDArray[np.bool_]:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
-        inside: NDArray[np.bool_] = np.all(self.reach(errors) <= 1, axis=0)
-        return inside
+        return np.asarray(np.all(self.reach(errors) <= 1, axis=0))
 
     def scaled(self, factor: float | Array) -> Region:
         """Return the region with its half axes times a factor, or one (S,) for each instant."""
@@ -134,21 +133,8 @@ class Bands(StoredData):
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
         radius = radius_at_level(self.steps if pointwise else self.table(kind), level)
-        return self._region(radius, self.growth(paths, columns, step), track_directions(paths))
-
-    def regions(
-        self, paths: Array, columns: Mapping[str, Array], step: float, levels: Sequence[float]
-    ) -> dict[float, Region]:
-        """Return the regions for whole paths at several levels, those that it promises; arguments as of `region`."""
-        size, ahead = self.growth(paths, columns, step), track_directions(paths)
-        return {
-            level: self._region(radius_at_level(self.whole, level), size, ahead)
-            for level in levels
-            if self.promises(level)
-        }
-
-    def _region(self, radius: Array, size: Array, ahead: Array) -> Region:
-        return Region(ahead, np.outer(self.along * radius, size), np.outer(self.across * radius, size))
+        size = self.growth(paths, columns, step)
+        return Region(track_directions(paths), *(np.outer(scale * radius, size) for scale in (self.along, self.across)))
 
     def table(self, kind: str | None = None) -> Array:
         """Radius (99,) for each of `LEVELS` that holds whole paths, of runs of a kind if one is given."""
@@ -166,10 +152,8 @@ class Bands(StoredData):
 
     def check(self, level: float, kind: str | None = None) -> None:
         """Raise DataError, one sentence, where no band of this level can be promised."""
-        number = isinstance(level, int | float | np.floating)
-        if not number or not 0 < level <= LEVELS[-1]:
-            shown = f"{level:g}" if number else repr(level)
-            raise DataError(f"{shown} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
+        if not isinstance(level, int | float | np.floating) or not 0 < level <= LEVELS[-1]:
+            raise DataError(f"{level} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
         if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {suggest_name(kind, self.kinds)}")
         if not self.promises(level, kind):

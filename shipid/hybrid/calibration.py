@@ -36,7 +36,6 @@ from shipid.metrics import Array, vector_lengths
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 WINDOWS = 60  # of a run that calibrate, at most
-PART = 4096  # windows whose distances are computed at once
 TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
@@ -57,14 +56,10 @@ class _RunShares:
         """Number of windows of each run, (G,)."""
         return np.bincount(self.place, minlength=self.count)
 
-    @cached_property
-    def order(self) -> NDArray[np.int64]:
-        """Windows sorted by their run, (S,)."""
-        return np.argsort(self.place, kind="stable")
-
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
-        sums: Array = np.add.reduceat(values[self.order], np.cumsum(self.sizes) - self.sizes, axis=0)
+        order = np.argsort(self.place, kind="stable")
+        sums: Array = np.add.reduceat(values[order], np.cumsum(self.sizes) - self.sizes, axis=0)
         return sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1))
 
 
@@ -244,12 +239,7 @@ def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, 
     each = max(-(-CENTRES // runs.count), 1)
     chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
-    parts = [slice(first, first + PART) for first in range(0, len(points), PART)]
-    away = [
-        nearest_distances(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen])
-        for part in parts
-    ]
-    return centres, spread, np.concatenate(away)
+    return centres, spread, nearest_distances(points / spread, centres / spread, runs.place, runs.place[chosen])
 
 
 def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -130,7 +130,15 @@ class Inputs:
         planned = {name: instants.planned[name] for name in self.commands} if instants.planned is not None else {}
         means = planned_means(instants.columns, planned)
         table = feature_table({**instants.columns, **means}, (*self.commands, *means))
-        return table | self._history(instants, step)
+        for seconds in self.memory.history:
+            for name in (*MOTIONS, *self.commands):
+                component, dot, signal = name.rpartition(".")
+                label = f"{component}{dot}past-{seconds:g}.{signal}"
+                table[label] = value_before(instants, name, seconds, step) - instants.columns[name]
+        for seconds in self.memory.turned:
+            before = value_before(instants, "psi", seconds, step)
+            table[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
+        return table
 
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
@@ -141,18 +149,6 @@ class Inputs:
             errors = past_error(replace(physics, observer=None), instants, seconds)
             table |= {f"error-{seconds:g}.{name}": values for name, values in errors.items()}
         return table
-
-    def _history(self, instants: Instants, step: float) -> dict[str, Array]:
-        columns: dict[str, Array] = {}
-        for seconds in self.memory.history:
-            for name in (*MOTIONS, *self.commands):
-                component, dot, signal = name.rpartition(".")
-                label = f"{component}{dot}past-{seconds:g}.{signal}"
-                columns[label] = value_before(instants, name, seconds, step) - instants.columns[name]
-        for seconds in self.memory.turned:
-            before = value_before(instants, "psi", seconds, step)
-            columns[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
-        return columns
 
 
 def value_before(instants: Instants, name: str, seconds: float, step: float) -> Array:
@@ -214,8 +210,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
     dx, dy = x0 - ends["x"], y0 - ends["y"]
     c, s = np.cos(turned), np.sin(turned)
-    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
-    errors |= {name: columns[name] - ends[name] for name in MOTIONS}
+    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx, **{name: columns[name] - ends[name] for name in MOTIONS}}
     sound = np.isfinite(np.stack(list(errors.values()))).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}
 
@@ -241,11 +236,8 @@ def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
         if np.ptp(values) <= tolerance:
             continue
         same = (kept for kept in chosen if "." in name and np.abs(table[kept] - values).max() <= tolerance)
-        twin = next(same, None)
-        if twin is None:
-            chosen[name] = (name,)
-        else:
-            chosen[twin] += (name,)
+        twin = next(same, name)
+        chosen[twin] = (*chosen.get(twin, ()), name)
     if not chosen:
         raise DataError(
             f"none of {', '.join(table)} varies over the training windows: nothing can be learned from them"

@@ -180,10 +180,6 @@ class HankelDMD(StepMethod):
         """Length of the past that windows must hold [s]."""
         return max(self.delays)
 
-    def varied(self) -> tuple[str, ...]:
-        """Return the names of the hyperparameters that differ between trials."""
-        return ("delays", *self.ranges())
-
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: the delays."""
         return {"delays": self.delays}

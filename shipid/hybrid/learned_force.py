@@ -72,7 +72,7 @@ class ForceProblem(LearningProblem):
             weights, count = trainer.solve(point["ridge"], self.starts.get(fold))
             self.starts[fold], most = weights, max(most, count)
             losses.append(trainer.error(weights, self.instants.select(validation), self.future[:, validation]))
-        return TrialWorth(float(np.mean(losses)) / 2, point, most)  # per coordinate, as the other methods
+        return float(np.mean(losses)) / 2, point, most  # per coordinate, as the other methods
 
     def solve(self, number: int, point: Point, windows: Index) -> ForceCorrector:  # noqa: ARG002
         """Return the force of a ridge, learned from some windows."""

@@ -265,10 +265,8 @@ def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
             raise DataError(words)
     with locate_errors(f"{name}.fit", type(method)):
         given = method.fit(task)
-    if not isinstance(given, Mapping):
-        raise DataError(f"{name}.fit must return a table, foundation -> FitResult, not {type(given).__name__}")
     for case in task.cases:
-        one = given.get(case)
+        one = given.get(case) if isinstance(given, Mapping) else given
         if not isinstance(one, FitResult):
             raise DataError(f"{name}.fit must give a FitResult for {case!r}, not {type(one).__name__}")
         _check_fitted(f"{name}.fit", one, shape, method.compensates)

@@ -16,9 +16,8 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import FitResult, Task
-from shipid.hybrid.search import Probability, Scale, SearchMethod, ridge_values, setting_at_share, spread_points
+from shipid.hybrid.search import Probability, Scale, SearchMethod, setting_at_share, spread_points
 
-RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory
 MEMORY_CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from, as far as a memory has them
 OBSERVER_CHOICES = (("observer",), MEMORY_KINDS)  # and with estimates of an observer
@@ -120,10 +119,6 @@ class PathDrawn(SearchMethod):
             raise ValueError("choose: there is no memory to choose from: give `memory`, or leave `choose` out")
         return self
 
-    def varied(self) -> tuple[str, ...]:
-        """Return the names of the hyperparameters that differ between trials."""
-        return (*self.ranges(), *self.choices())
-
     def num_chosen(self) -> int:
         """Return how many of the best trials make the compensator, at most."""
         return self.averaged or (4 if self.choose else 8)
@@ -145,10 +140,6 @@ class PathDrawn(SearchMethod):
             yield point | {
                 name: setting_at_share(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)
             }
-
-    def path(self) -> list[float]:
-        """Return the ridges of which each trial takes one for each model, rising, evenly spread by their logarithm."""
-        return ridge_values(self.ridge, RIDGES)
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""

@@ -234,11 +234,8 @@ class Physics:
         environment = {name: columns.get(name, zero) for name in model.environment}
         slow = drift = None
         if self.observer is not None:
-            if not instants.estimates:
-                raise DataError("the physics has an observer: instants must hold its estimates", path="observer")
-            missing = next((name for name in ESTIMATED if name not in instants.estimates), None)
-            if missing is not None:
-                raise DataError("the physics has an observer, and the instants lack this estimate", path=missing)
+            if missing := [name for name in ESTIMATED if name not in instants.estimates]:
+                raise DataError("the physics has an observer: instants must hold its estimates", path=missing[0])
             observed = {**columns, **instants.estimates}
             begun = observed_start(filter_bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift

@@ -19,11 +19,20 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.hybrid.compensator import Normaliser, flatten_paths, smooth_basis, unflatten_paths
+from shipid.hybrid.compensator import Normaliser, flatten_paths, unflatten_paths
 from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, mean_squared_error, seed_of
+from shipid.hybrid.search import (
+    LearningProblem,
+    PathProblem,
+    Point,
+    Scale,
+    SearchedAlone,
+    TrialWorth,
+    mean_squared_error,
+    seed_of,
+)
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 
@@ -116,15 +125,11 @@ class RecurrentCorrector(StoredData):
         return np.asarray(paths + np.mean(corrections, axis=0))
 
 
-class RecurrentProblem(LearningProblem):
+class RecurrentProblem(PathProblem):
     """A foundation whose past is read by networks, one for each fold, that give the error of the path on the basis."""
 
     def __init__(self, method: Recurrent, task: Task, name: str) -> None:
         super().__init__(method, task, name)
-        self.inputs = Inputs(task.commands, method.memory)
-        self.table = self.inputs.table(self.case.physics, self.instants)
-        self.basis = smooth_basis(task.windows.horizon, method.terms)
-        self.weights = np.tensordot(self.basis.T, self.targets, 1)  # (r, S, 2)
         self.trained: dict[int, tuple[GatedNetwork, ...]] = {}  # trial -> networks of the folds
 
     def judge(self, number: int, point: Point) -> TrialWorth:
@@ -133,10 +138,10 @@ class RecurrentProblem(LearningProblem):
         self.trained[number] = tuple(network for network, _ in networks)
         losses = []
         for network, (_, validation) in zip(self.trained[number], self.task.folds, strict=True):
-            here, instants = self._rows(validation), self.instants.select(validation)
+            here, instants = self.rows(validation), self.instants.select(validation)
             predicted = network.predict(here, instants, self.task.commands)
             losses.append(mean_squared_error(predicted, self.targets[:, validation]))
-        return TrialWorth(float(np.mean(losses)), point, max(epochs for _, epochs in networks))
+        return float(np.mean(losses)), point, max(epochs for _, epochs in networks)
 
     def corrector(self, best: Sequence[Row]) -> RecurrentCorrector:
         """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
@@ -145,19 +150,15 @@ class RecurrentProblem(LearningProblem):
             self.judge(number, params)
         return RecurrentCorrector(self.inputs, self.method.past, self.trained[number], params)
 
-    def _rows(self, windows: Index) -> dict[str, Array]:
-        """Inputs of some windows at their instants."""
-        return {key: values[windows] for key, values in self.table.items()}
-
     def _reader(self, training: Index) -> SequenceReader:
         """Statistics of the training windows alone."""
         steps = count_steps(self.method.seconds, self.task.windows.step)
         rows = past_signals(self.task.windows.select(training).instants(), steps, self.task.commands)
         along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-        past, now = (VaryingInputs.of(part, self.method.mirror) for part in (along, self._rows(training)))
-        if past.reflection is None or now.reflection is None:
-            return SequenceReader(past.normaliser, now.normaliser, None, steps)
-        return SequenceReader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
+        past, now = (VaryingInputs.of(part, self.method.mirror) for part in (along, self.rows(training)))
+        alike = past.reflection is not None and now.reflection is not None
+        mirrors = (past.reflection, now.reflection) if alike else None
+        return SequenceReader(past.normaliser, now.normaliser, mirrors, steps)
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""
@@ -167,7 +168,7 @@ class RecurrentProblem(LearningProblem):
         reader, parts = self._reader(training), []
         scale = max(float(np.sqrt(np.square(self.weights[:, training]).mean())), 1e-9)
         for windows in self.task.folds[fold]:
-            seen = reader.read(self._rows(windows), self.instants.select(windows), self.task.commands)
+            seen = reader.read(self.rows(windows), self.instants.select(windows), self.task.commands)
             both = [seen] if reader.mirrors is None else [seen, reader.mirrored(seen)]
             parts.append((both, flatten_paths(self.weights[:, windows]) / scale))
         seed = seed_of(self.task.seed, self.name, number, fold)

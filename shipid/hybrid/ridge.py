@@ -17,7 +17,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -30,12 +30,12 @@ from shipid.hybrid.compensator import Network, smooth_basis
 from shipid.hybrid.features import input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.path_drawn import PathDrawn
-from shipid.hybrid.products import hidden_layer, matrix_product
 from shipid.hybrid.search import (
     CLOSING_TRIALS,
     Point,
     Search,
     diverged_result,
+    ridge_values,
     seed_of,
     trial_row,
     windows_of_folds,
@@ -46,6 +46,7 @@ Mask = NDArray[np.bool_]
 Seeing = tuple[VaryingInputs, Tensor]
 """Windows as hidden units see them: what is seen, and its values (S, d), normalised."""
 
+RIDGES = 9  # of a range
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
 SPARE_TRIALS = 4  # further trials whose errors without each run are kept
@@ -66,13 +67,14 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, FitResult]:
 
 
 @dataclass(frozen=True)
-class _Coordinate:
-    """One coordinate, x or y: features with the axes of their Gram matrix, and what they have to make.
+class _Coordinates:
+    """Coordinates that are made of the same features, with the axes of their Gram matrix, and what they have to make.
 
-    features : (S, M); eigenvalues : (M,), rising; axes : (M, M); targets : (S, K r) [m];
-    product : (M, K r), features on the axes by targets.
+    sides : x, y or both, 0 and 1. features : (S, M); eigenvalues : (M,), rising; axes : (M, M);
+    targets : (S, sides K r) [m], side by side; product : (M, sides K r), features on the axes by targets.
     """
 
+    sides: tuple[int, ...]
     features: Tensor
     eigenvalues: Tensor
     axes: Tensor
@@ -83,6 +85,11 @@ class _Coordinate:
         """Features of some windows (...) on the axes, (..., M)."""
         every = torch.equal(windows, torch.arange(len(self.features)))
         return matrix_product(self.features if every else self.features[windows], self.axes)
+
+    def columns(self, of_side: list[int]) -> list[int]:
+        """Columns of all its sides, from those of one side."""
+        width = self.targets.shape[1] // len(self.sides)
+        return [place * width + column for place in range(len(self.sides)) for column in of_side]
 
     def weights(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """Weights (M, C) of the axes, fitted to all windows, for some columns of the targets."""
@@ -293,7 +300,7 @@ class _RidgeTuning:
         self, group: _FoundationGroup, number: int, judges: _JudgingWindows, wanted: Mapping[str, Index] | None = None
     ) -> dict[str, _TrialVerdict]:
         """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
-        point, terms, ridges = self.points[number], self.basis.shape[1], self.method.path()
+        point, terms, ridges = self.points[number], self.basis.shape[1], ridge_values(self.method.ridge, RIDGES)
         mirrored = bool(point["mirror"]) and group.mirrored is not None
         seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
         units = seen.draw(point, self.method.units, seed_of(self.task.seed, number))
@@ -306,7 +313,7 @@ class _RidgeTuning:
         errors, others, kept = _left_out_errors(parts, scaled, judges.blocks, terms, asked)
         verdicts = {}
         for k, key in enumerate(group.names):
-            place, columns = int(errors[:, k].argmin()), slice(k * terms, (k + 1) * terms)
+            place, columns = int(errors[:, k].argmin()), list(range(k * terms, (k + 1) * terms))
             chosen = np.unique([place, *others[:, :, k].argmin(axis=0)])
             verdicts[key] = _TrialVerdict(
                 value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
@@ -416,27 +423,25 @@ def _normalised_inputs(table: Mapping[str, Array], mirror: bool) -> Seeing:
     return seen, _double_tensor(seen.normaliser.apply(table))
 
 
-def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor]) -> list[_Coordinate]:
+def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor]) -> list[_Coordinates]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
     weight, offset = (_double_tensor(part) for part in (units.weight, units.offset))
     size = len(offset) ** 0.5
     features = hidden_layer(values, weight, offset)
     if units.reflection is None:
-        return _coordinates_with_axes(features.div_(size), outputs)
+        return [_with_axes((0, 1), features.div_(size), outputs)]
     image = hidden_layer(values, _double_tensor(units.reflection) @ weight, offset)
     even = (features + image).div_(2**0.5 * size)
     odd = features.sub_(image).div_(2**0.5 * size)
-    return _coordinates_with_axes(even, outputs[:1]) + _coordinates_with_axes(odd, outputs[1:])
+    return [_with_axes((0,), even, outputs[:1]), _with_axes((1,), odd, outputs[1:])]
 
 
-def _coordinates_with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Coordinate]:
-    """Coordinates that are made of the same features."""
+def _with_axes(sides: tuple[int, ...], features: Tensor, outputs: Sequence[Tensor]) -> _Coordinates:
+    """Coordinates that are made of features (S, M), with the targets (S, K r) of each."""
     eigenvalues, axes = torch.linalg.eigh(matrix_product(features.T, features))
     eigenvalues = eigenvalues.clamp(min=0.0)  # rounding makes none negative
-    return [
-        _Coordinate(features, eigenvalues, axes, side, matrix_product(axes.T, matrix_product(features.T, side)))
-        for side in outputs
-    ]
+    product = [matrix_product(axes.T, matrix_product(features.T, side)) for side in outputs]
+    return _Coordinates(sides, features, eigenvalues, axes, torch.cat(list(outputs), dim=1), torch.cat(product, dim=1))
 
 
 class _LeftOutErrors:
@@ -463,7 +468,7 @@ class _LeftOutErrors:
 
 
 def _left_out_errors(
-    parts: Sequence[_Coordinate],
+    parts: Sequence[_Coordinates],
     ridges: Sequence[float],
     blocks: Sequence[_FoldBlock],
     terms: int,
@@ -480,11 +485,11 @@ def _left_out_errors(
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
     pieces = []
-    for sides, part in _join_alike_sides(parts):
+    for part in parts:
         for end, block in zip(ends, blocks, strict=True):
             solver = (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
-            pieces.append(_SidePiece(sides, slice(end - len(block.out), end), block, solver))
-    num_models = targets.shape[1] // terms
+            pieces.append(_SidePiece(part.sides, slice(end - len(block.out), end), block, solver))
+    num_models = targets.shape[1] // (terms * len(parts[0].sides))
     sums = targets.new_full((len(ridges), num_models), torch.inf)
     others = targets.new_full((len(ridges), ends[-1], num_models), torch.inf)
     errors = _LeftOutErrors(len(targets), terms, len(ridges))
@@ -507,10 +512,11 @@ def _left_out_errors(
     for i, models in asked():
         if not models:
             continue
-        columns = None if len(models) == num_models else [k * terms + term for k in models for term in range(terms)]
+        columns = [k * terms + term for k in models for term in range(terms)]
         by_fold = targets.new_zeros((ends[-1], len(models)))
         for piece in pieces:
-            without = piece.solver.without(ridges[i], piece.columns(columns, targets.shape[1]))
+            every = len(models) == num_models
+            without = piece.solver.without(ridges[i], slice(None) if every else piece.solver.part.columns(columns))
             made = piece.block.of_judged(without)
             squares = np.einsum("fbc,fbc->fc", made.numpy(), made.numpy())
             shares = torch.from_numpy(squares).reshape(len(made), len(piece.sides), len(models), terms)
@@ -521,16 +527,6 @@ def _left_out_errors(
     return sums.numpy(), others.numpy(), errors
 
 
-def _join_alike_sides(parts: Sequence[_Coordinate]) -> Iterator[tuple[tuple[int, ...], _Coordinate]]:
-    """Sides with the same features as one part, their targets side by side."""
-    same = [parts] if all(part.features is parts[0].features for part in parts) else [[part] for part in parts]
-    first = 0
-    for some in same:
-        targets, product = (torch.cat([getattr(part, name) for part in some], dim=1) for name in ("targets", "product"))
-        yield tuple(range(first, first + len(some))), replace(some[0], targets=targets, product=product)
-        first += len(some)
-
-
 @dataclass(frozen=True)
 class _SidePiece:
     """Some sides, x and y, of the folds of a block. folds : their places among all folds."""
@@ -539,12 +535,6 @@ class _SidePiece:
     folds: slice
     block: _FoldBlock
     solver: _FewRows | _ManyRows
-
-    def columns(self, of_side: list[int] | None, width: int) -> list[int] | slice:
-        """Columns of all its sides, from those of one side, which has so many; all of them by default."""
-        if of_side is None:
-            return slice(None)
-        return [place * width + column for place in range(len(self.sides)) for column in of_side]
 
 
 def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tuple[Array, Tensor]:
@@ -558,7 +548,7 @@ class _FewRows:
     In single precision, which is twice as fast, where that is sound: the smaller the ridge, the worse is the condition.
     """
 
-    def __init__(self, part: _Coordinate, block: _FoldBlock) -> None:
+    def __init__(self, part: _Coordinates, block: _FoldBlock) -> None:
         self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
         self.exact = part.rotated(out)
@@ -598,7 +588,7 @@ class _FewRows:
 class _ManyRows:
     """As `_FewRows`, by the output weights without each block, (M, M): for blocks of more windows than features."""
 
-    def __init__(self, part: _Coordinate, block: _FoldBlock) -> None:
+    def __init__(self, part: _Coordinates, block: _FoldBlock) -> None:
         self.part = part
         self.rows, self.targets = part.rotated(block.out), part.targets[block.out]  # (folds, b, M), (folds, b, K r)
         self.within = matrix_product(self.rows.mT, self.rows)
@@ -622,13 +612,17 @@ def _hidden_weights(units: Units) -> tuple[Array, Array]:
 def _solved_network(
     seen: VaryingInputs,
     layer: tuple[Array, Array],
-    parts: Sequence[_Coordinate],
-    columns: slice,
+    parts: Sequence[_Coordinates],
+    columns: list[int],
     ridge: float,
     basis: Array,
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
-    x, y = ((part.axes @ part.weights(ridge, columns)).numpy() / part.features.shape[1] ** 0.5 for part in parts)
+    x, y = (
+        (part.axes @ weights).numpy() / part.features.shape[1] ** 0.5
+        for part in parts
+        for weights in part.weights(ridge, part.columns(columns)).chunk(len(part.sides), dim=1)
+    )
     if seen.reflection is not None:
         x, y = np.concatenate([x, x]) / 2**0.5, np.concatenate([y, -y]) / 2**0.5
     output = np.concatenate([x, y], axis=1)
@@ -637,3 +631,27 @@ def _solved_network(
 
 def _double_tensor(values: Array) -> Tensor:
     return torch.as_tensor(values, dtype=torch.float64)
+
+
+# On AMD products and functions of NumPy take a third to nine tenths of the time of those of PyTorch, except tanh with
+# AVX2 only: docs/performance.md, "Where the time goes". Both share their memory.
+
+
+def matrix_product(left: Tensor, right: Tensor) -> Tensor:
+    """Return left @ right, of matrices or stacks of them."""
+    return torch.from_numpy(np.matmul(left.numpy(), right.numpy()))
+
+
+def hidden_layer(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
+    """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
+    units = np.matmul(values.numpy(), weight.numpy())
+    units += offset.numpy()
+    return torch.from_numpy(units).tanh_() if _tanh_by_torch() else torch.from_numpy(np.tanh(units, out=units))
+
+
+@cache
+def _tanh_by_torch() -> bool:
+    """Whether NumPy's tanh is the one for AVX2, which takes twice the time of PyTorch's; that for AVX-512 does not."""
+    functions = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")  # empty on some processors
+    used = [kind["current"] for kinds in functions.values() for kind in kinds.values()]
+    return any(name in ("X86_V3", "FMA3__AVX2") for name in used)  # as NumPy 2.4 calls AVX2, and as 2.3 does

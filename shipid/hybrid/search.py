@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count, islice
 from math import ceil, exp, floor, log
 from statistics import fmean
@@ -20,13 +19,16 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from pydantic import model_validator as validator
 
-from shipid.hybrid.features import NO_MEMORY, Memory
+from shipid.hybrid.compensator import smooth_basis
+from shipid.hybrid.features import NO_MEMORY, Inputs, Memory
 from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task, Traits
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
 Point = Mapping[str, Any]
 """A trial: values of hyperparameters by name."""
+TrialWorth = tuple[float, Point, int]
+"""Mean squared validation error [m^2] per coordinate of a trial, all its settings, and its epochs."""
 Any_ = TypeVar("Any_")
 TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
 CLOSING_TRIALS = 1  # trials that the last fit costs, about
@@ -75,7 +77,7 @@ class SearchMethod(Method):
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
-        return tuple(self.ranges())
+        return (*self.ranges(), *self.choices())
 
     def num_trials(self) -> int | None:
         """Return how many sets of hyperparameters are tried per foundation; None where the budget decides it."""
@@ -248,9 +250,8 @@ def ridge_values(ridge: float | tuple[float, float], count: int) -> list[float]:
 
 def diverged_result(method: SearchMethod, points: Iterable[Mapping[str, float]]) -> FitResult:
     """The result where the physics is not finite: no corrector, every trial diverged."""
-    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    some = islice(points, 1 if method.budget else None)
-    return FitResult(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
+    start, some = time.process_time(), islice(points, 1 if method.budget else None)
+    return FitResult(None, [trial_row(i, point, np.nan, start) for i, point in enumerate(some)], 0.0)
 
 
 def trial_row(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
@@ -282,15 +283,6 @@ def mean_squared_error(paths: Array, future: Array) -> float:
     return value if np.isfinite(value) else float("inf")
 
 
-@dataclass(frozen=True)
-class TrialWorth:
-    """What a trial is worth: mean squared validation error [m^2] per coordinate, all its settings, and its epochs."""
-
-    value: float
-    params: Mapping[str, float]
-    epochs: int = 0
-
-
 class LearningProblem:
     """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged.
 
@@ -313,11 +305,29 @@ class LearningProblem:
             corrector, instants = self.solve(number, point, training), self.instants.select(validation)
             paths = corrector.predict(self.case.physics, instants, self.case.paths[:, validation])
             losses.append(mean_squared_error(paths, self.future[:, validation]))
-        return TrialWorth(float(np.mean(losses)), point)
+        return float(np.mean(losses)), point, 0
 
     def corrector(self, best: Sequence[Row]) -> Any:
         """Return the corrector that the best trials make, of which there are `num_chosen` at most."""
         return self.solve(best[0]["number"], best[0]["params"], windows_of_folds(self.task))
+
+
+class PathProblem(LearningProblem):
+    """A foundation whose errors of the path, on a basis (T, r) [m], follow from what is known at the instant.
+
+    table : inputs (S,) by name. weights : (r, S, 2), the errors on the basis.
+    """
+
+    def __init__(self, method: Any, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.inputs = Inputs(task.commands, method.memory)
+        self.table = self.inputs.table(self.case.physics, self.instants)
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
+        self.weights = np.tensordot(self.basis.T, self.targets, 1)
+
+    def rows(self, windows: Index) -> dict[str, Array]:
+        """Inputs of some windows."""
+        return {name: values[windows] for name, values in self.table.items()}
 
 
 class SearchedAlone(SearchMethod):
@@ -352,8 +362,8 @@ class SearchedAlone(SearchMethod):
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
         for number, point in search.left(self.points()):
             start = time.process_time()
-            judged = problem.judge(number, point)
-            search.record({name: trial_row(number, judged.params, judged.value, start, judged.epochs)})
+            value, params, epochs = problem.judge(number, point)
+            search.record({name: trial_row(number, params, value, start, epochs)})
         rows = search.rows[name]
         best = best_trials(rows)[: self.num_chosen()]
         return FitResult(problem.corrector(best) if best else None, rows, search.seconds)

@@ -201,7 +201,7 @@ class StepProblem(LearningProblem):
             paths = np.split(corrector.predict(self.case.physics, instants, np.empty(0)), len(ridges), axis=1)
             errors = errors + [mean_squared_error(path, self.future[:, judged]) for path in paths]
         best = int(errors.argmin())
-        return TrialWorth(float(errors[best]) / len(task.folds), {**point, "ridge": ridges[best]})
+        return float(errors[best]) / len(task.folds), {**point, "ridge": ridges[best]}, 0
 
 
 class StepMethod(SearchedAlone):

@@ -76,7 +76,7 @@ ROW = trial_row(0, {}, 1.0, 0.0)
 @pytest.mark.parametrize(
     ("gives", "message"),
     [
-        (None, "must return a table, foundation -> FitResult, not NoneType"),
+        (None, "must give a FitResult for 'right', not NoneType"),
         ({}, "must give a FitResult for 'right', not NoneType"),
         (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a FitResult for 'right', not tuple"),
         ({"right": FitResult(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*trial_row"),
