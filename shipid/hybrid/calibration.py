@@ -101,15 +101,14 @@ def calibrate_bands(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
     judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
-    best = None
-    for circle in (True, False):
-        fitted = _fit_scores(runs, apart, normal, circle)
-        whole = band_radii(fitted.scores.max(axis=0), runs)
-        size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[judged]
-        if best is None or size < TIGHTER * best[0]:
-            best = size, fitted, whole
-    assert best is not None
-    _, fitted, whole = best
+    fits = [_fit_scores(runs, apart, normal, circle) for circle in (True, False)]
+    radii = [band_radii(one.scores.max(axis=0), runs) for one in fits]
+    circle, ellipse = (
+        float(np.sqrt(one.scale[:, 0] * one.scale[:, 1]).mean()) * radius[judged]
+        for one, radius in zip(fits, radii, strict=True)
+    )
+    better = int(ellipse < TIGHTER * circle)
+    fitted, whole = fits[better], radii[better]
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
@@ -245,11 +244,8 @@ def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, 
 def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices of sound windows, at most `WINDOWS` of each run, in order."""
     rows = np.flatnonzero(sound)
-    if not len(rows):
-        return rows
-    place = np.unique(run[rows], return_inverse=True)[1]
-    parts = np.split(rows[np.argsort(place, kind="stable")], np.cumsum(np.bincount(place))[:-1])
-    return np.sort(np.concatenate([choose_evenly(part, WINDOWS) for part in parts]))
+    parts = (choose_evenly(rows[run[rows] == name], WINDOWS) for name in np.unique(run[rows]))
+    return np.sort(np.concatenate([rows[:0], *parts]))
 
 
 def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:

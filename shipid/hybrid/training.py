@@ -110,7 +110,9 @@ def train_stack(
         [leaf for layer in layers for leaf in layer],
         [one["weight_decay"] for one in members],
         length,
-        batches=lambda: _epoch_batches(num_samples, batch, order),
+        batches=lambda: (  # a single batch stays in order
+            [slice(None)] if batch == num_samples else torch.randperm(num_samples, generator=order).split(batch)
+        ),
         rate=lambda _: rates,
         loss=loss,
         watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
@@ -158,11 +160,6 @@ def minimise_losses(
             if not watch.running.any():
                 break
     return watch
-
-
-def _epoch_batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
-    """Cut one epoch into batches, shuffled; a single batch stays in order."""
-    return [slice(None)] if batch >= num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
 
 
 def stack_outputs(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
@@ -278,7 +275,10 @@ def train_gated(
 ) -> tuple[dict[str, Array], int]:
     """Train on the first part of the data, stop by the second; layers by name and the number of epochs."""
     generator = torch.Generator().manual_seed(seed)
-    (seen, outputs), watched = map(_tensors, parts)
+    (seen, outputs), watched = (
+        ([(_single_tensor(past, "cpu"), _single_tensor(now, "cpu")) for past, now in pairs], _single_tensor(out, "cpu"))
+        for pairs, out in parts
+    )
     (past, now), *_ = seen
     shapes = {
         "W_i": (3 * units, past.shape[2]),
@@ -321,13 +321,6 @@ def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
     """Layers by name, in the memory of weights (1, P)."""
     pieces = torch.split(weights[0], [int(np.prod(shape)) for shape in shapes.values()])
     return {name: piece.view(shape) for (name, shape), piece in zip(shapes.items(), pieces, strict=True)}
-
-
-def _tensors(part: Part) -> tuple[list[tuple[Tensor, Tensor]], Tensor]:
-    """What is read, and the outputs, in single precision."""
-    seen, outputs = part
-    pairs = [(torch.as_tensor(past).float(), torch.as_tensor(now).float()) for past, now in seen]
-    return pairs, torch.as_tensor(outputs).float()
 
 
 def _gated_loss(layers: Mapping[str, Tensor], seen: Sequence[tuple[Tensor, Tensor]], outputs: Tensor) -> Tensor:
