@@ -1,9 +1,8 @@
 """Calibration: from errors on runs that a model did not see, to bands that hold their share of paths of a new run.
 
-Windows of one run are alike, runs are exchangeable. So everything here counts runs: each weighs the same, and every
-quantity that a score is divided by comes from the other runs. The radius is set by leaving out every run in turn: the
-rank of a window among the windows of the other runs says which quantile of theirs would have held it, and the radius is
-the quantile of all windows that would have held the wanted share of the windows of runs left out.
+Windows of one run are alike, runs are exchangeable: each run weighs the same, and what a score is divided by comes from
+the other runs. The rank of a window among those of the other runs says which quantile of theirs would have held it; the
+radius is the quantile of all windows that would have held the wanted share of the windows of runs left out.
 
 Sources: Lee, Barber and Willett, "Distribution-free inference with hierarchical data" (arXiv 2306.06342); Dunn,
 Wasserman and Ramdas, "Distribution-free prediction sets for two-layer hierarchical models" (arXiv 1809.07441); Barber,
@@ -74,10 +73,8 @@ def calibrate_bands(
 ) -> Bands | None:
     """Calibrate bands; None where fewer than three runs have errors.
 
-    Parameters
-    ----------
     left_out : errors (T, S, 2) [m], true less predicted, of models that saw the run of the window neither in training
-        nor in any choice. Windows with values that are not finite are left out.
+        nor in any choice; windows with values that are not finite do not count.
     future : true paths (T, S, 2) [m] in the frame (11). run : name of the run of each window, (S,).
     columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
     step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
@@ -138,10 +135,7 @@ def calibrate_bands(
 
 
 def band_radii(scores: Array, runs: _RunShares) -> Array:
-    """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
-
-    The result depends on the scores by run alone, and not on the order of the runs.
-    """
+    """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs."""
     order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")

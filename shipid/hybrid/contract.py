@@ -1,4 +1,4 @@
-"""What a method and its corrector must have: classes that somebody wrote are looked at before anything is computed."""
+"""What a method and its corrector must have, before anything is computed."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Forest: a random forest of what is known at the instant gives the compensation of the path.
 
-The targets are the errors of the path on polynomials of time, as in `path-drawn`; the trees are scikit-learn's (the
-optional extra `forest`), kept as plain arrays, so that a saved predictor needs neither it nor pickle. Random forests:
-Breiman (2001); for ship manoeuvring models: Mei et al. (2019).
+The targets are the errors of the path on polynomials of time, as in `path-drawn`; the trees of scikit-learn are kept as
+plain arrays, so that a predictor does not need it. Breiman (2001); for manoeuvring models: Mei et al. (2019).
 """
 
 from __future__ import annotations
@@ -82,7 +81,7 @@ class Trees(StoredData):
 class ForestCorrector(StoredData):
     """Trees that give the compensation of the path.
 
-    inputs : which quantities the trees may take. names : those that they take, in order.
+    names : inputs that the trees take, in order.
     basis : (T, r) shapes over the horizon [m] that the outputs x_1 ... x_r, y_1 ... y_r weigh.
     """
 

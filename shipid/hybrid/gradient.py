@@ -26,8 +26,8 @@ def tune_gradient(task: Task, method: SearchMethod, inputs: Inputs, length: Leng
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
-    best trial. Foundations with the same inputs and the same architecture in a trial train as one stack. The sampler of
-    a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
+    best trial. Foundations with the same inputs and architecture in a trial train as one stack. The sampler of a trial
+    is seeded by its number.
     """
     trainer, search = _StackTrainer(task, method, inputs, length), Search(task, task.cases, method)
     space = method.space()

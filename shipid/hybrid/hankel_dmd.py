@@ -1,10 +1,8 @@
 """Hankel-DMD with control: a linear law of state, delayed states and commands, in closed form, rolled over the horizon.
 
 a_k = A [nu_k, nu_(k-1) ... nu_(k-d), a_(k-1) ... a_(k-d), commands_k ... commands_(k-d), wind_k] + b, with a_k the
-acceleration that a single step of the physics misses (without physics: the acceleration itself, and its delays are
-left out, for those of nu hold them). A, b are a ridge regression on true steps; then
-nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and control for ships: Diez et al.
-(2021-24).
+acceleration that a single step of the physics misses (without physics: the acceleration, and its delays are left out).
+A, b are a ridge regression on true steps; then nu_(k+1) = physics(nu_k) + step a_k. For ships: Diez et al. (2021-24).
 """
 
 from __future__ import annotations
@@ -155,8 +153,7 @@ class HankelDMD(StepMethod):
 
     Parameters
     ----------
-    delays : how far back the law may look [s]; each is a trial, with every ridge, and judged by the path. `trials`
-        is therefore refused.
+    delays : how far back the law may look [s]; each is a trial, so `trials` is refused.
     ridge : weight of the squared weights of normalised inputs; 8 from low to high.
     mirror, samples : as in `StepMethod`; the image of every step in the mirror counts, too.
     """

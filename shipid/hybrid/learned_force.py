@@ -1,10 +1,9 @@
 """Learned force: a small bounded network inside the equations of motion, trained through multi-step rollouts.
 
 M nu_dot = (forces of the vessel) + tau(u, v, r), tau = tau_max tanh(c h(u, v, r)), the term `hull.learned`. Its numbers
-minimise the mean squared position error over the horizon plus a ridge on them, by L-BFGS on exact gradients of the
-rollout; output weights start from a ridge regression on the forces that single true steps miss. A network inside an
-equation: universal differential equations (Rackauckas et al. 2020); a network as the damping of a ship: van de Ven et
-al. (2007).
+minimise the mean squared position error over the horizon plus a ridge, by L-BFGS on exact gradients of the rollout;
+output weights start from a ridge regression on the forces that single true steps miss. Rackauckas et al. (2020); as the
+damping of a ship: van de Ven et al. (2007).
 """
 
 from __future__ import annotations
@@ -104,8 +103,7 @@ class LearnedForce(SearchedAlone):
 
     Parameters
     ----------
-    trials : values of the ridge that are tried, evenly spread by its logarithm; with a `budget` as many of them as
-        fit, from the stiffest on.
+    trials : values of the ridge that are tried; with a `budget` as many of them as fit, from the stiffest on.
     units : hidden units of the network.
     ridge : weight of the mean squared output weight [m^2]; a range is searched.
     limit : bound of the force, times m U^2 / L_pp, and of the moment, times I_z (U / L_pp)^2, with U the greatest speed

@@ -40,7 +40,8 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
         raise DocumentError(f"{kind!r} is no kind of method: {method_names(kind)}", path=f"{path}.kind")
     if fault := fault_of_method(METHODS[kind]):
         raise DocumentError(f"METHODS[{kind!r}]: {fault}", path=f"{path}.kind")
-    return parse_model(METHODS[kind], dict(settings), None, path)
+    method: Method = parse_model(METHODS[kind], dict(settings), None, path)
+    return method
 
 
 def method_names(kind: str) -> str:

@@ -1,8 +1,7 @@
 """Path, drawn: networks whose hidden units are drawn at random and whose output weights are solved in closed form.
 
 f(z) = B W tanh(V z + c) with V, c drawn, B polynomials of time, and W = argmin |targets - f|^2 + ridge |W|^2; every
-trial is judged by every run left out in turn, at the price of one solution (`shipid.hybrid.ridge`). Random features:
-Rahimi and Recht (2007); leave-one-out from the hat matrix: Allen (1974).
+trial is judged by every run left out in turn (`shipid.hybrid.ridge`). Random features: Rahimi and Recht (2007).
 """
 
 from __future__ import annotations
@@ -29,28 +28,25 @@ Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 class PathDrawn(SearchMethod):
     """Networks with drawn hidden units on the errors of the path, solved in closed form.
 
-    All ranges are searched by their logarithm, with the same trials for all foundations. The defaults were chosen on
-    held-out windows of five worlds of `simulation`: docs/performance.md, "What lowers H".
+    All ranges are searched by their logarithm. Source of the defaults: docs/performance.md, "What lowers H".
 
     Parameters
     ----------
     trials : sets of hyperparameters tried per foundation.
     units : hidden units of tanh, drawn at random; twice as many where they come in mirrored pairs.
     motion_scale, command_scale, wind_scale : how far an input must move, in its standard deviations, to change a hidden
-        unit by about one: u, v, r; the commands; the relative wind. Large = the compensation varies slowly with it.
+        unit by about one.
     offset : spread of the offsets of the hidden units: large bends more.
-    ridge : weight of the squared output weights; of 9 from low to high, each trial takes for each model the best that
-        is found by descent from the middle.
+    ridge : weight of the squared output weights; each trial takes for each model the best of 9 by descent from the
+        middle.
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
-    averaged : the compensation is the mean of the networks of so many best trials; by default 8, and 4 with `choose`,
-        where each memory has a part of the trials only.
+    averaged : the compensation is the mean of the networks of so many best trials; by default 8, and 4 with `choose`.
     search_windows : about so many windows, evenly taken from each run, judge all trials where there are more; the
         best are then judged, and solved, with all windows.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
     choose : whether validation chooses between no memory, the error of the physics, and that with history; with
-        `memory.observer` also between its estimates alone and everything; all without what `memory` lacks. Each choice
-        has an equal share of the trials.
+        `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -110,7 +106,7 @@ class PathDrawn(SearchMethod):
 
     @property
     def memories(self) -> tuple[int, ...]:
-        """What validation chooses from, as places in `MEMORIES`: all choices without what the memory lacks."""
+        """What validation chooses from, as places in `MEMORIES`."""
         choices = (*MEMORY_CHOICES, *OBSERVER_CHOICES) if self.memory.observer else MEMORY_CHOICES
         kept = (tuple(kind for kind in choice if kind in self.kinds) for choice in choices)
         return tuple(dict.fromkeys(map(MEMORIES.index, kept)))
@@ -133,7 +129,7 @@ class PathDrawn(SearchMethod):
         return {**mirror, **memory}
 
     def points(self) -> Iterator[dict[str, float]]:
-        """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0; endless by budget."""
+        """Return the trials: a value of everything searched but the ridge, and `mirror`; endless by budget."""
         ranges = [name for name in self.ranges() if name != "ridge"]
         fixed = {name: value for name in self.SEARCHED if not isinstance(value := getattr(self, name), tuple)}
         for number, shares in enumerate(spread_points(len(ranges) + 1, None if self.budget else self.trials)):

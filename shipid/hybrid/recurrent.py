@@ -1,11 +1,9 @@
 """Recurrent: a gated recurrent unit reads the past, and gives the compensation of the path.
 
 h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
-[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time; where commands are
-known, the plan is among the inputs at the instant, as in `path-drawn`. AdamW on the mean squared error of the path,
-early stopping on the validation windows; the mean of the networks of the folds is the corrector. With mirror, x is even
-and y odd under the exchange of port and starboard, by construction. The usual deep rival (the unit: Cho et al. 2014);
-PyTorch trains it, plain arrays predict.
+[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time. AdamW on the mean
+squared error of the path, early stopping on the validation windows; the corrector is the mean over the folds. With
+mirror, x is even and y odd by construction. The unit: Cho et al. (2014); PyTorch trains it, plain arrays predict.
 """
 
 from __future__ import annotations
@@ -44,9 +42,8 @@ Sequences = tuple[Array, Array]
 class SequenceReader(StoredData):
     """Names, statistics and mirrors of what a network reads.
 
-    past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
-    mirrors : of both; None where port and starboard are not mirror images.
-    steps : number of past steps.
+    past, now : z-scores of the signals of the past with the instant, and of the inputs at the instant.
+    mirrors : of both; None where port and starboard are not mirror images. steps : of the past.
     """
 
     past: Normaliser
@@ -133,7 +130,7 @@ class RecurrentProblem(PathProblem):
         self.trained: dict[int, tuple[GatedNetwork, ...]] = {}  # trial -> networks of the folds
 
     def judge(self, number: int, point: Point) -> TrialWorth:
-        """Return the error of the networks of the folds on their validation windows, and the most epochs of one."""
+        """Return the error of the networks of the folds, and the most epochs of one."""
         networks = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
         self.trained[number] = tuple(network for network, _ in networks)
         losses = []
@@ -156,9 +153,9 @@ class RecurrentProblem(PathProblem):
         rows = past_signals(self.task.windows.select(training).instants(), steps, self.task.commands)
         along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
         past, now = (VaryingInputs.of(part, self.method.mirror) for part in (along, self.rows(training)))
-        alike = past.reflection is not None and now.reflection is not None
-        mirrors = (past.reflection, now.reflection) if alike else None
-        return SequenceReader(past.normaliser, now.normaliser, mirrors, steps)
+        mirrors = past.reflection, now.reflection
+        both = None if mirrors[0] is None or mirrors[1] is None else (mirrors[0], mirrors[1])
+        return SequenceReader(past.normaliser, now.normaliser, both, steps)
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""

@@ -1,15 +1,14 @@
 """Tuning in closed form: hidden units are drawn, output weights are a least-squares solution with a ridge.
 
-With the hidden layer fixed, the output weights of all models follow from one decomposition, for every ridge, and so
-does the error on each manoeuvre left out in turn: from the residuals r of the whole and the hat matrix H, that of a
-left-out block is (I - H_bb)^-1 r_b. So a trial is judged by every manoeuvre at the price of one solution.
+The output weights of all models follow from one decomposition, for every ridge, and so does the error on each run left
+out in turn: from the residuals r of the whole and the hat matrix H, that of a left-out block is (I - H_bb)^-1 r_b
+(Allen, 1974).
 
-A ship whose port and starboard sides are alike answers mirrored inputs with the mirrored path. A mirrored trial pairs
-each hidden unit with its mirror image, with equal output weights for x and opposite ones for y: the compensation then
-has this symmetry exactly, and each manoeuvre counts twice.
+A mirrored trial pairs each hidden unit with its mirror image, with equal output weights for x and opposite ones for y:
+mirrored inputs then give the mirrored path exactly.
 
-Windows of a run are alike. Where there are many, trials are compared by a part of them, evenly taken from each run.
-The best ones are judged once more, and solved, with all of them: successive halving (Jamieson and Talwalkar, 2016).
+Where windows are many, trials are compared by a part of them, evenly taken from each run; the best ones are judged once
+more, and solved, with all of them: successive halving (Jamieson and Talwalkar, 2016).
 """
 
 from __future__ import annotations
@@ -57,9 +56,8 @@ def tune_ridge(task: Task, method: PathDrawn) -> dict[str, FitResult]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
-    predicted by the solution without any window outside its training part. The compensator is the mean of the networks
-    of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
-    chooses the trials that are judged by all, and of these the best make the compensator.
+    predicted by the solution from its training part. The compensator is the mean of the networks of the best trials,
+    solved with all windows of the folds.
     """
     tuning = _RidgeTuning(task, method)
     tuning.search()
@@ -125,9 +123,9 @@ class _FoundationGroup:
 class _JudgingWindows:
     """Windows by which trials are judged: all, or a part.
 
-    rows : places of the windows among all, (S,). share : of all windows, by which a ridge shrinks as the sum of squares
-    does. blocks : what each fold leaves out of them. faster : sum of squares [m^2] of each foundation over those judged
-    that no network follows. count : number of windows that are judged.
+    rows : places of the windows among all, (S,). share : of all windows, by which a ridge shrinks.
+    blocks : what each fold leaves out of them. faster : sum of squares [m^2] of each foundation over those judged that
+    no network follows. count : number of windows that are judged.
     """
 
     rows: Index
@@ -166,10 +164,7 @@ class _TrialVerdict:
 
 
 class _BestTrials:
-    """The networks of the best trials of one model so far, and the errors without each fold of some more.
-
-    Without a fold, other trials may be the best.
-    """
+    """The networks of the best trials of one model so far, and the errors without each fold of some more."""
 
     def __init__(self, most: int) -> None:
         self.most = most
@@ -328,8 +323,8 @@ class _RidgeTuning:
 def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
     """Places of about `most` of the windows (S,), evenly taken from each run, one at least; all where they are few.
 
-    run : name of the run of each window, (S,). The windows of a run are in the order of time. Each run begins at
-    another part of a step, so that all moments of alike manoeuvres are seen.
+    run : name of the run of each window, (S,), in the order of time. Each run begins at another part of a step, so that
+    all moments of alike manoeuvres are seen.
     """
     if len(run) <= most:
         return np.arange(len(run))
@@ -344,8 +339,7 @@ def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
 def _ridges_for_all(ridges: Sequence[float], share: float, chosen: Index) -> Index:
     """Numbers of the rising ridges that all windows may choose where a share of them chose these.
 
-    A fit to a part has ridges smaller by that share, which is right where windows are alike. Where each has news, a
-    ridge is right for any number of windows. So that of all windows is one of those chosen, or smaller by that share.
+    Where windows are alike, a fit to a part has ridges smaller by that share; where each has news, the same ones.
     """
     lowest = np.searchsorted(ridges, share * np.asarray(ridges)[chosen] * (1 + 1e-9), side="right") - 1
     ranges = zip(np.maximum(lowest, 0), chosen, strict=True)
@@ -477,8 +471,7 @@ def _left_out_errors(
     """Errors over judged windows, each block without itself.
 
     `ridges` rise; `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models. By default each model
-    descends from the middle of the ridges: those on either side are taken one by one, as long as the last one is the
-    best so far by all folds, or by all but one of them.
+    descends from the middle, to either side as long as the last one is the best so far by all folds, or all but one.
 
     Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
     errors. The sums of a ridge that is not asked are infinite.
@@ -545,7 +538,7 @@ def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tup
 class _FewRows:
     """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b).
 
-    In single precision, which is twice as fast, where that is sound: the smaller the ridge, the worse is the condition.
+    In single precision, which is twice as fast, where that is sound.
     """
 
     def __init__(self, part: _Coordinates, block: _FoldBlock) -> None:

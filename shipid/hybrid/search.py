@@ -1,8 +1,7 @@
 """The search of a method: its trials, which are left, how many fit into a budget, and the skeleton of most methods.
 
-Trials are numbered, and whatever is random in one is seeded by its number. So a search that was interrupted goes on
-from its journal and gives the digits of one that was not. A budget becomes a number of trials by the time of the first
-ones; the number is written down before it is used, and read back.
+Whatever is random in a trial is seeded by its number, so a search that was interrupted goes on from its journal and
+gives the digits of one that was not. A budget becomes a number of trials by the time of the first ones, written down.
 """
 
 from __future__ import annotations
@@ -43,8 +42,8 @@ class SearchMethod(Method):
     Parameters
     ----------
     trials : sets of hyperparameters tried per foundation.
-    budget : core-seconds [s] per foundation for the whole fit, in place of `trials`: as many trials are made as fit,
-        by the time that the first ones take (`shipid.hybrid.search`), one at least.
+    budget : core-seconds [s] per foundation for the whole fit, in place of `trials`: as many trials as fit by the time
+        that the first ones take, one at least.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ()
@@ -124,11 +123,8 @@ def affordable_trials(
 ) -> int | None:
     """How many trials fit into a budget; None before enough have been timed, or half of the budget is gone.
 
-    Parameters
-    ----------
-    budget : core-seconds for everything [s].
-    before : what the search has cost before its first trial [s].
-    seconds : of the trials so far [s]; the first one also warms up, so the others tell the price.
+    budget : core-seconds for everything. before : what the search has cost before its first trial [s].
+    seconds : of the trials so far; the first one also warms up, so the others tell the price.
     closing : trials that what follows the search costs, about.
     """
     if not seconds or (len(seconds) < TIMED_TRIALS and before + sum(seconds) < budget / 2):
@@ -140,16 +136,9 @@ def affordable_trials(
 class Search:
     """The trials of one or several foundations that go trial by trial together.
 
-    Parameters
-    ----------
-    task, method : what is searched.
-    names : the foundations.
-    closing : as in `affordable_trials`.
+    names : the foundations. closing : as in `affordable_trials`.
     again : each trial needs what the one before left behind, so nothing is taken over from an interrupted search but
-        its number of trials; the digits are the same.
-
-    Attributes
-    ----------
+        its number of trials.
     rows : foundation -> its trials so far, those of an interrupted search first.
     """
 
@@ -224,8 +213,7 @@ class Search:
 def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
     """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
 
-    A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
-    a budget says how many are made. Where nothing is searched they differ in what is drawn at random.
+    They never end where a budget says how many are made. Where nothing is searched they differ in what is drawn.
     """
     ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
     fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in {*ranges, *idle}}
@@ -284,10 +272,7 @@ def mean_squared_error(paths: Array, future: Array) -> float:
 
 
 class LearningProblem:
-    """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged.
-
-    method : with its settings. task, name : the task and the name of the foundation.
-    """
+    """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged."""
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
         self.method, self.task, self.name = method, task, name
@@ -299,7 +284,7 @@ class LearningProblem:
         raise NotImplementedError
 
     def judge(self, number: int, point: Point) -> TrialWorth:
-        """Return the mean over the folds of the error on validation windows of what the training windows taught."""
+        """Return the mean error over the folds on validation windows of what the training windows taught."""
         losses = []
         for training, validation in self.task.folds:
             corrector, instants = self.solve(number, point, training), self.instants.select(validation)

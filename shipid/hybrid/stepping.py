@@ -1,9 +1,8 @@
 """Velocities one step at a time: what a step of the physics misses, and paths on which something is added to each step.
 
-After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where physics is
-integrated by `rk4`, heading and position move as it says, plus step^2 / 2 x a. By `euler`, which errs there by half a
-step, and without a vessel, which leaves the velocities as they are, they are the trapezoid of the velocities.
-Steps start from measured states: physics with an observer are refused.
+After a step the velocities are those of the physics plus step x a, with a the missing acceleration. By `rk4`, heading
+and position move as it says, plus step^2 / 2 x a; by `euler`, which errs there by half a step, and without a vessel
+they are the trapezoid of the velocities. Steps start from measured states: physics with an observer are refused.
 """
 
 from __future__ import annotations
@@ -39,17 +38,7 @@ VELOCITY_LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
 
 class Stepper:
-    """The physics in single steps from some instants.
-
-    Parameters
-    ----------
-    physics : as in a case.
-    instants : S instants of prediction; commands are held or planned.
-
-    Raises
-    ------
-    DataError : for physics with an observer.
-    """
+    """The physics in single steps from S instants; DataError for physics with an observer."""
 
     def __init__(self, physics: Physics, instants: Instants) -> None:
         if physics.observer is not None:
@@ -87,8 +76,8 @@ def _step_and_way(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
 def stepped_paths(physics: Physics, instants: Instants, acceleration: Acceleration) -> Array:
     """Paths (T, S, 2) [m] in the frame (11) on which `acceleration` is added to each step of the physics.
 
-    acceleration : (what holds at the start of the step, number of the step, velocities (S, 3) after it by the physics
-        alone) -> missing acceleration (S, 3) [m/s^2, rad/s^2].
+    acceleration : (start of the step, its number, velocities (S, 3) after it by the physics alone) -> missing
+        acceleration (S, 3) [m/s^2, rad/s^2].
     """
     stepper, step = Stepper(physics, instants), physics.step
     nu = np.stack([np.asarray(instants.columns[name], dtype=float) for name in MOTIONS], axis=1)
@@ -149,10 +138,9 @@ class TrueSteps:
 
 
 def true_steps(task: Task, name: str) -> TrueSteps:
-    """Steps of the true motion over the windows of a task, and what the physics of a foundation makes of them.
+    """Steps of the true motion over the windows of a task; DataError where they hold no true states.
 
-    A moment that several windows of a run hold is taken where it is nearest to the instant, so that the wind is as
-    fresh as can be. DataError where the windows hold no true states.
+    A moment that several windows of a run hold is taken where it is nearest to the instant: the wind is fresh there.
     """
     windows, physics = task.windows, task.cases[name].physics
     if not windows.states:
@@ -205,7 +193,7 @@ class StepProblem(LearningProblem):
 
 
 class StepMethod(SearchedAlone):
-    """A method that adds to each step: a trial is solved on true steps for all ridges, and judged by the path.
+    """A method that adds to each step: a trial is solved on true steps for several ridges, and judged by the path.
 
     RIDGES : how many ridges are solved where `ridge` is a range.
 

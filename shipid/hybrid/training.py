@@ -1,8 +1,7 @@
 """Training by PyTorch, with one loop, `minimise_losses`: stacks of small networks, and gated recurrent units.
 
-The K members of a stack share inputs, batches and structure; each has separate targets, initial weights, learning rate,
-weight decay and drop-out, and nothing it computes depends on who else is in the stack. One small network leaves a core
-waiting; nineteen of them as one batched product do not.
+The K members of a stack share inputs, batches and structure; nothing that one computes depends on the others. One small
+network leaves a core waiting; nineteen of them as one batched product do not.
 """
 
 from __future__ import annotations
@@ -33,11 +32,8 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's d
 
 @dataclass(frozen=True)
 class Length:
-    """How long networks are trained.
+    """How long networks are trained: `epochs` at most.
 
-    Parameters
-    ----------
-    epochs : at most so many passes over the training samples.
     batch : samples per optimiser step; 0 = all of them.
     patience : epochs without a better validation loss after which a member stops; 0 = it never does.
     """
@@ -82,9 +78,9 @@ def train_stack(
         `weight_decay` (AdamW; 0 is Adam), and `input_dropout` and `hidden_dropout`, the probabilities to be dropped.
     seeds : (K,) of the initial weights and drop-out of each member.
     order_seed : of the order of the samples in batches, the same for all members.
-    device : a PyTorch device; random numbers are drawn on the CPU, hence the same everywhere.
+    device : a PyTorch device; random numbers are drawn on the CPU.
 
-    A member that diverges keeps its best weights before that, no numbers where there are none; others go on.
+    A member that diverges keeps its best weights before that; others go on.
     """
     num_samples = len(train_idx)
     num_layers, units = int(members[0]["layers"]), int(members[0]["units"])
@@ -111,7 +107,7 @@ def train_stack(
         [one["weight_decay"] for one in members],
         length,
         batches=lambda: (  # a single batch stays in order
-            [slice(None)] if batch == num_samples else torch.randperm(num_samples, generator=order).split(batch)
+            [slice(None)] if batch == num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
         ),
         rate=lambda _: rates,
         loss=loss,

@@ -88,7 +88,7 @@ class Units(StoredData):
 def mirror_matrix(table: Mapping[str, Array], features: Mapping[str, tuple[str, ...]]) -> Array | None:
     """The mirror (d, d) on inputs, a signed permutation: image = inputs @ it; None where a column has no image.
 
-    Names of components say their sides. Several that say none, such as `m1` and `m2`, have no image.
+    Names of components say their sides; several that say none have no image.
     """
     standing = {column: name for name, columns in features.items() for column in columns}
     names = list(features)
