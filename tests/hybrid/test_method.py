@@ -33,17 +33,6 @@ def task(**options: object) -> Task:
     return Task(cases, windows, options.pop("folds", folds), commands, **options)  # type: ignore[arg-type]
 
 
-def test_instants_hold_what_belongs_to_the_foundation() -> None:
-    count = len(task().windows)
-    given = task(estimates={"wrong": {"observer.u": np.ones(count)}}, hidden={"right": {"port.n": np.zeros(count)}})
-    assert set(given.instants("wrong").estimates) == {"observer.u"}
-    assert given.instants("wrong").hidden is None
-    assert given.instants("right").hidden is not None
-    assert not given.instants("right").estimates
-    assert given.instants("none").planned is None
-    assert task(known=True).instants("none").planned is not None
-
-
 @pytest.mark.parametrize("empty", [0, 1])
 def test_a_fold_without_windows_is_refused(empty: int) -> None:
     fold = [np.arange(4), np.arange(4, 8)]
