@@ -54,10 +54,6 @@ class Region:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
         return np.asarray(np.all(self.reach(errors) <= 1, axis=0))
 
-    def scaled(self, factor: float | Array) -> Region:
-        """Return the region with its half axes times a factor, or one (S,) for each instant."""
-        return Region(self.ahead, self.along * factor, self.across * factor)
-
 
 @dataclass(frozen=True, eq=False)
 class Bands(StoredData):
@@ -124,7 +120,8 @@ class Bands(StoredData):
 
     def growth(self, paths: Array, columns: Mapping[str, Array], step: float) -> Array:
         """How much wider (S,) the band of each prediction is than that of an average one [1]."""
-        away = distance_from_training(columns, self.names, self.centres, self.spread)
+        points = np.stack([columns[name] for name in self.names], axis=1)
+        away = nearest_distances(points / self.spread, self.centres / self.spread)
         seen = np.clip(
             prediction_traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high
         )
@@ -210,13 +207,6 @@ def prediction_traits(paths: Array, columns: Mapping[str, Array], step: float, a
             np.log1p(away),
         ]
     )
-
-
-def distance_from_training(
-    columns: Mapping[str, Array], names: tuple[str, ...], centres: Array, spread: Array
-) -> Array:
-    """Distance (S,) [1] of instants from the nearest of some points of training, root mean square over columns."""
-    return nearest_distances(np.stack([columns[name] for name in names], axis=1) / spread, centres / spread)
 
 
 def nearest_distances(

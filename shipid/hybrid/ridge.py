@@ -299,7 +299,9 @@ class _RidgeTuning:
         mirrored = bool(point["mirror"]) and group.mirrored is not None
         seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
         units = seen.draw(point, self.method.units, seed_of(self.task.seed, number))
-        layer = _hidden_weights(units)  # the same array for all foundations
+        layer = units.weight, units.offset  # the same arrays for all foundations
+        if units.reflection is not None:  # and the mirror images
+            layer = np.concatenate([layer[0], units.reflection @ layer[0]], axis=1), np.tile(layer[1], 2)
         parts = _coordinates_of_trial(values, units, group.outputs)
         asked = None
         if wanted is not None:
@@ -592,14 +594,6 @@ class _ManyRows:
         remainder = torch.diag(self.part.eigenvalues + ridge) - self.within
         solved = torch.linalg.solve(remainder, self.other[..., columns])
         return self.targets[..., columns] - matrix_product(self.rows, solved)
-
-
-def _hidden_weights(units: Units) -> tuple[Array, Array]:
-    """Weights (d, M) and offsets (M,) of the hidden layer of a network: the units drawn, and their mirror images."""
-    weight, offset = units.weight, units.offset
-    if units.reflection is None:
-        return weight, offset
-    return np.concatenate([weight, units.reflection @ weight], axis=1), np.concatenate([offset, offset])
 
 
 def _solved_network(

@@ -85,7 +85,7 @@ def train_stack(
     num_samples = len(train_idx)
     num_layers, units = int(members[0]["layers"]), int(members[0]["units"])
     widths = [inputs.shape[1], *[units] * num_layers, targets.shape[2]]
-    rates = _single_tensor([one["learning_rate"] for one in members], device)[:, None]
+    learning = _single_tensor([one["learning_rate"] for one in members], device)[:, None]
     dropout = [[one[name] for one in members] for name in ("input_dropout", *["hidden_dropout"] * num_layers)]
     x, y = _single_tensor(inputs[train_idx], device), _single_tensor(targets[:, train_idx], device)
     x_val, y_val = _single_tensor(inputs[val_idx], device), _single_tensor(targets[:, val_idx], device)
@@ -97,7 +97,10 @@ def train_stack(
 
     def loss(rows: Tensor | slice) -> Tensor:
         x_batch, y_batch = x[rows], y[:, rows]
-        masks = _dropout_masks(len(x_batch), widths, dropout, generators, device)
+        masks = [  # for the input of each layer, or None where no member drops any
+            draw_dropout(rates, (len(x_batch), width), generators).to(device) if any(rates) else None
+            for rates, width in zip(dropout, widths[:-1], strict=True)
+        ]
         return (stack_outputs(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
 
     batch = min(length.batch or num_samples, num_samples)
@@ -109,7 +112,7 @@ def train_stack(
         batches=lambda: (  # a single batch stays in order
             [slice(None)] if batch == num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
         ),
-        rate=lambda _: rates,
+        rate=lambda _: learning,
         loss=loss,
         watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
     )
@@ -233,20 +236,6 @@ def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tens
         views.append((flat[:, start:middle].view(-1, i, o), flat[:, None, middle:end]))
         start = end
     return views
-
-
-def _dropout_masks(
-    num_samples: int,
-    widths: Sequence[int],
-    dropout: Sequence[Sequence[float]],
-    generators: Sequence[torch.Generator],
-    device: str,
-) -> Masks:
-    """Draw a mask (K, n, i) for the input of each layer, or None where no member drops any."""
-    return [
-        draw_dropout(rates, (num_samples, width), generators).to(device) if any(rates) else None
-        for rates, width in zip(dropout, widths[:-1], strict=True)
-    ]
 
 
 def draw_dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:

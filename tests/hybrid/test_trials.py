@@ -15,9 +15,6 @@ from shipid.hybrid.search import (
     trial_row,
 )
 
-RUNS = {"u": np.arange(12.0)}
-FOLDS = [(np.arange(0, 6), np.arange(6, 9)), (np.arange(3, 9), np.arange(0, 3))]
-
 
 class Counting(SearchMethod):
     """Whole numbers, shares, and a number by its logarithm."""
