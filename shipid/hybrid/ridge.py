@@ -28,7 +28,6 @@ from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Network, smooth_basis
 from shipid.hybrid.features import input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.search import (
     CLOSING_TRIALS,
     Point,
@@ -52,7 +51,7 @@ SPARE_TRIALS = 4  # further trials whose errors without each run are kept
 LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
 
 
-def tune_ridge(task: Task, method: PathDrawn) -> dict[str, FitResult]:
+def tune_ridge(task: Task, method: Any) -> dict[str, FitResult]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
@@ -200,7 +199,7 @@ class _RidgeTuning:
     windows as judges; first : those that judge all trials. rows : of each foundation, its trials.
     """
 
-    def __init__(self, task: Task, method: PathDrawn) -> None:
+    def __init__(self, task: Task, method: Any) -> None:
         self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
         self.windows, self.targets = windows_of_folds(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
