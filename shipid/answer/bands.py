@@ -32,9 +32,10 @@ def cell_regions(
     for row in results.rows:
         bands = results.bands.get(row["cell"])
         if bands is not None and any(bands.promises(level) for level in levels):
-            paths = results.paths[row["cell"]]
-            by_level = bands.regions(paths, results.test.columns, results.test.step, levels)
-            yield row, by_level, results.test.future - paths
+            paths, test = results.paths[row["cell"]], results.test
+            kept = filter(bands.promises, levels)
+            by_level = {level: bands.region(paths, test.columns, test.step, level) for level in kept}
+            yield row, by_level, test.future - paths
 
 
 def coverage_frame(results: Results) -> pd.DataFrame:

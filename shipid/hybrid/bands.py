@@ -1,17 +1,14 @@
 """Bands: a region around every step of a predicted path that holds the whole path, or each step, with a probability.
 
-The region at step k is an ellipse around the predicted position, along and across the predicted track, or a circle. Its
-half axes are `radius(level) * scale[k] * growth`: the scale says how errors grow over the horizon, the growth how much
-harder this prediction is than others, by the predicted path and by the distance from the windows of training. The
-radius is calibrated on runs that the models behind the errors did not see: `shipid.hybrid.calibration`.
-
-Everything here is arrays and formulas, so that a band can be exported with its predictor.
+The region at step k is an ellipse along and across the predicted track, or a circle, with half axes
+`radius(level) * scale[k] * growth`: how errors grow over the horizon, and how much harder this prediction is than
+others. The radius is calibrated on runs that no model saw: `shipid.hybrid.calibration`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -34,10 +31,7 @@ TRAITS = ("length", "turn", "change", "slip", "distance")
 class Region:
     """Regions around predicted paths, in the frame (11) of the instants.
 
-    Parameters
-    ----------
-    ahead : unit vector (T, S, 2) of the predicted track.
-    along, across : half axes (T, S) [m] of the ellipse along the track and across it.
+    ahead : unit vector (T, S, 2) of the predicted track. along, across : half axes (T, S) [m].
     """
 
     ahead: Array
@@ -46,14 +40,11 @@ class Region:
 
     @property
     def radius(self) -> Array:
-        """Radius (T, S) [m] of the circle with the area of the region: the width of a band in one number."""
+        """Radius (T, S) [m] of the circle with the area of the region."""
         return np.asarray(np.sqrt(self.along * self.across))
 
     def reach(self, errors: Array) -> Array:
-        """How far errors (T, S, 2) [m] from the predicted path reach, (T, S): 1 at the border of the region.
-
-        No error reaches 0, also in the region without extent of a predictor that never erred.
-        """
+        """How far errors (T, S, 2) [m] reach, (T, S): 1 at the border of the region; 0 without an error."""
         along, across = split_along_track(errors, self.ahead)
         with np.errstate(divide="ignore", invalid="ignore"):
             parts = np.stack([along / self.along, across / self.across], axis=-1)
@@ -61,20 +52,13 @@ class Region:
 
     def holds(self, errors: Array) -> NDArray[np.bool_]:
         """Whether the whole path, with errors (T, S, 2) [m], lies in its band, (S,)."""
-        inside: NDArray[np.bool_] = np.all(self.reach(errors) <= 1, axis=0)
-        return inside
-
-    def scaled(self, factor: float | Array) -> Region:
-        """Return the region with its half axes times a factor, or one (S,) for each instant."""
-        return Region(self.ahead, self.along * factor, self.across * factor)
+        return np.asarray(np.all(self.reach(errors) <= 1, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
 class Bands(StoredData):
     """Calibrated bands of a predictor.
 
-    Parameters
-    ----------
     runs : number of runs that calibrated it.
     along, across : scale (T,) [m] of the errors along the predicted track and across it; equal for a circle.
     whole : (99,) radius for each of `LEVELS` that holds whole paths.
@@ -85,8 +69,8 @@ class Bands(StoredData):
     middle, deviation, low, high : (5,) mean, standard deviation, least and greatest value of each of `TRAITS`.
     slopes : (5,) growth per standard deviation of each trait, as the logarithm.
     length : mean length [m] of the predicted paths of calibration.
-    kinds : kinds of manoeuvre of the runs of calibration -> number of runs, where they were known.
-    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind; of use where a kind has enough runs.
+    kinds : kind of manoeuvre -> number of runs, where it was known.
+    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind.
     """
 
     runs: int
@@ -117,46 +101,27 @@ class Bands(StoredData):
         pointwise: bool = False,
         kind: str | None = None,
     ) -> Region:
-        """Return the region around paths (T, S, 2) [m] in the frame (11).
+        """Return the region around paths (T, S, 2) [m] in the frame (11); DataError as of `check`.
 
-        Parameters
-        ----------
         columns : measured columns at the instants, name -> (S,). step : of the path [s].
         level : share of whole paths that the region holds, such as 0.9; with `pointwise`, of positions at each step.
-        kind : kind of manoeuvre of the run, if it is known: the share then holds for runs of this kind, and not only
-            for all kinds together as they were mixed in calibration.
-
-        Raises
-        ------
-        DataError : the level is not between 0 and 0.99, or there were too few runs for it, or of the kind.
+        kind : kind of manoeuvre of the run: the share then holds for runs of this kind.
         """
         self.check(level, kind)
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
         radius = radius_at_level(self.steps if pointwise else self.table(kind), level)
-        return self._region(radius, self.growth(paths, columns, step), track_directions(paths))
-
-    def regions(
-        self, paths: Array, columns: Mapping[str, Array], step: float, levels: Sequence[float]
-    ) -> dict[float, Region]:
-        """Return the regions for whole paths at several levels, those that it promises; arguments as of `region`."""
-        size, ahead = self.growth(paths, columns, step), track_directions(paths)
-        return {
-            level: self._region(radius_at_level(self.whole, level), size, ahead)
-            for level in levels
-            if self.promises(level)
-        }
-
-    def _region(self, radius: Array, size: Array, ahead: Array) -> Region:
-        return Region(ahead, np.outer(self.along * radius, size), np.outer(self.across * radius, size))
+        size = self.growth(paths, columns, step)
+        return Region(track_directions(paths), *(np.outer(scale * radius, size) for scale in (self.along, self.across)))
 
     def table(self, kind: str | None = None) -> Array:
-        """Radius (99,) for each of `LEVELS` that holds whole paths, of runs of a kind if one is given."""
+        """Radius (99,) for each of `LEVELS` that holds whole paths, of runs of a kind."""
         return self.whole if kind is None else self.by_kind[list(self.kinds).index(kind)]
 
     def growth(self, paths: Array, columns: Mapping[str, Array], step: float) -> Array:
         """How much wider (S,) the band of each prediction is than that of an average one [1]."""
-        away = distance_from_training(columns, self.names, self.centres, self.spread)
+        points = np.stack([columns[name] for name in self.names], axis=1)
+        away = nearest_distances(points / self.spread, self.centres / self.spread)
         seen = np.clip(
             prediction_traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high
         )
@@ -166,10 +131,8 @@ class Bands(StoredData):
 
     def check(self, level: float, kind: str | None = None) -> None:
         """Raise DataError, one sentence, where no band of this level can be promised."""
-        number = isinstance(level, int | float | np.floating)
-        if not number or not 0 < level <= LEVELS[-1]:
-            shown = f"{level:g}" if number else repr(level)
-            raise DataError(f"{shown} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
+        if not isinstance(level, int | float | np.floating) or not 0 < level <= LEVELS[-1]:
+            raise DataError(f"{level} is no level of a band: give a share above 0 and up to 0.99, such as 0.9")
         if kind is not None and not (isinstance(kind, str) and kind in self.kinds):
             raise DataError(f"no run of the kind {kind!r} calibrated this band: {suggest_name(kind, self.kinds)}")
         if not self.promises(level, kind):
@@ -184,11 +147,7 @@ class Bands(StoredData):
 
 
 def runs_needed(level: float) -> int:
-    """Fewest runs that a level needs: 4 for 0.8, 9 for 0.9, 19 for 0.95.
-
-    Of G runs and a new one, each is the worst with the same probability, so no band from G runs promises more than
-    G / (G + 1).
-    """
+    """Fewest runs that a level needs, 9 for 0.9: a new run is the worst of G + 1 with the probability 1 / (G + 1)."""
     return max(FEWEST, math.ceil(level / (1 - level) - 1e-9))
 
 
@@ -225,7 +184,7 @@ def path_chords(paths: Array) -> Array:
 
 
 def prediction_traits(paths: Array, columns: Mapping[str, Array], step: float, away: Array, length: float) -> Array:
-    """What makes a prediction easy or hard, (S, 5), one column for each of `TRAITS`; no trait has a unit.
+    """What makes a prediction easy or hard, (S, 5), a column for each of `TRAITS`.
 
     length : logarithm of the length of the predicted path, by three chords, over that of an average one.
     turn : by how much the predicted track turns between the chords [rad]. change : by how much faster or slower it
@@ -250,19 +209,12 @@ def prediction_traits(paths: Array, columns: Mapping[str, Array], step: float, a
     )
 
 
-def distance_from_training(
-    columns: Mapping[str, Array], names: tuple[str, ...], centres: Array, spread: Array
-) -> Array:
-    """Distance (S,) [1] of instants from the nearest of some points of training, root mean square over columns."""
-    return nearest_distances(np.stack([columns[name] for name in names], axis=1) / spread, centres / spread)
-
-
 def nearest_distances(
     points: Array, centres: Array, run: Places | None = None, run_of_centre: Places | None = None
 ) -> Array:
     """Root mean square distance over coordinates of points (S, d) from the nearest of the centres (m, d), (S,).
 
-    run, run_of_centre : number of the run of each point (S,) and centre (m,): those of the same run are passed over.
+    run, run_of_centre : of each point (S,) and centre (m,): those of the same run are passed over.
     """
     middle = centres.mean(axis=0)
     points, centres = points - middle, centres - middle  # else large coordinates would cost digits
@@ -275,10 +227,10 @@ def nearest_distances(
 
 
 class AdaptiveState(NamedTuple):
-    """State of a band that adapts along a run: the share of paths that it now aims to miss, and the one wanted.
+    """State of a band that adapts along a run.
 
-    miss : may leave 0 to 1: below 0 the band grows until it holds, above 1 it is empty. wanted : 1 - level.
-    rate : how fast it adapts, per horizon.
+    miss : share of paths that it now aims to miss; below 0 the band grows until it holds, above 1 it is empty.
+    wanted : 1 - level. rate : how fast it adapts, per horizon.
     """
 
     miss: float
@@ -292,16 +244,12 @@ def start_adaptation(level: float, rate: float = 0.02) -> AdaptiveState:
 
 
 def adapt_band(state: AdaptiveState, missed: bool, together: int = 1) -> AdaptiveState:
-    """Return the state after one more path could be judged: adaptive conformal inference.
+    """Return the state after one more path could be judged: Gibbs and Candes (2021), eq. (2).
 
-    Each miss widens the band, each hit narrows it a little, so that the long-run share of misses goes to that wanted,
-    whatever drifts: |share - wanted| <= const / (rate n) after n horizons. Source: Gibbs and Candes (2021), eq. (2).
+    The long-run share of misses goes to that wanted: |share - wanted| <= const / (rate n) after n horizons.
 
-    Parameters
-    ----------
     missed : whether the path, predicted a horizon ago, left the band that was then given for it.
-    together : how many paths begin within a horizon. Each counts so much less: what the first one shows is not known to
-        the others, and all of them would widen the band for the same error.
+    together : how many paths begin within a horizon: each counts so much less, for they miss by the same error.
     """
     return state._replace(miss=state.miss + state.rate / together * (state.wanted - float(missed)))
 
@@ -309,7 +257,7 @@ def adapt_band(state: AdaptiveState, missed: bool, together: int = 1) -> Adaptiv
 def adaptive_factor(state: AdaptiveState, whole: Array) -> float:
     """Return how much wider than calibrated the band is now, from the table `whole` (99,) of its `Bands`.
 
-    Beyond the levels of the table it grows by e for each 0.05 that misses are to fall further, without a bound.
+    Beyond the levels of the table it grows by e for each 0.05.
     """
     usual = float(radius_at_level(whole, min(1 - state.wanted, LEVELS[-1])))
     level = 1 - state.miss

@@ -1,9 +1,8 @@
 """Calibration: from errors on runs that a model did not see, to bands that hold their share of paths of a new run.
 
-Windows of one run are alike, runs are exchangeable. So everything here counts runs: each weighs the same, and every
-quantity that a score is divided by comes from the other runs. The radius is set by leaving out every run in turn: the
-rank of a window among the windows of the other runs says which quantile of theirs would have held it, and the radius is
-the quantile of all windows that would have held the wanted share of the windows of runs left out.
+Windows of one run are alike, runs are exchangeable: each run weighs the same, and what a score is divided by comes from
+the other runs. The rank of a window among those of the other runs says which quantile of theirs would have held it; the
+radius is the quantile of all windows that would have held the wanted share of the windows of runs left out.
 
 Sources: Lee, Barber and Willett, "Distribution-free inference with hierarchical data" (arXiv 2306.06342); Dunn,
 Wasserman and Ramdas, "Distribution-free prediction sets for two-layer hierarchical models" (arXiv 1809.07441); Barber,
@@ -36,7 +35,6 @@ from shipid.metrics import Array, vector_lengths
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 WINDOWS = 60  # of a run that calibrate, at most
-PART = 4096  # windows whose distances are computed at once
 TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
@@ -57,14 +55,10 @@ class _RunShares:
         """Number of windows of each run, (G,)."""
         return np.bincount(self.place, minlength=self.count)
 
-    @cached_property
-    def order(self) -> NDArray[np.int64]:
-        """Windows sorted by their run, (S,)."""
-        return np.argsort(self.place, kind="stable")
-
     def means(self, values: Array) -> Array:
         """Means (G, ...) over the windows of each run, of values (S, ...)."""
-        sums: Array = np.add.reduceat(values[self.order], np.cumsum(self.sizes) - self.sizes, axis=0)
+        order = np.argsort(self.place, kind="stable")
+        sums: Array = np.add.reduceat(values[order], np.cumsum(self.sizes) - self.sizes, axis=0)
         return sums / self.sizes.reshape(-1, *[1] * (values.ndim - 1))
 
 
@@ -79,10 +73,8 @@ def calibrate_bands(
 ) -> Bands | None:
     """Calibrate bands; None where fewer than three runs have errors.
 
-    Parameters
-    ----------
     left_out : errors (T, S, 2) [m], true less predicted, of models that saw the run of the window neither in training
-        nor in any choice. Windows with values that are not finite are left out.
+        nor in any choice; windows with values that are not finite do not count.
     future : true paths (T, S, 2) [m] in the frame (11). run : name of the run of each window, (S,).
     columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
     step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
@@ -106,15 +98,14 @@ def calibrate_bands(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
     judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
-    best = None
-    for circle in (True, False):
-        fitted = _fit_scores(runs, apart, normal, circle)
-        whole = band_radii(fitted.scores.max(axis=0), runs)
-        size = float(np.sqrt(fitted.scale[:, 0] * fitted.scale[:, 1]).mean()) * whole[judged]
-        if best is None or size < TIGHTER * best[0]:
-            best = size, fitted, whole
-    assert best is not None
-    _, fitted, whole = best
+    fits = [_fit_scores(runs, apart, normal, circle) for circle in (True, False)]
+    radii = [band_radii(one.scores.max(axis=0), runs) for one in fits]
+    circle, ellipse = (
+        float(np.sqrt(one.scale[:, 0] * one.scale[:, 1]).mean()) * radius[judged]
+        for one, radius in zip(fits, radii, strict=True)
+    )
+    better = int(ellipse < TIGHTER * circle)
+    fitted, whole = fits[better], radii[better]
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     reach, of = fitted.scores.max(axis=0), of[runs.place]
@@ -144,10 +135,7 @@ def calibrate_bands(
 
 
 def band_radii(scores: Array, runs: _RunShares) -> Array:
-    """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs.
-
-    The result depends on the scores by run alone, and not on the order of the runs.
-    """
+    """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs."""
     order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
     rising_ranks = np.argsort(ranks, kind="stable")
@@ -244,22 +232,14 @@ def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, 
     each = max(-(-CENTRES // runs.count), 1)
     chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
-    parts = [slice(first, first + PART) for first in range(0, len(points), PART)]
-    away = [
-        nearest_distances(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen])
-        for part in parts
-    ]
-    return centres, spread, np.concatenate(away)
+    return centres, spread, nearest_distances(points / spread, centres / spread, runs.place, runs.place[chosen])
 
 
 def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Indices of sound windows, at most `WINDOWS` of each run, in order."""
     rows = np.flatnonzero(sound)
-    if not len(rows):
-        return rows
-    place = np.unique(run[rows], return_inverse=True)[1]
-    parts = np.split(rows[np.argsort(place, kind="stable")], np.cumsum(np.bincount(place))[:-1])
-    return np.sort(np.concatenate([choose_evenly(part, WINDOWS) for part in parts]))
+    parts = (choose_evenly(rows[run[rows] == name], WINDOWS) for name in np.unique(run[rows]))
+    return np.sort(np.concatenate([rows[:0], *parts]))
 
 
 def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:

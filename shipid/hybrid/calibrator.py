@@ -1,8 +1,7 @@
 """Calibrator: networks that see where the physics says the ship will go, and correct the path by it.
 
-[dx, dy] = f(u, v, r, commands, wind, trajectory of the physics): where the physics puts the ship at a few instants of
-the horizon (x, y in the frame (11), and u, v, r) are inputs beside those of `path-drawn`, and f is solved in closed
-form as there. A network that calibrates a model's prediction of ship motion by that prediction: Wang et al. (2021).
+[dx, dy] = f(u, v, r, commands, wind, trajectory of the physics), solved as `path-drawn`: x, y in the frame (11), u, v
+and r of the physics at a few instants of the horizon are inputs, too. After Wang et al. (2021).
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class TrajectoryCompensator(Compensator):
 class Calibrator(PathDrawn):
     """`path-drawn` with the trajectory of the physics over the horizon among the inputs.
 
-    All other settings are those of `path-drawn`. The foundation `none` has no trajectory.
+    All other settings are those of `path-drawn`.
 
     Parameters
     ----------

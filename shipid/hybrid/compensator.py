@@ -1,8 +1,4 @@
-"""The compensator: small networks that predict what the physics misses, eq. (12) and (13).
-
-Everything here is arrays and formulas, so that a trained compensator predicts, is saved and is exported without the
-library that trained it.
-"""
+"""The compensator: small networks, plain arrays, that predict what the physics misses, eq. (12) and (13)."""
 
 from __future__ import annotations
 
@@ -22,13 +18,7 @@ Layers = tuple[tuple[Array, Array], ...]
 
 @dataclass(frozen=True)
 class Normaliser(StoredData):
-    """The z-score of the training samples: (value - mean) / std of each named feature.
-
-    Parameters
-    ----------
-    names : features in the order of the network's inputs.
-    mean, std : (d,) statistics in the units of the features.
-    """
+    """The z-score of the training samples: (value - mean) / std, (d,) each, of the named features."""
 
     names: tuple[str, ...]
     mean: Array
@@ -36,21 +26,19 @@ class Normaliser(StoredData):
 
     @classmethod
     def fit(cls, table: Mapping[str, Array], names: Sequence[str]) -> Self:
-        """Take the statistics of features (S,), which must be training samples only."""
+        """Take the statistics of training samples (S,)."""
         values = [table[name] for name in names]
         return cls(tuple(names), np.array([v.mean() for v in values]), np.array([v.std() for v in values]))
 
     def apply(self, table: Mapping[str, Array]) -> Array:
-        """Return normalised inputs (S, d) of features (S,), selected by name; DataError where one is missing."""
+        """Return normalised inputs (S, d) of features (S,); DataError where one is missing."""
         return (select_inputs(table, self.names) - self.mean) / self.std
 
 
 @dataclass(frozen=True)
 class Network(StoredData):
-    """One trained network with what belongs to its data: inputs, statistics, shapes of its outputs.
+    """One trained network with what belongs to its data.
 
-    Parameters
-    ----------
     features : name of each input -> the columns that were equal to it in training.
     normaliser : z-score of those inputs.
     basis : (T, r) shapes over the horizon [m] that the outputs weigh; the identity where each step has an output.
@@ -73,13 +61,9 @@ class Network(StoredData):
 
 @dataclass(frozen=True)
 class Compensator(StoredData):
-    """The mean of some networks: what is known at an instant -> compensation of the path after it.
+    """The mean of some networks: one per fold (`path-trained`), or those of the best trials (`path-drawn`).
 
-    Parameters
-    ----------
-    inputs : which quantities the networks may take.
-    networks : one per fold (`path-trained`), or those of the best trials (`path-drawn`).
-    hyperparameters : what the search chose, for the record.
+    inputs : which quantities they may take.
     """
 
     inputs: Inputs
@@ -96,7 +80,7 @@ class Compensator(StoredData):
         return paths + self.compensation(self.inputs.table(physics, instants))
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
-        """Return the compensation (T, S, 2) [m] in the frame (11) of the instant, from inputs (S,) by name."""
+        """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
         total = sum((network.predict(table) for network in self.networks), start=np.zeros(()))
         return np.asarray(total / len(self.networks))
 

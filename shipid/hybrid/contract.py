@@ -1,4 +1,4 @@
-"""What a method and its corrector must have: classes that somebody wrote are looked at before anything is computed."""
+"""What a method and its corrector must have, before anything is computed."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ CORRECTOR_CALLS = {
 
 def fault_of_method(kind: type[BaseModel]) -> str:
     """What a class of `Method` lacks, one sentence with its file; empty where it has all that it is asked for."""
+    if not (isinstance(kind, type) and issubclass(kind, BaseModel)) or inspect.isabstract(kind):
+        return "must be a class of Method with `fit`, such as shipid.hybrid.alone.Alone"
     corrector, validation = getattr(kind, "corrector", None), getattr(kind, "validation", None)
     if validation not in SPLITS:
         return f"`validation` of {name_of_class(kind)} must be a class variable, one of {SPLITS}, not {validation!r}"

@@ -16,18 +16,15 @@ from shipid.vessel.load import Vessel
 
 @dataclass(frozen=True, eq=False)
 class DeployedMethod:
-    """Physics and a fitted method, and what is known of both: what a predictor holds, and what an export writes.
+    """Physics and a fitted method: what a predictor holds, and what an export writes.
 
-    physics : the vessel with its numbers, or none, with horizon, step and rule of the rollout.
-    method : kind of the method, a name in `shipid.hybrid.methods.METHODS`.
-    corrector : the fitted method.
-    limits : column -> (least, greatest) seen in training: the region where the method has evidence.
-    commands : `held` at their value at the instant, or `known` over the horizon: then instants must hold the command
-        in force in each step, `Instants.planned`, name -> (T, S).
+    method : a name in `shipid.hybrid.methods.METHODS`.
+    limits : column -> (least, greatest) seen in training.
+    commands : `held` at their value at the instant, or `known` over the horizon: instants then hold `planned`.
     causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
-    bands : what says how far off a prediction may be; None where no runs could calibrate it.
-    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training; 0 without an
-        observer. One that has run for less time has not settled as it had there, so such an instant is outside.
+    bands : None where no runs could calibrate them.
+    run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training, by which an
+        observer has settled; 0 without one. An earlier instant is outside.
     """
 
     physics: Physics

@@ -24,10 +24,9 @@ PLAN_PARTS = 3  # of the horizon, in which a method sees planned commands
 
 
 def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) -> dict[str, Array]:
-    """Planned commands as few numbers: the mean command less the present one in each part of the horizon.
+    """The mean command less the present one in each of `PLAN_PARTS` parts of the horizon, or in each step of fewer.
 
-    The parts are nearly equal, `PLAN_PARTS` of them or one a step. `port.alpha` (T, S) gives
-    `port.planned-1.alpha` (S,), ..., so that the side and the sign of the command hold for its plan.
+    `port.alpha` (T, S) gives `port.planned-1.alpha` (S,), ...
     """
     means: dict[str, Array] = {}
     for name, values in planned.items():
@@ -40,16 +39,10 @@ def planned_means(columns: Mapping[str, Array], planned: Mapping[str, Array]) ->
 def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict[str, Array]:
     """Return the inputs at the instant: u, v, r, the commands and, where measured, relative wind and other environment.
 
-    u_rw = u - V_w cos(beta_w - psi), v_rw = v - V_w sin(beta_w - psi), (6) and (7). What is not measured is no input.
+    u_rw = u - V_w cos(beta_w - psi), v_rw = v - V_w sin(beta_w - psi), (6) and (7).
 
-    Parameters
-    ----------
-    columns : quantities (S,) at the instants of prediction, SI and radians.
+    columns : quantities (S,), SI and radians; DataError where a motion or a command is missing.
     commands : names of the command columns, `<component>.<signal>`.
-
-    Raises
-    ------
-    DataError : a motion or a command is missing.
     """
     for name in (*MOTIONS, *commands):
         if name not in columns:
@@ -63,7 +56,7 @@ def feature_table(columns: Mapping[str, Array], commands: Sequence[str]) -> dict
 
 
 def select_inputs(table: Mapping[str, Array], names: Sequence[str]) -> Array:
-    """Inputs (S, d) of a fitted method, by name; DataError where the table lacks one that it was trained with."""
+    """Inputs (S, d) of a fitted method; DataError where the table lacks one that it was trained with."""
     missing = next((name for name in names if name not in table), None)
     if missing is not None:
         remedy = "measure wind (V_w, beta_w)" if missing.endswith("_rw") else "the data must hold what it is made of"
@@ -75,18 +68,16 @@ OneOrMore = NonNegativeFloat | tuple[PositiveFloat, ...]
 
 
 class Memory(CheckedModel, BaseModel):
-    """What a method takes from the past: all in seconds before the instant; nothing by default.
-
-    Times are rounded to whole steps of the prediction, one at least.
+    """What a method takes from the past, in seconds before the instant, rounded to whole steps, one at least.
 
     Parameters
     ----------
     history : u, v, r and the commands so long ago, less their present values.
     turned : change of heading over so long.
     observer : the estimates of the observer of the physics: slow forces as accelerations, current, and the filtered
-        velocities less the measured ones. Nothing where the physics has no observer.
+        velocities less the measured ones.
     error : what the physics, started so long ago with the commands then given, gets wrong by now: along and across the
-        present heading, and in u, v, r. It holds wind, current, and what the model lacks. One number or several.
+        present heading, and in u, v, r.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -114,8 +105,8 @@ NO_MEMORY = Memory()
 class Inputs:
     """Which inputs a method takes: names of commands, and the memory.
 
-    `table` gives them all by name; what is a difference to the past is called `past-4.u` or `port.past-4.alpha`, a
-    change of heading `turned-10.psi`, the error of the physics `error-8.x`, so that the last part is the signal.
+    A difference to the past is called `past-4.u` or `port.past-4.alpha`, a change of heading `turned-10.psi`, the error
+    of the physics `error-8.x`: the last part is the signal.
     """
 
     commands: tuple[str, ...]
@@ -130,7 +121,15 @@ class Inputs:
         planned = {name: instants.planned[name] for name in self.commands} if instants.planned is not None else {}
         means = planned_means(instants.columns, planned)
         table = feature_table({**instants.columns, **means}, (*self.commands, *means))
-        return table | self._history(instants, step)
+        for seconds in self.memory.history:
+            for name in (*MOTIONS, *self.commands):
+                component, dot, signal = name.rpartition(".")
+                label = f"{component}{dot}past-{seconds:g}.{signal}"
+                table[label] = value_before(instants, name, seconds, step) - instants.columns[name]
+        for seconds in self.memory.turned:
+            before = value_before(instants, "psi", seconds, step)
+            table[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
+        return table
 
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
         """Return the inputs (S,) that the physics gives: its error over the last seconds; none without physics."""
@@ -141,18 +140,6 @@ class Inputs:
             errors = past_error(replace(physics, observer=None), instants, seconds)
             table |= {f"error-{seconds:g}.{name}": values for name, values in errors.items()}
         return table
-
-    def _history(self, instants: Instants, step: float) -> dict[str, Array]:
-        columns: dict[str, Array] = {}
-        for seconds in self.memory.history:
-            for name in (*MOTIONS, *self.commands):
-                component, dot, signal = name.rpartition(".")
-                label = f"{component}{dot}past-{seconds:g}.{signal}"
-                columns[label] = value_before(instants, name, seconds, step) - instants.columns[name]
-        for seconds in self.memory.turned:
-            before = value_before(instants, "psi", seconds, step)
-            columns[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
-        return columns
 
 
 def value_before(instants: Instants, name: str, seconds: float, step: float) -> Array:
@@ -166,7 +153,7 @@ def value_before(instants: Instants, name: str, seconds: float, step: float) -> 
 def input_group(name: str) -> str:
     """Kind of an input by its name: `motion`, `wind`, `command`, `history`, `error`, `observer` or `physics`.
 
-    A plan is a command; `physics` is a trajectory over the horizon, `wind` also other environment.
+    A plan is a command; `physics` is a trajectory, `wind` also other environment.
     """
     if name in MOTIONS:
         return "motion"
@@ -214,8 +201,7 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
     x0, y0 = to_frame(0.0, 0.0, then["x"], then["y"], -turned)  # the present position in the frame of the start
     dx, dy = x0 - ends["x"], y0 - ends["y"]
     c, s = np.cos(turned), np.sin(turned)
-    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx}
-    errors |= {name: columns[name] - ends[name] for name in MOTIONS}
+    errors = {"x": c * dx + s * dy, "y": c * dy - s * dx, **{name: columns[name] - ends[name] for name in MOTIONS}}
     sound = np.isfinite(np.stack(list(errors.values()))).all(axis=0)
     return {name: np.where(sound, values, 0.0) for name, values in errors.items()}
 
@@ -223,17 +209,8 @@ def past_error(physics: Physics, instants: Instants, seconds: float) -> dict[str
 def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
     """Merge columns that are equal and drop those that are constant: (12) becomes (13) where both azimuths act as one.
 
-    Parameters
-    ----------
-    table : features (S,), training samples only.
-
-    Returns
-    -------
-    dict : name of each feature that stays -> all the columns equal to it, itself first.
-
-    Raises
-    ------
-    DataError : none of them varies.
+    table : features (S,) of training samples. Returns the name of each feature that stays -> all the columns equal to
+    it, itself first; DataError where none varies.
     """
     chosen: dict[str, tuple[str, ...]] = {}
     for name, values in table.items():
@@ -241,11 +218,8 @@ def choose_features(table: Mapping[str, Array]) -> dict[str, tuple[str, ...]]:
         if np.ptp(values) <= tolerance:
             continue
         same = (kept for kept in chosen if "." in name and np.abs(table[kept] - values).max() <= tolerance)
-        twin = next(same, None)
-        if twin is None:
-            chosen[name] = (name,)
-        else:
-            chosen[twin] += (name,)
+        twin = next(same, name)
+        chosen[twin] = (*chosen.get(twin, ()), name)
     if not chosen:
         raise DataError(
             f"none of {', '.join(table)} varies over the training windows: nothing can be learned from them"

@@ -1,8 +1,7 @@
 """Forest: a random forest of what is known at the instant gives the compensation of the path.
 
-The targets are the errors of the path on polynomials of time, as in `path-drawn`; the trees are scikit-learn's (the
-optional extra `forest`), kept as plain arrays, so that a saved predictor needs neither it nor pickle. Random forests:
-Breiman (2001); for ship manoeuvring models: Mei et al. (2019).
+The targets are the errors of the path on polynomials of time, as in `path-drawn`; the trees of scikit-learn are kept as
+plain arrays, so that a predictor does not need it. Breiman (2001); for manoeuvring models: Mei et al. (2019).
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from pydantic import Field, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import ShipidError
-from shipid.hybrid.compensator import flatten_paths, smooth_basis, unflatten_paths
+from shipid.hybrid.compensator import flatten_paths, unflatten_paths
 from shipid.hybrid.features import Inputs, Memory, select_inputs
-from shipid.hybrid.method import Array, Index, Task
+from shipid.hybrid.method import Array, Index
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, Point, SearchedAlone, seed_of
+from shipid.hybrid.search import LearningProblem, PathProblem, Point, SearchedAlone, seed_of
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 
@@ -82,7 +81,7 @@ class Trees(StoredData):
 class ForestCorrector(StoredData):
     """Trees that give the compensation of the path.
 
-    inputs : which quantities the trees may take. names : those that they take, in order.
+    names : inputs that the trees take, in order.
     basis : (T, r) shapes over the horizon [m] that the outputs x_1 ... x_r, y_1 ... y_r weigh.
     """
 
@@ -104,21 +103,14 @@ class ForestCorrector(StoredData):
         return np.asarray(paths + np.tensordot(self.basis, unflatten_paths(weights), 1))
 
 
-class ForestProblem(LearningProblem):
+class ForestProblem(PathProblem):
     """A foundation whose inputs and errors of the path, on the basis, are the samples of forests."""
-
-    def __init__(self, method: Forest, task: Task, name: str) -> None:
-        super().__init__(method, task, name)
-        self.inputs = Inputs(task.commands, method.memory)
-        self.table = self.inputs.table(self.case.physics, self.instants)
-        self.basis = smooth_basis(task.windows.horizon, method.terms)
-        self.outputs = flatten_paths(np.tensordot(self.basis.T, self.targets, 1))  # (S, 2 r)
 
     def solve(self, number: int, point: Point, windows: Index) -> ForestCorrector:
         """Return a forest grown on some windows."""
         method, seed = self.method, seed_of(self.task.seed, number)
-        here = {name: values[windows] for name, values in self.table.items()}
-        seen, outputs = VaryingInputs.of(here, method.mirror), self.outputs[windows]
+        here = self.rows(windows)
+        seen, outputs = VaryingInputs.of(here, method.mirror), flatten_paths(self.weights[:, windows])
         if seen.reflection is not None:
             outputs = np.concatenate([outputs, outputs * np.repeat([1.0, -1.0], len(self.basis.T))])
         grower = _new_forest(method.trees, round(point["leaf"]), point["share"], seed)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
 import optuna
-from optuna.distributions import BaseDistribution
 from optuna.trial import TrialState
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
@@ -27,12 +26,15 @@ def tune_gradient(task: Task, method: SearchMethod, inputs: Inputs, length: Leng
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
-    best trial. Foundations with the same inputs and the same architecture in a trial train as one stack. The sampler of
-    a trial is seeded by its number, so that a search that goes on after an interruption gives the same digits.
+    best trial. Foundations with the same inputs and architecture in a trial train as one stack. The sampler of a trial
+    is seeded by its number.
     """
     trainer, search = _StackTrainer(task, method, inputs, length), Search(task, task.cases, method)
     space = method.space()
-    studies = {key: _memory_study(rows, space) for key, rows in search.rows.items()}
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    studies = {key: optuna.create_study(direction="minimize") for key in search.rows}
+    for key, study in studies.items():
+        study.add_trials([frozen_trial(row, space) for row in search.rows[key]])
     best: dict[str, _TrialOutcome] = {}  # of the trials that were trained here
     for number, _ in search.left(count()):
         for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
@@ -54,14 +56,6 @@ def tune_gradient(task: Task, method: SearchMethod, inputs: Inputs, length: Leng
             studies[key].tell(trial, *told)
         search.record({key: rows[key] for key in studies})
     return {key: trainer.fitted(key, search.rows, best.get(key)) for key in studies}
-
-
-def _memory_study(rows: Sequence[Row], space: Mapping[str, BaseDistribution]) -> optuna.Study:
-    """Make a study in memory that knows the trials so far."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = optuna.create_study(direction="minimize")
-    study.add_trials([frozen_trial(row, space) for row in rows])
-    return study
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,13 @@
 """Hankel-DMD with control: a linear law of state, delayed states and commands, in closed form, rolled over the horizon.
 
 a_k = A [nu_k, nu_(k-1) ... nu_(k-d), a_(k-1) ... a_(k-d), commands_k ... commands_(k-d), wind_k] + b, with a_k the
-acceleration that a single step of the physics misses (without physics: the acceleration itself, and its delays are
-left out, for those of nu hold them). A, b are a ridge regression on true steps; then
-nu_(k+1) = physics(nu_k) + step a_k. Dynamic mode decomposition with delays and control for ships: Diez et al.
-(2021-24).
+acceleration that a single step of the physics misses (without physics: the acceleration, and its delays are left out).
+A, b are a ridge regression on true steps; then nu_(k+1) = physics(nu_k) + step a_k. For ships: Diez et al. (2021-24).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Self
 
@@ -24,7 +22,7 @@ from shipid.hybrid.features import MOTIONS, count_steps, feature_table
 from shipid.hybrid.method import Array, Index
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, Point, Scale
-from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths
+from shipid.hybrid.stepping import StepMethod, Stepper, StepProblem, step_alone, stepped_paths, true_motion
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs, apply_blocks, solve_ridges
 
@@ -119,8 +117,8 @@ class HankelCorrector(StoredData):
 class HankelProblem(StepProblem):
     """A foundation whose missing accelerations are the targets of linear laws."""
 
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> HankelCorrector:  # noqa: ARG002
-        """Return the law on the steps of some windows for all ridges; one ridge has no axis in front."""
+    def solve(self, number: int, point: Point, windows: Index) -> HankelCorrector:  # noqa: ARG002
+        """Return the law on the steps of some windows."""
         delays = count_steps(point["delays"], self.task.windows.step)
         chosen, table = self.steps.of(windows), self.table(delays)
         here = {key: values[chosen] for key, values in table.items()}
@@ -131,15 +129,14 @@ class HankelProblem(StepProblem):
         full = np.concatenate([values, np.ones((len(values), 1))], axis=1)
         size = np.maximum(missing.std(axis=0), 1e-12)
         penalty = np.r_[np.ones(values.shape[1]), 1e-3]
-        weights = solve_ridges(full, missing / size, ridges, penalty) * size
-        law = LinearLaw(self.task.commands, delays, seen.normaliser, weights[0] if len(ridges) == 1 else weights)
-        return HankelCorrector(law, point["delays"], point)
+        weights = solve_ridges(full, missing / size, point["ridge"], penalty) * size
+        return HankelCorrector(LinearLaw(self.task.commands, delays, seen.normaliser, weights), point["delays"], point)
 
     def table(self, delays: int) -> dict[str, Array]:
         """Return inputs (N,) at the true steps: before them are the past and the horizon of their windows."""
         windows, steps, physics = self.task.windows, self.steps, self.case.physics
         past = past_rows(physics, self.task.instants(self.name), delays, self.task.commands)
-        motion = {key: np.concatenate([windows.columns[key][None], windows.states[key]]) for key in (*MOTIONS, "psi")}
+        motion = true_motion(windows)
         later = {**motion, **windows.planned}
         if physics.vessel is not None:
             instants = windows.instants(known=True, hidden=self.task.hidden.get(self.name))
@@ -156,8 +153,7 @@ class HankelDMD(StepMethod):
 
     Parameters
     ----------
-    delays : how far back the law may look [s]; each is a trial, with every ridge, and judged by the path. `trials`
-        is therefore refused.
+    delays : how far back the law may look [s]; each is a trial, so `trials` is refused.
     ridge : weight of the squared weights of normalised inputs; 8 from low to high.
     mirror, samples : as in `StepMethod`; the image of every step in the mirror counts, too.
     """
@@ -180,14 +176,6 @@ class HankelDMD(StepMethod):
     def past(self) -> float:
         """Length of the past that windows must hold [s]."""
         return max(self.delays)
-
-    def varied(self) -> tuple[str, ...]:
-        """Return the names of the hyperparameters that differ between trials."""
-        return ("delays", *self.ranges())
-
-    def num_trials(self) -> int | None:
-        """Return how many delays are tried; None where the budget decides it."""
-        return None if self.budget else len(self.delays)
 
     def choices(self) -> dict[str, tuple[float, ...]]:
         """Return what is searched among some values: the delays."""

@@ -1,8 +1,7 @@
 """Journals of searches: the trials of a unit of work in a file, which Optuna and its dashboard open.
 
-There is one Optuna study for each cell. One process writes a journal, a line for each trial that has ended, so a search
-has no trial that is half done. A last line that a killed process left half written is cut off when the file is opened
-again. Each trial carries a checksum, each study the digest of the plan that it belongs to.
+One process writes a journal, a line for each trial that has ended. A last line that a killed process left half written
+is cut off when the file is opened again. Each trial carries a checksum, each study the digest of its plan.
 """
 
 from __future__ import annotations
@@ -95,7 +94,7 @@ class Journal:
 
 
 class _JournalLines(JournalFileBackend):
-    """The file of a journal, without a lock, for one process writes it, and without waiting for the disk."""
+    """The file of a journal, without a lock and without waiting for the disk."""
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
         """Append entries, a line each."""

@@ -1,10 +1,9 @@
 """Learned force: a small bounded network inside the equations of motion, trained through multi-step rollouts.
 
 M nu_dot = (forces of the vessel) + tau(u, v, r), tau = tau_max tanh(c h(u, v, r)), the term `hull.learned`. Its numbers
-minimise the mean squared position error over the horizon plus a ridge on them, by L-BFGS on exact gradients of the
-rollout; output weights start from a ridge regression on the forces that single true steps miss. A network inside an
-equation: universal differential equations (Rackauckas et al. 2020); a network as the damping of a ship: van de Ven et
-al. (2007).
+minimise the mean squared position error over the horizon plus a ridge, by L-BFGS on exact gradients of the rollout;
+output weights start from a ridge regression on the forces that single true steps miss. Rackauckas et al. (2020); as the
+damping of a ship: van de Ven et al. (2007).
 """
 
 from __future__ import annotations
@@ -72,7 +71,7 @@ class ForceProblem(LearningProblem):
             weights, count = trainer.solve(point["ridge"], self.starts.get(fold))
             self.starts[fold], most = weights, max(most, count)
             losses.append(trainer.error(weights, self.instants.select(validation), self.future[:, validation]))
-        return TrialWorth(float(np.mean(losses)) / 2, point, most)  # per coordinate, as the other methods
+        return float(np.mean(losses)) / 2, point, most  # per coordinate, as the other methods
 
     def solve(self, number: int, point: Point, windows: Index) -> ForceCorrector:  # noqa: ARG002
         """Return the force of a ridge, learned from some windows."""
@@ -104,8 +103,7 @@ class LearnedForce(SearchedAlone):
 
     Parameters
     ----------
-    trials : values of the ridge that are tried, evenly spread by its logarithm; with a `budget` as many of them as
-        fit, from the stiffest on.
+    trials : values of the ridge that are tried; with a `budget` as many of them as fit, from the stiffest on.
     units : hidden units of the network.
     ridge : weight of the mean squared output weight [m^2]; a range is searched.
     limit : bound of the force, times m U^2 / L_pp, and of the moment, times I_z (U / L_pp)^2, with U the greatest speed
@@ -138,17 +136,9 @@ class LearnedForce(SearchedAlone):
             return f"{drawn[0].path} is a sum over drawn waves, which has no gradient: {remedy}"
         return ""
 
-    def num_trials(self) -> int | None:
-        """Return how many ridges are tried; None where the budget decides it."""
-        return None if self.budget else len(self.ridges())
-
-    def ridges(self) -> list[float]:
-        """Return the values of the ridge that are tried."""
-        return ridge_values(self.ridge, self.trials)
-
     def points(self) -> list[Point]:
         """Return the trials: from stiff to soft, for each starts from the one before."""
-        return [{"ridge": ridge} for ridge in self.ridges()[::-1]]
+        return [{"ridge": ridge} for ridge in ridge_values(self.ridge, self.trials)[::-1]]
 
 
 def first_output_weights(
@@ -165,7 +155,7 @@ def first_output_weights(
     initial = dict(block)
     for key, limit, axis, features in zip(OUTPUT, LIMITS, range(3), (even, odd, odd), strict=True):
         goal = np.arctanh(np.clip(force[:, axis] / block[limit], -LARGEST_START, LARGEST_START))
-        initial[key] = solve_ridges(features, goal[:, None], [START_RIDGE])[0, :, 0]
+        initial[key] = solve_ridges(features, goal[:, None], START_RIDGE)[:, 0]
     return initial
 
 

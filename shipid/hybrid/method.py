@@ -29,13 +29,12 @@ Index = NDArray[np.int64]
 class Corrector(Protocol):
     """A fitted method: what it makes of the physics at instants of prediction.
 
-    `hyperparameters` are what the search chose. `header` and `arrays` hold all of it as plain JSON and as arrays, from
-    which `from_arrays` rebuilds it; ResultError where a part is missing or does not fit.
+    `from_arrays` rebuilds it from `header` and `arrays`; ResultError where a part is missing or does not fit.
     """
 
     @property
     def hyperparameters(self) -> Mapping[str, float]:
-        """Name -> value, for the record."""
+        """What the search chose, for the record."""
 
     @property
     def past(self) -> float:
@@ -89,20 +88,15 @@ class TrialJournal(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a method is fitted to: foundations on the same windows. Its arrays cannot be written to: others use them.
+    """What a method is fitted to: foundations on the same windows. Its arrays cannot be written to.
 
-    Parameters
-    ----------
-    cases : name of a foundation -> its physics and paths. The result for one does not depend on the others.
+    cases : foundation -> its physics and paths. The result for one does not depend on the others.
     windows : windows that train or validate.
     folds : (training, validation) indices of windows, split by run; one pair, or one per fold.
-    commands : names of the command columns.
-    known : whether the commands over the horizon are known to a prediction.
-    seed : of all that is random.
+    commands : names of the command columns. known : whether those over the horizon are known to a prediction.
     hidden : foundation -> states of its actuators at the instants (S,), where it has any.
     estimates : foundation -> what its observer knows at the instants (S,), where it has one.
-    device : a PyTorch device.
-    journal : where searches are written as they go and read back; without one they are kept in memory.
+    device : a PyTorch device. journal : where searches are written as they go and read back.
     cells : foundation -> name of its search in the journal.
     """
 
@@ -140,14 +134,14 @@ class Task:
 class FitResult:
     """Result of a method for one foundation.
 
-    corrector : the fitted method; None where every trial failed (targets that are not numbers).
+    corrector : None where every trial failed.
     trials : a row each: number, params, value (mean squared validation error [m^2]), epochs, seconds, state
         (`complete`, `stopped` where some of the windows alone judged it, or `diverged`).
     seconds : time spent on this foundation, its share of what is done for several at once.
-    left_out : errors (T, S, 2) [m], true less predicted, on the windows of the task, by models that saw the run of the
-        window neither in training nor in the choice of hyperparameters; not numbers where there are none. None where
-        the method has them only from further fits: `refits` of `shipid.predictor.fit`.
-    sentence : why nothing could be fitted, where the windows do not suffice; else empty.
+    left_out : errors (T, S, 2) [m], true less predicted, by models that saw the run of the window neither in training
+        nor in the choice of hyperparameters; not numbers where there are none. None: `refits` of `shipid.predictor.fit`
+        gives them.
+    sentence : why the windows do not suffice; else empty.
     """
 
     corrector: Corrector | None
@@ -161,10 +155,9 @@ class FitResult:
 class Traits:
     """What sentences, comparisons and findings of a study know of a method; no number depends on it.
 
-    mirror : whether it may use that port and starboard are mirror images; None where it has no such choice. One that
-        may not, on no physics alone, is the plain rival of the others.
-    memory : what its inputs hold of the past. Methods of a kind that differ in it are compared.
-    terms : its compensation of the path is a polynomial of time with so many terms; None where it is something else.
+    mirror : whether it may use that port and starboard are mirror images; None where it has no such choice.
+    memory : what its inputs hold of the past.
+    terms : of time, of the polynomial that compensates the path; None where it is something else.
     """
 
     mirror: bool | None = None
@@ -173,9 +166,7 @@ class Traits:
 
 
 class Method(CheckedModel, BaseModel, ABC):
-    """A way to improve physics by data: its fields are its settings, `fit` returns correctors.
-
-    What a study asks of a method is below; all but `fit` and `corrector` have a default.
+    """A way to improve physics by data: its fields are its settings. It must have `fit` and `corrector`.
 
     validation : `runs` leaves out every run in turn to judge a trial; `share` holds out a fifth of the runs.
     compensates : whether anything is learned from data.
@@ -198,7 +189,7 @@ class Method(CheckedModel, BaseModel, ABC):
 
     @property
     def together(self) -> bool:
-        """Whether several foundations cost much less in one fit than in a fit each: then they are one unit of work."""
+        """Whether several foundations, which cost much less in one fit, are one unit of work."""
         return False
 
     @property
@@ -207,7 +198,7 @@ class Method(CheckedModel, BaseModel, ABC):
         return Traits()
 
     def unfit(self, vessel: Vessel) -> str:
-        """Why this method cannot work with a vessel, and what to do, in words; empty where it can."""
+        """Why this method cannot work with a vessel, and what to do; empty where it can."""
         del vessel
         return ""
 
@@ -254,10 +245,10 @@ class TrialRow(BaseModel):
 
 
 def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
-    """Fit every foundation of a task; DataError where a method that somebody wrote gives something else.
+    """Fit every foundation of a task.
 
-    DataError for a vessel that the method cannot work with. ShipidError where it ends the process, for what runs it
-    would else be taken for killed, and where the code of the user makes a mistake.
+    DataError for a vessel that the method cannot work with, or where it gives something else; ShipidError for a mistake
+    in the code of a user.
     """
     name, shape = type(method).__name__, task.windows.future.shape
     for vessel in (case.physics.vessel for case in task.cases.values()):
@@ -265,10 +256,8 @@ def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
             raise DataError(words)
     with locate_errors(f"{name}.fit", type(method)):
         given = method.fit(task)
-    if not isinstance(given, Mapping):
-        raise DataError(f"{name}.fit must return a table, foundation -> FitResult, not {type(given).__name__}")
     for case in task.cases:
-        one = given.get(case)
+        one = given.get(case) if isinstance(given, Mapping) else given
         if not isinstance(one, FitResult):
             raise DataError(f"{name}.fit must give a FitResult for {case!r}, not {type(one).__name__}")
         _check_fitted(f"{name}.fit", one, shape, method.compensates)
@@ -276,7 +265,7 @@ def fit_all(method: Method, task: Task) -> dict[str, FitResult]:
 
 
 def _check_fitted(where: str, one: FitResult, shape: tuple[int, ...], learns: bool) -> None:
-    """DataError where the parts of a result are not what a study stores: it could not be read back."""
+    """DataError where the parts of a result are not what a study stores."""
     try:
         rows: list[TrialRow] = [
             parse_model(TrialRow, row, None, f"trial {place}") for place, row in enumerate(one.trials)
@@ -307,7 +296,7 @@ def widen_range(low: float, high: float) -> tuple[float, float]:
 
 
 def shared_tables(task: Task, inputs: Inputs) -> dict[str, dict[str, Array]]:
-    """Inputs (S,) by name, for every foundation; an input that does not depend on the physics is one array for all."""
+    """Inputs (S,) by name, for every foundation; what does not depend on the physics is one array for all."""
     common = inputs.common(task.windows.instants(known=task.known), task.windows.step)
     return {name: common | inputs.of_physics(case.physics, task.instants(name)) for name, case in task.cases.items()}
 

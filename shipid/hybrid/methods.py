@@ -38,13 +38,9 @@ def method_of(kind: str, settings: Mapping[str, Any], path: str = "method") -> M
     """Return the method of a kind with settings; DocumentError with the path for a wrong kind, key or value."""
     if kind not in METHODS:
         raise DocumentError(f"{kind!r} is no kind of method: {method_names(kind)}", path=f"{path}.kind")
-    known: Any = METHODS[kind]
-    if not (isinstance(known, type) and issubclass(known, Method)) or known.__abstractmethods__:
-        what = "needs `fit`" if isinstance(known, type) and issubclass(known, Method) else "must be a class of Method"
-        raise DocumentError(f"METHODS[{kind!r}] {what}, such as shipid.hybrid.alone.Alone", path=f"{path}.kind")
-    if fault := fault_of_method(known):
+    if fault := fault_of_method(METHODS[kind]):
         raise DocumentError(f"METHODS[{kind!r}]: {fault}", path=f"{path}.kind")
-    method: Method = parse_model(known, dict(settings), None, path)
+    method: Method = parse_model(METHODS[kind], dict(settings), None, path)
     return method
 
 

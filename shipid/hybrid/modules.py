@@ -1,17 +1,14 @@
 """Modules: bounded factors of hull, thrusters and rudders, learned from single steps, with an alarm off the data.
 
 M nu_dot = sum over modules of f_m(u, v, r, commands) F_m + the rest, with 1 - limit <= f_m <= 1 + limit. What a module
-does to a step is the difference of two steps of the physics, with the module and without it. f_m - 1 = w_m h is linear
-in a constant and drawn hidden units h, so that w follows in closed form from the missing accelerations of single true
-steps; outside of the limits it is cut. Far from the training data all factors fade to 1.
-
-Corrections of single modules with limits and a distance-based alarm have been published for free-running model tests;
-the closed form is ours.
+does to a step is the difference of two steps of the physics, with and without it. f_m - 1 = w_m h is linear in a
+constant and drawn hidden units h: w follows in closed form from the missing accelerations of single true steps, and is
+cut at the limits. Far from the training data all factors fade to 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self
 
@@ -71,7 +68,7 @@ class Alarm(StoredData):
     """How far a moment is from the training data: the distance to the nearest of some of its moments.
 
     centres : (C, d) normalised inputs. radius : how far the moments of one run of training are from the other runs, at
-        most; of a single run, from the centres.
+    most; of a single run, from the centres.
     """
 
     normaliser: Normaliser
@@ -80,7 +77,7 @@ class Alarm(StoredData):
 
     @classmethod
     def fit(cls, table: Mapping[str, Array], normaliser: Normaliser, count: int, run: NDArray[np.str_]) -> Self:
-        """Choose centres, each the moment that is farthest from those before; `run` (S,) names the run of each."""
+        """Choose centres, each the moment that is farthest from those before; `run` (S,)."""
         z = normaliser.apply(table)
         centres = [z[np.square(z).sum(axis=1).argmin()]]
         apart = np.linalg.norm(z - centres[0], axis=1)
@@ -110,7 +107,6 @@ def _distance_to_centres(z: Array, centres: Array) -> Array:
 class ModulesCorrector(StoredData):
     """Factors of the modules of the physics.
 
-    commands : names of the command columns. modules : names, in order.
     weights : (..., K, M + 1) of the constant and the even hidden units, for each module; R in front are R corrections
         for R S inputs, in R blocks.
     limit : greatest departure of a factor from 1. fade : distance beyond the training data at which factors are 1.
@@ -147,7 +143,7 @@ class ModulesCorrector(StoredData):
 
 
 class ModulesProblem(StepProblem):
-    """A foundation whose missing accelerations are shared among its modules, by what each adds to the true steps."""
+    """A foundation whose missing accelerations are shared among its modules."""
 
     def __init__(self, method: Modules, task: Task, name: str) -> None:
         super().__init__(method, task, name)
@@ -156,8 +152,8 @@ class ModulesProblem(StepProblem):
             physics_without_modules(self.case.physics), self.steps.at, self.steps.free, self.steps.step
         )
 
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> ModulesCorrector:
-        """Return factors on the steps of some windows for all ridges; one ridge has no axis in front."""
+    def solve(self, number: int, point: Point, windows: Index) -> ModulesCorrector:
+        """Return factors on the steps of some windows."""
         task, method, steps, modules = self.task, self.method, self.steps, self.modules
         chosen = steps.of(windows)
         table = {key: values[chosen] for key, values in feature_table(steps.at.columns, task.commands).items()}
@@ -168,10 +164,9 @@ class ModulesProblem(StepProblem):
         size = np.maximum(acting.std(axis=0).max(axis=0), 1e-12)  # of each axis
         rows = np.einsum("skj,sm->sjkm", acting / size, even).reshape(missing.size, -1)
         penalty = np.tile(np.r_[0.1, np.ones(method.units)], len(modules))
-        weights = solve_ridges(rows, (missing / size).reshape(-1, 1), ridges, penalty)
-        weights = weights.reshape(len(ridges), len(modules), -1)
+        weights = solve_ridges(rows, (missing / size).reshape(-1, 1), point["ridge"], penalty)
+        weights = weights.reshape(*weights.shape[:-2], len(modules), -1)
         alarm = Alarm.fit(table, units.normaliser, method.centres, task.windows.run[steps.window[chosen]])
-        weights = weights[0] if len(ridges) == 1 else weights
         return ModulesCorrector(task.commands, modules, units, weights, alarm, method.limit, method.fade, dict(point))
 
 
@@ -180,7 +175,7 @@ class Modules(StepMethod):
 
     Parameters
     ----------
-    trials : sets of hyperparameters tried per foundation, each with 6 ridges; judged by the path.
+    trials : sets of hyperparameters tried per foundation, each with 6 ridges.
     units : drawn hidden units; 0 leaves constants alone.
     motion_scale, command_scale, offset : as in `path-drawn`.
     ridge : weight of the squared weights of the hidden units; the constants have a hundredth of it.

@@ -1,8 +1,7 @@
 """One step: networks of state, commands and wind that give the acceleration the physics misses, at every step.
 
-nu_(k+1) = physics(nu_k) + step f(u, v, r, commands, u_rw, v_rw), with f trained on what single steps of the physics
-from true states miss (without physics: on the acceleration itself). Skulstad et al. (2021) train it by gradients;
-here f(z) = W tanh(V z + c) with V, c drawn and W in closed form.
+nu_(k+1) = physics(nu_k) + step f(u, v, r, commands, u_rw, v_rw), with f(z) = W tanh(V z + c), V and c drawn and W in
+closed form by what single steps of the physics from true states miss. Skulstad et al. (2021) train it by gradients.
 """
 
 from __future__ import annotations
@@ -43,10 +42,7 @@ class OutputWeights(StoredData):
 
 @dataclass(frozen=True)
 class OneStepCorrector(StoredData):
-    """The mean of some networks, applied at every step of the rollout.
-
-    commands : names of the command columns.
-    """
+    """The mean of some networks, applied at every step of the rollout."""
 
     commands: tuple[str, ...]
     heads: tuple[OutputWeights, ...]
@@ -70,8 +66,8 @@ class OneStepProblem(StepProblem):
         super().__init__(method, task, name)
         self.table = feature_table(self.steps.at.columns, task.commands)
 
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> OneStepCorrector:
-        """Return networks on the steps of some windows for all ridges; one ridge has no axis in front."""
+    def solve(self, number: int, point: Point, windows: Index) -> OneStepCorrector:
+        """Return networks on the steps of some windows."""
         chosen = self.steps.of(windows)
         here = {key: values[chosen] for key, values in self.table.items()}
         units = VaryingInputs.of(here, self.method.mirror).draw(
@@ -80,10 +76,9 @@ class OneStepProblem(StepProblem):
         missing = self.steps.missing[chosen]
         size = np.maximum(missing.std(axis=0), 1e-12)
         even, odd = units.parts(here)
-        surge = solve_ridges(even, missing[:, :1] / size[:1], ridges) * size[:1]
-        sway_yaw = solve_ridges(odd, missing[:, 1:] / size[1:], ridges) * size[1:]
-        head = OutputWeights(units, surge, sway_yaw) if len(ridges) > 1 else OutputWeights(units, surge[0], sway_yaw[0])
-        return OneStepCorrector(self.task.commands, (head,), point)
+        surge = solve_ridges(even, missing[:, :1] / size[:1], point["ridge"]) * size[:1]
+        sway_yaw = solve_ridges(odd, missing[:, 1:] / size[1:], point["ridge"]) * size[1:]
+        return OneStepCorrector(self.task.commands, (OutputWeights(units, surge, sway_yaw),), point)
 
     def corrector(self, best: Sequence[Row]) -> OneStepCorrector:
         """Return the mean of the networks of the best trials."""
@@ -96,16 +91,13 @@ class OneStepProblem(StepProblem):
 class OneStep(StepMethod):
     """Networks with drawn hidden units on the missing acceleration, applied at every step of the rollout.
 
-    Every trial draws hidden units, solves them for 8 ridges on the training steps, and is judged by the path on the
-    validation windows. Sway and yaw change sign in the mirror, surge does not.
-
     Parameters
     ----------
     trials : sets of hyperparameters tried per foundation.
-    units : hidden units of tanh, drawn at random; in mirrored pairs where the inputs have a mirror.
+    units : hidden units of tanh; in mirrored pairs where the inputs have a mirror.
     motion_scale, command_scale, wind_scale, offset : as in `path-drawn`.
     ridge : weight of the squared output weights beside the mean squared error of the accelerations, each axis by its
-        standard deviation; from low to high, the best of 8 is taken for each trial.
+        standard deviation; each trial takes the best of 8.
     averaged : the accelerations are the mean of the networks of so many best trials.
     mirror, samples : as in `StepMethod`.
     """

@@ -1,8 +1,7 @@
 """Path, drawn: networks whose hidden units are drawn at random and whose output weights are solved in closed form.
 
 f(z) = B W tanh(V z + c) with V, c drawn, B polynomials of time, and W = argmin |targets - f|^2 + ridge |W|^2; every
-trial is judged by every run left out in turn, at the price of one solution (`shipid.hybrid.ridge`). Random features:
-Rahimi and Recht (2007); leave-one-out from the hat matrix: Allen (1974).
+trial is judged by every run left out in turn (`shipid.hybrid.ridge`). Random features: Rahimi and Recht (2007).
 """
 
 from __future__ import annotations
@@ -16,9 +15,8 @@ from pydantic import model_validator as validator
 from shipid.hybrid.compensator import Compensator
 from shipid.hybrid.features import Inputs, Memory
 from shipid.hybrid.method import FitResult, Task
-from shipid.hybrid.search import Probability, Scale, SearchMethod, ridge_values, setting_at_share, spread_points
+from shipid.hybrid.search import Probability, Scale, SearchMethod, setting_at_share, spread_points
 
-RIDGES = 9  # of a range
 MEMORY_KINDS = ("history", "error", "observer")  # of memory
 MEMORY_CHOICES = ((), ("error",), ("history", "error"))  # that validation chooses from, as far as a memory has them
 OBSERVER_CHOICES = (("observer",), MEMORY_KINDS)  # and with estimates of an observer
@@ -30,28 +28,25 @@ Ridge = Annotated[float, Field(ge=1e-8)]  # below it rounding decides
 class PathDrawn(SearchMethod):
     """Networks with drawn hidden units on the errors of the path, solved in closed form.
 
-    All ranges are searched by their logarithm, with the same trials for all foundations. The defaults were chosen on
-    held-out windows of five worlds of `simulation`: docs/performance.md, "What lowers H".
+    All ranges are searched by their logarithm. Source of the defaults: docs/performance.md, "What lowers H".
 
     Parameters
     ----------
     trials : sets of hyperparameters tried per foundation.
     units : hidden units of tanh, drawn at random; twice as many where they come in mirrored pairs.
     motion_scale, command_scale, wind_scale : how far an input must move, in its standard deviations, to change a hidden
-        unit by about one: u, v, r; the commands; the relative wind. Large = the compensation varies slowly with it.
+        unit by about one.
     offset : spread of the offsets of the hidden units: large bends more.
-    ridge : weight of the squared output weights; of 9 from low to high, each trial takes for each model the best that
-        is found by descent from the middle.
+    ridge : weight of the squared output weights; each trial takes for each model the best of 9 by descent from the
+        middle.
     terms : the compensation is a polynomial of time with so many terms: what is faster is waves.
     mirror : share of the trials in which port and starboard are mirror images.
-    averaged : the compensation is the mean of the networks of so many best trials; by default 8, and 4 with `choose`,
-        where each memory has a part of the trials only.
+    averaged : the compensation is the mean of the networks of so many best trials; by default 8, and 4 with `choose`.
     search_windows : about so many windows, evenly taken from each run, judge all trials where there are more; the
         best are then judged, and solved, with all windows.
     memory : what the inputs hold of the past; `history_scale`, `error_scale`, `observer_scale` are their scales.
     choose : whether validation chooses between no memory, the error of the physics, and that with history; with
-        `memory.observer` also between its estimates alone and everything; all without what `memory` lacks. Each choice
-        has an equal share of the trials.
+        `memory.observer` also between its estimates alone and everything. Each has an equal share of the trials.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -94,9 +89,7 @@ class PathDrawn(SearchMethod):
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high); scales of a memory that is not taken are left out."""
-        idle = set() if self.memory.history or self.memory.turned else {"history_scale"}
-        idle |= set() if self.memory.error else {"error_scale"}
-        idle |= set() if self.memory.observer else {"observer_scale"}
+        idle = {f"{kind}_scale" for kind in MEMORY_KINDS if kind not in self.kinds}
         return {name: pair for name, pair in super().ranges().items() if name not in idle}
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
@@ -105,12 +98,17 @@ class PathDrawn(SearchMethod):
         return frozenset(set(MEMORY_KINDS) - set(taken))
 
     @property
-    def memories(self) -> tuple[int, ...]:
-        """What validation chooses from, as places in `MEMORIES`: all choices without what the memory lacks."""
+    def kinds(self) -> list[str]:
+        """Kinds of memory that the inputs hold."""
         memory = self.memory
-        of_kind = dict(zip(MEMORY_KINDS, (memory.history or memory.turned, memory.error, memory.observer), strict=True))
+        held = memory.history or memory.turned, memory.error, memory.observer
+        return [kind for kind, one in zip(MEMORY_KINDS, held, strict=True) if one]
+
+    @property
+    def memories(self) -> tuple[int, ...]:
+        """What validation chooses from, as places in `MEMORIES`."""
         choices = (*MEMORY_CHOICES, *OBSERVER_CHOICES) if self.memory.observer else MEMORY_CHOICES
-        kept = (tuple(kind for kind in choice if of_kind[kind]) for choice in choices)
+        kept = (tuple(kind for kind in choice if kind in self.kinds) for choice in choices)
         return tuple(dict.fromkeys(map(MEMORIES.index, kept)))
 
     @validator(mode="after")
@@ -119,10 +117,6 @@ class PathDrawn(SearchMethod):
         if self.choose and len(self.memories) < 2:
             raise ValueError("choose: there is no memory to choose from: give `memory`, or leave `choose` out")
         return self
-
-    def varied(self) -> tuple[str, ...]:
-        """Return the names of the hyperparameters that differ between trials."""
-        return (*self.ranges(), *self.choices())
 
     def num_chosen(self) -> int:
         """Return how many of the best trials make the compensator, at most."""
@@ -135,7 +129,7 @@ class PathDrawn(SearchMethod):
         return {**mirror, **memory}
 
     def points(self) -> Iterator[dict[str, float]]:
-        """Return the trials: a value of everything searched but the ridge, and `mirror`, 1 or 0; endless by budget."""
+        """Return the trials: a value of everything searched but the ridge, and `mirror`; endless by budget."""
         ranges = [name for name in self.ranges() if name != "ridge"]
         fixed = {name: value for name in self.SEARCHED if not isinstance(value := getattr(self, name), tuple)}
         for number, shares in enumerate(spread_points(len(ranges) + 1, None if self.budget else self.trials)):
@@ -146,22 +140,8 @@ class PathDrawn(SearchMethod):
                 name: setting_at_share(self, name, share) for share, name in zip(shares[1:], ranges, strict=True)
             }
 
-    def path(self) -> list[float]:
-        """Return the ridges of which each trial takes one for each model, rising, evenly spread by their logarithm."""
-        return ridge_values(self.ridge, RIDGES)
-
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Solve networks for every foundation; the corrector is the mean of the networks of the best trials."""
-        from shipid.hybrid.ridge import Recipe, tune_ridge  # a study is read without PyTorch
+        from shipid.hybrid.ridge import tune_ridge  # a study is read without PyTorch
 
-        recipe = Recipe(
-            corrector=self.corrector,
-            inputs=self.inputs(task.commands),
-            units=self.units,
-            terms=self.terms,
-            ridges=self.path(),
-            search_windows=self.search_windows,
-            points=self.points,
-            left_out=self.left_out,
-        )
-        return tune_ridge(task, self, recipe)
+        return tune_ridge(task, self)

@@ -17,7 +17,7 @@ from shipid.hybrid.search import Probability, Scale, SearchMethod
 
 
 class PathTrained(SearchMethod):
-    """Networks trained on the errors of the path, as in the paper; the defaults are the paper's, or pinned for it.
+    """Networks trained on the errors of the path, as in the paper; the defaults are the paper's.
 
     Parameters
     ----------

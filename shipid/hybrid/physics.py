@@ -40,13 +40,10 @@ RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array]
 class Physics:
     """What the physics predicts from an instant: `horizon` steps of `step` [s] by the rule `integrator`.
 
-    vessel : equations with their numbers; None is no physics, whose paths are zero.
-    integrator : `euler` or `rk4`. Wind is held at its value at the instant, commands are held or planned.
+    vessel : None is no physics, whose paths are zero.
     observer : with one, the physics starts from the filtered state in moving water, under the slow force as it fades;
         instants must then hold its `estimates`.
-    path : where true positions come from, see `cut_windows`.
-
-    Raises ShipidError for a vessel that is none, numbers that are not positive, and an unknown integrator or path.
+    path : where true positions come from, see `cut_windows`. ShipidError for a wrong argument.
     """
 
     vessel: Vessel | None
@@ -78,10 +75,7 @@ class Physics:
         return self.vessel
 
     def paths(self, instants: Instants) -> Array:
-        """Paths (T, S, 2) [m] in the frame (11); zeros without physics, not finite where the rollout diverges.
-
-        As the methods below it raises DataError for what are no instants.
-        """
+        """Paths (T, S, 2) [m] in the frame (11); zeros without physics, not finite where the rollout diverges."""
         check_instants(instants)
         if self.vessel is None:
             return np.zeros((self.horizon, len(instants), 2))
@@ -93,8 +87,7 @@ class Physics:
     ) -> tuple[Array, Array]:
         """Paths (T, V, S, 2) [m] in the frame (11) of V variants, `parameters` (V, P), and which diverged (V, S).
 
-        What the vessel feels and the columns do not hold, such as wind that was not measured, is zero:
-        see `missing_columns`.
+        What the columns do not hold is zero: see `missing_columns`.
         """
         result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
         return np.stack(_positions_in_frame(instants, north, east), axis=-1), result.diverged
@@ -103,7 +96,6 @@ class Physics:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S), horizontal as in a log.
 
         With an observer u and v are those through the water.
-        engine : as in `rollout`; `auto` takes C from `REPEATED_FROM` steps on.
         """
         leaning = tuple(name for name in LEANING if name in vessel_dynamics(self.ship).state)
         kept = ("north", "east", *MOTION, *leaning)
@@ -130,7 +122,7 @@ class Physics:
         """Mean squared position error [m^2] over windows and steps, and its slope by the parameters `names`, (K,).
 
         future : true paths (T, S, 2) [m] in the frame (11). parameters : (P,) numbers instead of the vessel's.
-        The error is infinite where the rollout of a window diverges: without this window it would be smaller.
+        The error is infinite where the rollout of a window diverges.
         """
         start, commands, environment, slow, drift = self._inputs(instants)
         gradients = rollout_gradient(
@@ -234,11 +226,8 @@ class Physics:
         environment = {name: columns.get(name, zero) for name in model.environment}
         slow = drift = None
         if self.observer is not None:
-            if not instants.estimates:
-                raise DataError("the physics has an observer: instants must hold its estimates", path="observer")
-            missing = next((name for name in ESTIMATED if name not in instants.estimates), None)
-            if missing is not None:
-                raise DataError("the physics has an observer, and the instants lack this estimate", path=missing)
+            if missing := [name for name in ESTIMATED if name not in instants.estimates]:
+                raise DataError("the physics has an observer: instants must hold its estimates", path=missing[0])
             observed = {**columns, **instants.estimates}
             begun = observed_start(filter_bank(self.ship, self.observer), observed, self.horizon, self.step, self.path)
             columns, environment, slow, drift = begun.columns, begun.environment, begun.tau_extra, begun.drift
@@ -262,7 +251,7 @@ def _positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[
 
 
 def check_instants(instants: Instants) -> None:
-    """Raise DataError for what are no instants, such as windows, or for instants without columns."""
+    """Raise DataError for what are no instants, or for instants without columns."""
     check_class("instants", instants, Instants, "such as `windows.instants()`", DataError)
     check_mapping("columns of the instants", instants.columns, "a name to an array", DataError)
     if "u" not in instants.columns:  # which says how many instants there are
@@ -270,7 +259,7 @@ def check_instants(instants: Instants) -> None:
 
 
 def missing_columns(vessel: Vessel, columns: Collection[str]) -> list[str]:
-    """Columns of states and weather that a vessel has and the columns lack: taken as zero, and named in the report."""
+    """Columns of states and weather that a vessel has and the columns lack: taken as zero."""
     model = vessel_dynamics(vessel)
     needed = (state_column(name) for name in (*model.state, *model.environment))
     return [name for name in needed if name not in columns]

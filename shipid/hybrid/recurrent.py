@@ -1,11 +1,9 @@
 """Recurrent: a gated recurrent unit reads the past, and gives the compensation of the path.
 
 h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
-[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time; where commands are
-known, the plan is among the inputs at the instant, as in `path-drawn`. AdamW on the mean squared error of the path,
-early stopping on the validation windows; the mean of the networks of the folds is the corrector. With mirror, x is even
-and y odd under the exchange of port and starboard, by construction. The usual deep rival (the unit: Cho et al. 2014);
-PyTorch trains it, plain arrays predict.
+[dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time. AdamW on the mean
+squared error of the path, early stopping on the validation windows; the corrector is the mean over the folds. With
+mirror, x is even and y odd by construction. The unit: Cho et al. (2014); PyTorch trains it, plain arrays predict.
 """
 
 from __future__ import annotations
@@ -19,11 +17,20 @@ from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.hybrid.compensator import Normaliser, flatten_paths, smooth_basis, unflatten_paths
+from shipid.hybrid.compensator import Normaliser, flatten_paths, unflatten_paths
 from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
-from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, TrialWorth, mean_squared_error, seed_of
+from shipid.hybrid.search import (
+    LearningProblem,
+    PathProblem,
+    Point,
+    Scale,
+    SearchedAlone,
+    TrialWorth,
+    mean_squared_error,
+    seed_of,
+)
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
 
@@ -35,9 +42,8 @@ Sequences = tuple[Array, Array]
 class SequenceReader(StoredData):
     """Names, statistics and mirrors of what a network reads.
 
-    past, now : z-scores of the signals of the past, the instant among them, and of the inputs at the instant.
-    mirrors : of both; None where port and starboard are not mirror images.
-    steps : number of past steps.
+    past, now : z-scores of the signals of the past with the instant, and of the inputs at the instant.
+    mirrors : of both; None where port and starboard are not mirror images. steps : of the past.
     """
 
     past: Normaliser
@@ -116,27 +122,23 @@ class RecurrentCorrector(StoredData):
         return np.asarray(paths + np.mean(corrections, axis=0))
 
 
-class RecurrentProblem(LearningProblem):
+class RecurrentProblem(PathProblem):
     """A foundation whose past is read by networks, one for each fold, that give the error of the path on the basis."""
 
     def __init__(self, method: Recurrent, task: Task, name: str) -> None:
         super().__init__(method, task, name)
-        self.inputs = Inputs(task.commands, method.memory)
-        self.table = self.inputs.table(self.case.physics, self.instants)
-        self.basis = smooth_basis(task.windows.horizon, method.terms)
-        self.weights = np.tensordot(self.basis.T, self.targets, 1)  # (r, S, 2)
         self.trained: dict[int, tuple[GatedNetwork, ...]] = {}  # trial -> networks of the folds
 
     def judge(self, number: int, point: Point) -> TrialWorth:
-        """Return the error of the networks of the folds on their validation windows, and the most epochs of one."""
+        """Return the error of the networks of the folds, and the most epochs of one."""
         networks = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
         self.trained[number] = tuple(network for network, _ in networks)
         losses = []
         for network, (_, validation) in zip(self.trained[number], self.task.folds, strict=True):
-            here, instants = self._rows(validation), self.instants.select(validation)
+            here, instants = self.rows(validation), self.instants.select(validation)
             predicted = network.predict(here, instants, self.task.commands)
             losses.append(mean_squared_error(predicted, self.targets[:, validation]))
-        return TrialWorth(float(np.mean(losses)), point, max(epochs for _, epochs in networks))
+        return float(np.mean(losses)), point, max(epochs for _, epochs in networks)
 
     def corrector(self, best: Sequence[Row]) -> RecurrentCorrector:
         """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
@@ -145,19 +147,15 @@ class RecurrentProblem(LearningProblem):
             self.judge(number, params)
         return RecurrentCorrector(self.inputs, self.method.past, self.trained[number], params)
 
-    def _rows(self, windows: Index) -> dict[str, Array]:
-        """Inputs of some windows at their instants."""
-        return {key: values[windows] for key, values in self.table.items()}
-
     def _reader(self, training: Index) -> SequenceReader:
         """Statistics of the training windows alone."""
         steps = count_steps(self.method.seconds, self.task.windows.step)
         rows = past_signals(self.task.windows.select(training).instants(), steps, self.task.commands)
         along = {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
-        past, now = (VaryingInputs.of(part, self.method.mirror) for part in (along, self._rows(training)))
-        if past.reflection is None or now.reflection is None:
-            return SequenceReader(past.normaliser, now.normaliser, None, steps)
-        return SequenceReader(past.normaliser, now.normaliser, (past.reflection, now.reflection), steps)
+        past, now = (VaryingInputs.of(part, self.method.mirror) for part in (along, self.rows(training)))
+        mirrors = past.reflection, now.reflection
+        both = None if mirrors[0] is None or mirrors[1] is None else (mirrors[0], mirrors[1])
+        return SequenceReader(past.normaliser, now.normaliser, both, steps)
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""
@@ -167,7 +165,7 @@ class RecurrentProblem(LearningProblem):
         reader, parts = self._reader(training), []
         scale = max(float(np.sqrt(np.square(self.weights[:, training]).mean())), 1e-9)
         for windows in self.task.folds[fold]:
-            seen = reader.read(self._rows(windows), self.instants.select(windows), self.task.commands)
+            seen = reader.read(self.rows(windows), self.instants.select(windows), self.task.commands)
             both = [seen] if reader.mirrors is None else [seen, reader.mirrored(seen)]
             parts.append((both, flatten_paths(self.weights[:, windows]) / scale))
         seed = seed_of(self.task.seed, self.name, number, fold)

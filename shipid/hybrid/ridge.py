@@ -1,23 +1,22 @@
 """Tuning in closed form: hidden units are drawn, output weights are a least-squares solution with a ridge.
 
-With the hidden layer fixed, the output weights of all models follow from one decomposition, for every ridge, and so
-does the error on each manoeuvre left out in turn: from the residuals r of the whole and the hat matrix H, that of a
-left-out block is (I - H_bb)^-1 r_b. So a trial is judged by every manoeuvre at the price of one solution.
+The output weights of all models follow from one decomposition, for every ridge, and so does the error on each run left
+out in turn: from the residuals r of the whole and the hat matrix H, that of a left-out block is (I - H_bb)^-1 r_b
+(Allen, 1974).
 
-A ship whose port and starboard sides are alike answers mirrored inputs with the mirrored path. A mirrored trial pairs
-each hidden unit with its mirror image, with equal output weights for x and opposite ones for y: the compensation then
-has this symmetry exactly, and each manoeuvre counts twice.
+A mirrored trial pairs each hidden unit with its mirror image, with equal output weights for x and opposite ones for y:
+mirrored inputs then give the mirrored path exactly.
 
-Windows of a run are alike. Where there are many, trials are compared by a part of them, evenly taken from each run.
-The best ones are judged once more, and solved, with all of them: successive halving (Jamieson and Talwalkar, 2016).
+Where windows are many, trials are compared by a part of them, evenly taken from each run; the best ones are judged once
+more, and solved, with all of them: successive halving (Jamieson and Talwalkar, 2016).
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -27,15 +26,14 @@ from torch import Tensor
 
 from shipid.data.windows import choose_evenly
 from shipid.hybrid.compensator import Network, smooth_basis
-from shipid.hybrid.features import Inputs, input_group
+from shipid.hybrid.features import input_group
 from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.products import hidden_layer, matrix_product
 from shipid.hybrid.search import (
     CLOSING_TRIALS,
     Point,
     Search,
-    SearchMethod,
     diverged_result,
+    ridge_values,
     seed_of,
     trial_row,
     windows_of_folds,
@@ -46,52 +44,36 @@ Mask = NDArray[np.bool_]
 Seeing = tuple[VaryingInputs, Tensor]
 """Windows as hidden units see them: what is seen, and its values (S, d), normalised."""
 
+RIDGES = 9  # of a range
 GOLDEN = 0.6180339887498949  # multiples of it are spread evenly over a step
 FINAL_PRICE = 2  # trials by a part of the windows that one by all costs, about
 SPARE_TRIALS = 4  # further trials whose errors without each run are kept
 LEAST_PIVOT = 0.1  # least square of a pivot of I - H_bb for single precision: sums of squares are right to about 1e-5
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """How networks are drawn and solved.
-
-    corrector : the class of what they make. inputs : which quantities they may take. units : hidden units drawn.
-    terms : polynomials of time. ridges : those of which a trial takes one for each model, rising. search_windows : how
-    many judge all trials, about. points : gives the trials anew. left_out : trial -> kinds of memory that it lacks.
-    """
-
-    corrector: type[Any]
-    inputs: Inputs
-    units: int
-    terms: int
-    ridges: Sequence[float]
-    search_windows: int
-    points: Callable[[], Iterable[Point]]
-    left_out: Callable[[Point], frozenset[str]]
-
-
-def tune_ridge(task: Task, method: SearchMethod, recipe: Recipe) -> dict[str, FitResult]:
+def tune_ridge(task: Task, method: Any) -> dict[str, FitResult]:
     """Solve networks for each foundation.
 
     The objective is the mean squared error [m^2] per coordinate over the validation windows of all folds, each
-    predicted by the solution without any window outside its training part. The compensator is the mean of the networks
-    of the best trials, solved with all windows of the folds. With more than `search_windows` windows, a part of them
-    chooses the trials that are judged by all, and of these the best make the compensator.
+    predicted by the solution from its training part. The compensator is the mean of the networks of the best trials,
+    solved with all windows of the folds.
+
+    method : a `PathDrawn`, or a kind of it; the class itself imports this file, so it is not named here.
     """
-    tuning = _RidgeTuning(task, method, recipe)
+    tuning = _RidgeTuning(task, method)
     tuning.search()
     return {key: tuning.fitted(key) for key in task.cases}
 
 
 @dataclass(frozen=True)
-class _Coordinate:
-    """One coordinate, x or y: features with the axes of their Gram matrix, and what they have to make.
+class _Coordinates:
+    """Coordinates that are made of the same features, with the axes of their Gram matrix, and what they have to make.
 
-    features : (S, M); eigenvalues : (M,), rising; axes : (M, M); targets : (S, K r) [m];
-    product : (M, K r), features on the axes by targets.
+    sides : x, y or both, 0 and 1. features : (S, M); eigenvalues : (M,), rising; axes : (M, M);
+    targets : (S, sides K r) [m], side by side; product : (M, sides K r), features on the axes by targets.
     """
 
+    sides: tuple[int, ...]
     features: Tensor
     eigenvalues: Tensor
     axes: Tensor
@@ -102,6 +84,11 @@ class _Coordinate:
         """Features of some windows (...) on the axes, (..., M)."""
         every = torch.equal(windows, torch.arange(len(self.features)))
         return matrix_product(self.features if every else self.features[windows], self.axes)
+
+    def columns(self, of_side: list[int]) -> list[int]:
+        """Columns of all its sides, from those of one side."""
+        width = self.targets.shape[1] // len(self.sides)
+        return [place * width + column for place in range(len(self.sides)) for column in of_side]
 
     def weights(self, ridge: float, columns: list[int] | slice) -> Tensor:
         """Weights (M, C) of the axes, fitted to all windows, for some columns of the targets."""
@@ -137,9 +124,9 @@ class _FoundationGroup:
 class _JudgingWindows:
     """Windows by which trials are judged: all, or a part.
 
-    rows : places of the windows among all, (S,). share : of all windows, by which a ridge shrinks as the sum of squares
-    does. blocks : what each fold leaves out of them. faster : sum of squares [m^2] of each foundation over those judged
-    that no network follows. count : number of windows that are judged.
+    rows : places of the windows among all, (S,). share : of all windows, by which a ridge shrinks.
+    blocks : what each fold leaves out of them. faster : sum of squares [m^2] of each foundation over those judged that
+    no network follows. count : number of windows that are judged.
     """
 
     rows: Index
@@ -178,10 +165,7 @@ class _TrialVerdict:
 
 
 class _BestTrials:
-    """The networks of the best trials of one model so far, and the errors without each fold of some more.
-
-    Without a fold, other trials may be the best.
-    """
+    """The networks of the best trials of one model so far, and the errors without each fold of some more."""
 
     def __init__(self, most: int) -> None:
         self.most = most
@@ -217,16 +201,16 @@ class _RidgeTuning:
     windows as judges; first : those that judge all trials. rows : of each foundation, its trials.
     """
 
-    def __init__(self, task: Task, method: SearchMethod, recipe: Recipe) -> None:
-        self.task, self.method, self.recipe = task, method, recipe
+    def __init__(self, task: Task, method: Any) -> None:
+        self.task, self.method, self.inputs = task, method, method.inputs(task.commands)
         self.windows, self.targets = windows_of_folds(task), task.targets
         sound = {key: paths for key, paths in self.targets.items() if np.isfinite(paths[:, self.windows]).all()}
-        tables = _tables_of_windows(shared_tables(task, recipe.inputs), self.windows)
+        tables = _tables_of_windows(shared_tables(task, self.inputs), self.windows)
         self.tables = {key: tables[key] for key in sound}
-        self.basis = smooth_basis(task.windows.horizon, recipe.terms)
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
         self.paths = {key: np.tensordot(self.basis.T, paths[:, self.windows], 1) for key, paths in sound.items()}
         self.every = _JudgingWindows.of(task, self.windows, np.arange(len(self.windows)), sound, self.basis)
-        rows = part_of_runs(task.windows.run[self.windows], recipe.search_windows)
+        rows = part_of_runs(task.windows.run[self.windows], method.search_windows)
         lacks = any(not np.isin(part, self.windows[rows]).any() for fold in task.folds for part in fold)
         self.whole = len(rows) == len(self.windows) or lacks  # no fold may lose all windows of a part
         self.first = self.every if self.whole else _JudgingWindows.of(task, self.windows, rows, sound, self.basis)
@@ -242,7 +226,7 @@ class _RidgeTuning:
         closing = CLOSING_TRIALS if self.whole else FINAL_PRICE * self.finalists
         search = Search(self.task, self.paths, self.method, again=True, closing=closing)
         promising: dict[str, list[tuple[float, int, Index]]] = {key: [] for key in self.paths}
-        for number, point in search.left(self.recipe.points() if self.paths else ()):
+        for number, point in search.left(self.method.points() if self.paths else ()):
             self.points[number] = point
             made: dict[str, Row] = {}
             for group in self._groups(number):
@@ -287,7 +271,7 @@ class _RidgeTuning:
         With a single fold there are none: nothing but that fold can choose the trials that judge it.
         """
         if key not in self.best:
-            return diverged_result(self.method, self.recipe.points())
+            return diverged_result(self.method, self.method.points())
         best, errors = self.best[key], None
         folds = [row.numpy() for block in self.every.blocks for row in block.rows]
         if len(folds) > 1:
@@ -295,12 +279,12 @@ class _RidgeTuning:
             errors, targets = np.full_like(self.targets[key], np.nan), self.targets[key][:, self.windows]
             errors[:, self.windows] = targets - np.tensordot(self.basis, self.paths[key], 1) + missed
         params, networks = zip(*(kept for _, kept in best.networks), strict=True)
-        corrector, rows = self.recipe.corrector(self.recipe.inputs, networks, params[0]), self.rows[key]
+        corrector, rows = self.method.corrector(self.inputs, networks, params[0]), self.rows[key]
         return FitResult(corrector, rows, sum(row["seconds"] for row in rows), errors)
 
     def _groups(self, number: int, *, whole: bool = False) -> list[_FoundationGroup]:
         """Foundations with the same inputs in a trial together, with all windows, or with those that judge first."""
-        left_out = self.recipe.left_out(self.points[number])
+        left_out = self.method.left_out(self.points[number])
         if left_out not in self.groups:
             self.groups[left_out] = _group_foundations(self.tables, self.paths, left_out)
         if whole or self.whole:
@@ -312,11 +296,13 @@ class _RidgeTuning:
         self, group: _FoundationGroup, number: int, judges: _JudgingWindows, wanted: Mapping[str, Index] | None = None
     ) -> dict[str, _TrialVerdict]:
         """One trial for some foundations; `wanted` are the numbers of the ridges of each, else it descends."""
-        point, terms, ridges = self.points[number], self.basis.shape[1], self.recipe.ridges
+        point, terms, ridges = self.points[number], self.basis.shape[1], ridge_values(self.method.ridge, RIDGES)
         mirrored = bool(point["mirror"]) and group.mirrored is not None
         seen, values = group.mirrored if mirrored and group.mirrored is not None else group.plain
-        units = seen.draw(point, self.recipe.units, seed_of(self.task.seed, number))
-        layer = _hidden_weights(units)  # the same array for all foundations
+        units = seen.draw(point, self.method.units, seed_of(self.task.seed, number))
+        layer = units.weight, units.offset  # the same arrays for all foundations
+        if units.reflection is not None:  # and the mirror images
+            layer = np.concatenate([layer[0], units.reflection @ layer[0]], axis=1), np.tile(layer[1], 2)
         parts = _coordinates_of_trial(values, units, group.outputs)
         asked = None
         if wanted is not None:
@@ -325,7 +311,7 @@ class _RidgeTuning:
         errors, others, kept = _left_out_errors(parts, scaled, judges.blocks, terms, asked)
         verdicts = {}
         for k, key in enumerate(group.names):
-            place, columns = int(errors[:, k].argmin()), slice(k * terms, (k + 1) * terms)
+            place, columns = int(errors[:, k].argmin()), list(range(k * terms, (k + 1) * terms))
             chosen = np.unique([place, *others[:, :, k].argmin(axis=0)])
             verdicts[key] = _TrialVerdict(
                 value=float(errors[place, k] + judges.faster[key]) / (2 * len(self.basis) * judges.count),
@@ -340,8 +326,8 @@ class _RidgeTuning:
 def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
     """Places of about `most` of the windows (S,), evenly taken from each run, one at least; all where they are few.
 
-    run : name of the run of each window, (S,). The windows of a run are in the order of time. Each run begins at
-    another part of a step, so that all moments of alike manoeuvres are seen.
+    run : name of the run of each window, (S,), in the order of time. Each run begins at another part of a step, so that
+    all moments of alike manoeuvres are seen.
     """
     if len(run) <= most:
         return np.arange(len(run))
@@ -356,8 +342,7 @@ def part_of_runs(run: NDArray[np.str_], most: int) -> Index:
 def _ridges_for_all(ridges: Sequence[float], share: float, chosen: Index) -> Index:
     """Numbers of the rising ridges that all windows may choose where a share of them chose these.
 
-    A fit to a part has ridges smaller by that share, which is right where windows are alike. Where each has news, a
-    ridge is right for any number of windows. So that of all windows is one of those chosen, or smaller by that share.
+    Where windows are alike, a fit to a part has ridges smaller by that share; where each has news, the same ones.
     """
     lowest = np.searchsorted(ridges, share * np.asarray(ridges)[chosen] * (1 + 1e-9), side="right") - 1
     ranges = zip(np.maximum(lowest, 0), chosen, strict=True)
@@ -435,27 +420,25 @@ def _normalised_inputs(table: Mapping[str, Array], mirror: bool) -> Seeing:
     return seen, _double_tensor(seen.normaliser.apply(table))
 
 
-def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor]) -> list[_Coordinate]:
+def _coordinates_of_trial(values: Tensor, units: Units, outputs: Sequence[Tensor]) -> list[_Coordinates]:
     """Features of a trial with the targets of x and y: even and odd ones in the mirror, else the same for both."""
     weight, offset = (_double_tensor(part) for part in (units.weight, units.offset))
     size = len(offset) ** 0.5
     features = hidden_layer(values, weight, offset)
     if units.reflection is None:
-        return _coordinates_with_axes(features.div_(size), outputs)
+        return [_with_axes((0, 1), features.div_(size), outputs)]
     image = hidden_layer(values, _double_tensor(units.reflection) @ weight, offset)
     even = (features + image).div_(2**0.5 * size)
     odd = features.sub_(image).div_(2**0.5 * size)
-    return _coordinates_with_axes(even, outputs[:1]) + _coordinates_with_axes(odd, outputs[1:])
+    return [_with_axes((0,), even, outputs[:1]), _with_axes((1,), odd, outputs[1:])]
 
 
-def _coordinates_with_axes(features: Tensor, outputs: Sequence[Tensor]) -> list[_Coordinate]:
-    """Coordinates that are made of the same features."""
+def _with_axes(sides: tuple[int, ...], features: Tensor, outputs: Sequence[Tensor]) -> _Coordinates:
+    """Coordinates that are made of features (S, M), with the targets (S, K r) of each."""
     eigenvalues, axes = torch.linalg.eigh(matrix_product(features.T, features))
     eigenvalues = eigenvalues.clamp(min=0.0)  # rounding makes none negative
-    return [
-        _Coordinate(features, eigenvalues, axes, side, matrix_product(axes.T, matrix_product(features.T, side)))
-        for side in outputs
-    ]
+    product = [matrix_product(axes.T, matrix_product(features.T, side)) for side in outputs]
+    return _Coordinates(sides, features, eigenvalues, axes, torch.cat(list(outputs), dim=1), torch.cat(product, dim=1))
 
 
 class _LeftOutErrors:
@@ -482,7 +465,7 @@ class _LeftOutErrors:
 
 
 def _left_out_errors(
-    parts: Sequence[_Coordinate],
+    parts: Sequence[_Coordinates],
     ridges: Sequence[float],
     blocks: Sequence[_FoldBlock],
     terms: int,
@@ -491,19 +474,18 @@ def _left_out_errors(
     """Errors over judged windows, each block without itself.
 
     `ridges` rise; `terms` is r. `wanted` (ridges, K) says which ridges are asked of which models. By default each model
-    descends from the middle of the ridges: those on either side are taken one by one, as long as the last one is the
-    best so far by all folds, or by all but one of them.
+    descends from the middle, to either side as long as the last one is the best so far by all folds, or all but one.
 
     Returns sums of squares (ridges, K) [m^2] over all folds, those over all folds but one (ridges, F, K), and the
     errors. The sums of a ridge that is not asked are infinite.
     """
     targets, ends = parts[0].targets, np.cumsum([len(block.out) for block in blocks])
     pieces = []
-    for sides, part in _join_alike_sides(parts):
+    for part in parts:
         for end, block in zip(ends, blocks, strict=True):
             solver = (_FewRows if block.out.shape[1] <= part.features.shape[1] else _ManyRows)(part, block)
-            pieces.append(_SidePiece(sides, slice(end - len(block.out), end), block, solver))
-    num_models = targets.shape[1] // terms
+            pieces.append(_SidePiece(part.sides, slice(end - len(block.out), end), block, solver))
+    num_models = targets.shape[1] // (terms * len(parts[0].sides))
     sums = targets.new_full((len(ridges), num_models), torch.inf)
     others = targets.new_full((len(ridges), ends[-1], num_models), torch.inf)
     errors = _LeftOutErrors(len(targets), terms, len(ridges))
@@ -526,10 +508,11 @@ def _left_out_errors(
     for i, models in asked():
         if not models:
             continue
-        columns = None if len(models) == num_models else [k * terms + term for k in models for term in range(terms)]
+        columns = [k * terms + term for k in models for term in range(terms)]
         by_fold = targets.new_zeros((ends[-1], len(models)))
         for piece in pieces:
-            without = piece.solver.without(ridges[i], piece.columns(columns, targets.shape[1]))
+            every = len(models) == num_models
+            without = piece.solver.without(ridges[i], slice(None) if every else piece.solver.part.columns(columns))
             made = piece.block.of_judged(without)
             squares = np.einsum("fbc,fbc->fc", made.numpy(), made.numpy())
             shares = torch.from_numpy(squares).reshape(len(made), len(piece.sides), len(models), terms)
@@ -538,16 +521,6 @@ def _left_out_errors(
         sums[i, models] = by_fold.sum(dim=0)
         others[i][:, models] = by_fold.sum(dim=0) - by_fold
     return sums.numpy(), others.numpy(), errors
-
-
-def _join_alike_sides(parts: Sequence[_Coordinate]) -> Iterator[tuple[tuple[int, ...], _Coordinate]]:
-    """Sides with the same features as one part, their targets side by side."""
-    same = [parts] if all(part.features is parts[0].features for part in parts) else [[part] for part in parts]
-    first = 0
-    for some in same:
-        targets, product = (torch.cat([getattr(part, name) for part in some], dim=1) for name in ("targets", "product"))
-        yield tuple(range(first, first + len(some))), replace(some[0], targets=targets, product=product)
-        first += len(some)
 
 
 @dataclass(frozen=True)
@@ -559,12 +532,6 @@ class _SidePiece:
     block: _FoldBlock
     solver: _FewRows | _ManyRows
 
-    def columns(self, of_side: list[int] | None, width: int) -> list[int] | slice:
-        """Columns of all its sides, from those of one side, which has so many; all of them by default."""
-        if of_side is None:
-            return slice(None)
-        return [place * width + column for place in range(len(self.sides)) for column in of_side]
-
 
 def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tuple[Array, Tensor]:
     """A trial without each fold in turn, for one model: others (ridges, F) [m^2] over all folds but that one."""
@@ -574,10 +541,10 @@ def _without_each_fold(others: Array, errors: _LeftOutErrors, model: int) -> tup
 class _FewRows:
     """Errors (folds, b, K r) of blocks without themselves, by their part H_bb of the hat matrix, (b, b).
 
-    In single precision, which is twice as fast, where that is sound: the smaller the ridge, the worse is the condition.
+    In single precision, which is twice as fast, where that is sound.
     """
 
-    def __init__(self, part: _Coordinate, block: _FoldBlock) -> None:
+    def __init__(self, part: _Coordinates, block: _FoldBlock) -> None:
         self.part, self.block, self.shape = part, block, block.out.shape
         out = block.out.flatten()
         self.exact = part.rotated(out)
@@ -617,7 +584,7 @@ class _FewRows:
 class _ManyRows:
     """As `_FewRows`, by the output weights without each block, (M, M): for blocks of more windows than features."""
 
-    def __init__(self, part: _Coordinate, block: _FoldBlock) -> None:
+    def __init__(self, part: _Coordinates, block: _FoldBlock) -> None:
         self.part = part
         self.rows, self.targets = part.rotated(block.out), part.targets[block.out]  # (folds, b, M), (folds, b, K r)
         self.within = matrix_product(self.rows.mT, self.rows)
@@ -630,24 +597,20 @@ class _ManyRows:
         return self.targets[..., columns] - matrix_product(self.rows, solved)
 
 
-def _hidden_weights(units: Units) -> tuple[Array, Array]:
-    """Weights (d, M) and offsets (M,) of the hidden layer of a network: the units drawn, and their mirror images."""
-    weight, offset = units.weight, units.offset
-    if units.reflection is None:
-        return weight, offset
-    return np.concatenate([weight, units.reflection @ weight], axis=1), np.concatenate([offset, offset])
-
-
 def _solved_network(
     seen: VaryingInputs,
     layer: tuple[Array, Array],
-    parts: Sequence[_Coordinate],
-    columns: slice,
+    parts: Sequence[_Coordinates],
+    columns: list[int],
     ridge: float,
     basis: Array,
 ) -> Network:
     """The network whose targets are some columns of a trial, solved with all windows."""
-    x, y = ((part.axes @ part.weights(ridge, columns)).numpy() / part.features.shape[1] ** 0.5 for part in parts)
+    x, y = (
+        (part.axes @ weights).numpy() / part.features.shape[1] ** 0.5
+        for part in parts
+        for weights in part.weights(ridge, part.columns(columns)).chunk(len(part.sides), dim=1)
+    )
     if seen.reflection is not None:
         x, y = np.concatenate([x, x]) / 2**0.5, np.concatenate([y, -y]) / 2**0.5
     output = np.concatenate([x, y], axis=1)
@@ -656,3 +619,27 @@ def _solved_network(
 
 def _double_tensor(values: Array) -> Tensor:
     return torch.as_tensor(values, dtype=torch.float64)
+
+
+# On AMD products and functions of NumPy take a third to nine tenths of the time of those of PyTorch, except tanh with
+# AVX2 only: docs/performance.md, "Where the time goes". Both share their memory.
+
+
+def matrix_product(left: Tensor, right: Tensor) -> Tensor:
+    """Return left @ right, of matrices or stacks of them."""
+    return torch.from_numpy(np.matmul(left.numpy(), right.numpy()))
+
+
+def hidden_layer(values: Tensor, weight: Tensor, offset: Tensor) -> Tensor:
+    """Return tanh(values @ weight + offset): units (S, M) of inputs (S, d) by weights (d, M) and offsets (M,)."""
+    units = np.matmul(values.numpy(), weight.numpy())
+    units += offset.numpy()
+    return torch.from_numpy(units).tanh_() if _tanh_by_torch() else torch.from_numpy(np.tanh(units, out=units))
+
+
+@cache
+def _tanh_by_torch() -> bool:
+    """Whether NumPy's tanh is the one for AVX2, which takes twice the time of PyTorch's; that for AVX-512 does not."""
+    functions = np.lib.introspect.opt_func_info(func_name="^tanh$", signature="float64")  # empty on some processors
+    used = [kind["current"] for kinds in functions.values() for kind in kinds.values()]
+    return any(name in ("X86_V3", "FMA3__AVX2") for name in used)  # as NumPy 2.4 calls AVX2, and as 2.3 does

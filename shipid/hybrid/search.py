@@ -1,15 +1,13 @@
 """The search of a method: its trials, which are left, how many fit into a budget, and the skeleton of most methods.
 
-Trials are numbered, and whatever is random in one is seeded by its number. So a search that was interrupted goes on
-from its journal and gives the digits of one that was not. A budget becomes a number of trials by the time of the first
-ones; the number is written down before it is used, and read back.
+Whatever is random in a trial is seeded by its number, so a search that was interrupted goes on from its journal and
+gives the digits of one that was not. A budget becomes a number of trials by the time of the first ones, written down.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count, islice
 from math import ceil, exp, floor, log
 from statistics import fmean
@@ -20,13 +18,16 @@ import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 from pydantic import model_validator as validator
 
-from shipid.hybrid.features import NO_MEMORY, Memory
+from shipid.hybrid.compensator import smooth_basis
+from shipid.hybrid.features import NO_MEMORY, Inputs, Memory
 from shipid.hybrid.method import Array, FitResult, Index, Method, Row, Task, Traits
 
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Scale = PositiveFloat | tuple[PositiveFloat, PositiveFloat]
-Point = Mapping[str, float]
+Point = Mapping[str, Any]
 """A trial: values of hyperparameters by name."""
+TrialWorth = tuple[float, Point, int]
+"""Mean squared validation error [m^2] per coordinate of a trial, all its settings, and its epochs."""
 Any_ = TypeVar("Any_")
 TIMED_TRIALS = 4  # first trials from whose time the number of all follows; `choose` takes three kinds of memory in turn
 CLOSING_TRIALS = 1  # trials that the last fit costs, about
@@ -41,8 +42,8 @@ class SearchMethod(Method):
     Parameters
     ----------
     trials : sets of hyperparameters tried per foundation.
-    budget : core-seconds [s] per foundation for the whole fit, in place of `trials`: as many trials are made as fit,
-        by the time that the first ones take (`shipid.hybrid.search`), one at least.
+    budget : core-seconds [s] per foundation for the whole fit, in place of `trials`: as many trials as fit by the time
+        that the first ones take, one at least.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ()
@@ -75,7 +76,7 @@ class SearchMethod(Method):
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
-        return tuple(self.ranges())
+        return (*self.ranges(), *self.choices())
 
     def num_trials(self) -> int | None:
         """Return how many sets of hyperparameters are tried per foundation; None where the budget decides it."""
@@ -122,11 +123,8 @@ def affordable_trials(
 ) -> int | None:
     """How many trials fit into a budget; None before enough have been timed, or half of the budget is gone.
 
-    Parameters
-    ----------
-    budget : core-seconds for everything [s].
-    before : what the search has cost before its first trial [s].
-    seconds : of the trials so far [s]; the first one also warms up, so the others tell the price.
+    budget : core-seconds for everything. before : what the search has cost before its first trial [s].
+    seconds : of the trials so far; the first one also warms up, so the others tell the price.
     closing : trials that what follows the search costs, about.
     """
     if not seconds or (len(seconds) < TIMED_TRIALS and before + sum(seconds) < budget / 2):
@@ -138,16 +136,9 @@ def affordable_trials(
 class Search:
     """The trials of one or several foundations that go trial by trial together.
 
-    Parameters
-    ----------
-    task, method : what is searched.
-    names : the foundations.
-    closing : as in `affordable_trials`.
+    names : the foundations. closing : as in `affordable_trials`.
     again : each trial needs what the one before left behind, so nothing is taken over from an interrupted search but
-        its number of trials; the digits are the same.
-
-    Attributes
-    ----------
+        its number of trials.
     rows : foundation -> its trials so far, those of an interrupted search first.
     """
 
@@ -222,8 +213,7 @@ class Search:
 def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"})) -> Iterator[dict[str, float]]:
     """The trials of a method: a value of everything searched but what is `idle`, evenly spread over its range.
 
-    A setting is spread by its logarithm unless it is one of `LINEAR`; one of `COUNTS` is rounded. They never end where
-    a budget says how many are made. Where nothing is searched they differ in what is drawn at random.
+    They never end where a budget says how many are made. Where nothing is searched they differ in what is drawn.
     """
     ranges = {name: pair for name, pair in method.ranges().items() if name not in idle}
     fixed = {name: float(getattr(method, name)) for name in method.SEARCHED if name not in {*ranges, *idle}}
@@ -248,9 +238,8 @@ def ridge_values(ridge: float | tuple[float, float], count: int) -> list[float]:
 
 def diverged_result(method: SearchMethod, points: Iterable[Mapping[str, float]]) -> FitResult:
     """The result where the physics is not finite: no corrector, every trial diverged."""
-    blank = {"value": np.nan, "seconds": 0.0, "epochs": 0, "state": "diverged"}
-    some = islice(points, 1 if method.budget else None)
-    return FitResult(None, [{"number": i, "params": dict(point), **blank} for i, point in enumerate(some)], 0.0)
+    start, some = time.process_time(), islice(points, 1 if method.budget else None)
+    return FitResult(None, [trial_row(i, point, np.nan, start) for i, point in enumerate(some)], 0.0)
 
 
 def trial_row(number: int, params: Mapping[str, float], value: float, start: float, epochs: int = 0) -> dict[str, Any]:
@@ -282,20 +271,8 @@ def mean_squared_error(paths: Array, future: Array) -> float:
     return value if np.isfinite(value) else float("inf")
 
 
-@dataclass(frozen=True)
-class TrialWorth:
-    """What a trial is worth: mean squared validation error [m^2] per coordinate, all its settings, and its epochs."""
-
-    value: float
-    params: Mapping[str, float]
-    epochs: int = 0
-
-
 class LearningProblem:
-    """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged.
-
-    method : with its settings. task, name : the task and the name of the foundation.
-    """
+    """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged."""
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
         self.method, self.task, self.name = method, task, name
@@ -307,17 +284,35 @@ class LearningProblem:
         raise NotImplementedError
 
     def judge(self, number: int, point: Point) -> TrialWorth:
-        """Return the mean over the folds of the error on validation windows of what the training windows taught."""
+        """Return the mean error over the folds on validation windows of what the training windows taught."""
         losses = []
         for training, validation in self.task.folds:
             corrector, instants = self.solve(number, point, training), self.instants.select(validation)
             paths = corrector.predict(self.case.physics, instants, self.case.paths[:, validation])
             losses.append(mean_squared_error(paths, self.future[:, validation]))
-        return TrialWorth(float(np.mean(losses)), point)
+        return float(np.mean(losses)), point, 0
 
     def corrector(self, best: Sequence[Row]) -> Any:
         """Return the corrector that the best trials make, of which there are `num_chosen` at most."""
         return self.solve(best[0]["number"], best[0]["params"], windows_of_folds(self.task))
+
+
+class PathProblem(LearningProblem):
+    """A foundation whose errors of the path, on a basis (T, r) [m], follow from what is known at the instant.
+
+    table : inputs (S,) by name. weights : (r, S, 2), the errors on the basis.
+    """
+
+    def __init__(self, method: Any, task: Task, name: str) -> None:
+        super().__init__(method, task, name)
+        self.inputs = Inputs(task.commands, method.memory)
+        self.table = self.inputs.table(self.case.physics, self.instants)
+        self.basis = smooth_basis(task.windows.horizon, method.terms)
+        self.weights = np.tensordot(self.basis.T, self.targets, 1)
+
+    def rows(self, windows: Index) -> dict[str, Array]:
+        """Inputs of some windows."""
+        return {name: values[windows] for name, values in self.table.items()}
 
 
 class SearchedAlone(SearchMethod):
@@ -335,6 +330,10 @@ class SearchedAlone(SearchMethod):
         """Return the trials: a value of everything searched, evenly spread."""
         return trial_points(self, self.IDLE)
 
+    def num_trials(self) -> int | None:
+        """Return how many trials there are for each foundation; None where the budget decides it."""
+        return None if self.budget else len(list(self.points()))
+
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Search for every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
         every, fitted = windows_of_folds(task), {}
@@ -348,8 +347,8 @@ class SearchedAlone(SearchMethod):
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
         for number, point in search.left(self.points()):
             start = time.process_time()
-            judged = problem.judge(number, point)
-            search.record({name: trial_row(number, judged.params, judged.value, start, judged.epochs)})
+            value, params, epochs = problem.judge(number, point)
+            search.record({name: trial_row(number, params, value, start, epochs)})
         rows = search.rows[name]
         best = best_trials(rows)[: self.num_chosen()]
         return FitResult(problem.corrector(best) if best else None, rows, search.seconds)

@@ -1,17 +1,15 @@
 """Velocities one step at a time: what a step of the physics misses, and paths on which something is added to each step.
 
-After a step the velocities are those of the physics plus step x a, with a the missing acceleration. Where physics is
-integrated by `rk4`, heading and position move as it says, plus step^2 / 2 x a. By `euler`, which errs there by half a
-step, and without a vessel, which leaves the velocities as they are, they are the trapezoid of the velocities.
-Steps start from measured states: physics with an observer are refused.
+After a step the velocities are those of the physics plus step x a, with a the missing acceleration. By `rk4`, heading
+and position move as it says, plus step^2 / 2 x a; by `euler`, which errs there by half a step, and without a vessel
+they are the trapezoid of the velocities. Steps start from measured states: physics with an observer are refused.
 """
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import PositiveInt
@@ -40,17 +38,7 @@ VELOCITY_LIMIT = 100.0  # m/s and rad/s: no ship, so the path has diverged
 
 
 class Stepper:
-    """The physics in single steps from some instants.
-
-    Parameters
-    ----------
-    physics : as in a case.
-    instants : S instants of prediction; commands are held or planned.
-
-    Raises
-    ------
-    DataError : for physics with an observer.
-    """
+    """The physics in single steps from S instants; DataError for physics with an observer."""
 
     def __init__(self, physics: Physics, instants: Instants) -> None:
         if physics.observer is not None:
@@ -60,12 +48,12 @@ class Stepper:
         self.columns = {name: values for name, values in instants.columns.items() if name in kept or "." in name}
         self.reached = physics.reached(instants)
 
-    def at(self, k: int, motion: Mapping[str, Array]) -> Instants:
-        """What holds at the start of step k = 0..T-1, given u, v, r and psi (S,) then."""
-        planned = self.instants.planned or {}
-        columns = {**self.columns, **{name: values[k] for name, values in planned.items()}, **motion}
-        hidden = {name: values[k] for name, values in self.reached.items()}
-        return Instants(columns, hidden=hidden or None)
+    def at(self, k: int | Index, motion: Mapping[str, Array], window: Index | slice = slice(None)) -> Instants:
+        """What holds at the start of step k = 0..T-1, given u, v, r and psi (S,) then; k may be (S,)."""
+        columns = {name: values[window] for name, values in self.columns.items()}
+        columns |= {name: values[k, window] for name, values in (self.instants.planned or {}).items()}
+        hidden = {name: values[k, window] for name, values in self.reached.items()}
+        return Instants({**columns, **motion}, hidden=hidden or None)
 
 
 def step_alone(physics: Physics, at: Instants) -> Array:
@@ -88,8 +76,8 @@ def _step_and_way(physics: Physics, at: Instants) -> tuple[Array, Array | None]:
 def stepped_paths(physics: Physics, instants: Instants, acceleration: Acceleration) -> Array:
     """Paths (T, S, 2) [m] in the frame (11) on which `acceleration` is added to each step of the physics.
 
-    acceleration : (what holds at the start of the step, number of the step, velocities (S, 3) after it by the physics
-        alone) -> missing acceleration (S, 3) [m/s^2, rad/s^2].
+    acceleration : (start of the step, its number, velocities (S, 3) after it by the physics alone) -> missing
+        acceleration (S, 3) [m/s^2, rad/s^2].
     """
     stepper, step = Stepper(physics, instants), physics.step
     nu = np.stack([np.asarray(instants.columns[name], dtype=float) for name in MOTIONS], axis=1)
@@ -150,25 +138,23 @@ class TrueSteps:
 
 
 def true_steps(task: Task, name: str) -> TrueSteps:
-    """Steps of the true motion over the windows of a task, and what the physics of a foundation makes of them.
+    """Steps of the true motion over the windows of a task; DataError where they hold no true states.
 
-    A moment that several windows of a run hold is taken where it is nearest to the instant, so that the wind is as
-    fresh as can be. DataError where the windows hold no true states.
+    A moment that several windows of a run hold is taken where it is nearest to the instant: the wind is fresh there.
     """
     windows, physics = task.windows, task.cases[name].physics
     if not windows.states:
         raise DataError("the method learns from the true velocities over the horizon: these windows hold none")
     stepper = Stepper(physics, windows.instants(known=True, hidden=task.hidden.get(name)))
-    chosen = _first_of_each_moment(task)
-    number, window = np.divmod(chosen, len(windows))
-    at = join_instants([stepper.at(k, true_motion(windows, k)) for k in range(windows.horizon)]).select(chosen)
-    after = np.stack([windows.states[key].ravel()[chosen] for key in MOTIONS], axis=1)
+    number, window = np.divmod(_first_of_each_moment(task), len(windows))
+    at = stepper.at(number, {key: values[number, window] for key, values in true_motion(windows).items()}, window)
+    after = np.stack([windows.states[key][number, window] for key in MOTIONS], axis=1)
     return TrueSteps(at, step_alone(physics, at), after, window, number, physics.step)
 
 
-def true_motion(windows: Windows, k: int) -> dict[str, Array]:
-    """True u, v, r [m/s, rad/s] and psi [rad] (S,) at the start of step k = 0..T-1 of each window."""
-    return {key: windows.columns[key] if k == 0 else windows.states[key][k - 1] for key in (*MOTIONS, "psi")}
+def true_motion(windows: Windows) -> dict[str, Array]:
+    """True u, v, r [m/s, rad/s] and psi [rad] after 0..T steps of each window, (T + 1, S)."""
+    return {key: np.concatenate([windows.columns[key][None], windows.states[key]]) for key in (*MOTIONS, "psi")}
 
 
 def _first_of_each_moment(task: Task) -> Index:
@@ -180,34 +166,22 @@ def _first_of_each_moment(task: Task) -> Index:
     return np.sort(np.unique(moments, axis=0, return_index=True)[1])
 
 
-def join_instants(parts: Sequence[Instants]) -> Instants:
-    """Several sets of instants one after the other."""
-    columns = {key: np.concatenate([part.columns[key] for part in parts]) for key in parts[0].columns}
-    hidden = {key: np.concatenate([(part.hidden or {})[key] for part in parts]) for key in parts[0].hidden or {}}
-    return Instants(columns, hidden=hidden or None)
-
-
 class StepProblem(LearningProblem):
-    """A foundation whose true steps are solved for all ridges; a trial takes the ridge that predicts the path best."""
+    """A foundation whose true steps are solved for several ridges; a trial takes the one that predicts the path best.
+
+    `solve` must give one corrector for a point whose ridge is a list of R: it takes R S instants, in R blocks.
+    """
 
     def __init__(self, method: StepMethod, task: Task, name: str) -> None:
         super().__init__(method, task, name)
         self.steps = true_steps(task, name)
-
-    @abstractmethod
-    def solve_ridges(self, number: int, point: Point, windows: Index, ridges: Sequence[float]) -> Any:
-        """Return the corrector of some windows for R ridges: of several R in one, which takes R S instants."""
-
-    def solve(self, number: int, point: Point, windows: Index) -> Any:
-        """Return the corrector of a trial for the ridge that it took."""
-        return self.solve_ridges(number, point, windows, [point["ridge"]])
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the least error over the ridges, on `samples` of the validation windows of each fold at most."""
         method, task, errors = self.method, self.task, np.zeros(())
         ridges = ridge_values(method.ridge, method.RIDGES)
         for fold, (training, judged) in enumerate(task.folds):
-            corrector = self.solve_ridges(number, point, training, ridges)
+            corrector = self.solve(number, {**point, "ridge": ridges}, training)
             if len(judged) > method.samples:
                 generator = np.random.default_rng(seed_of(task.seed, fold))
                 judged = np.sort(generator.choice(judged, method.samples, replace=False))
@@ -215,11 +189,11 @@ class StepProblem(LearningProblem):
             paths = np.split(corrector.predict(self.case.physics, instants, np.empty(0)), len(ridges), axis=1)
             errors = errors + [mean_squared_error(path, self.future[:, judged]) for path in paths]
         best = int(errors.argmin())
-        return TrialWorth(float(errors[best]) / len(task.folds), {**point, "ridge": ridges[best]})
+        return float(errors[best]) / len(task.folds), {**point, "ridge": ridges[best]}, 0
 
 
 class StepMethod(SearchedAlone):
-    """A method that adds to each step: a trial is solved on true steps for all ridges, and judged by the path.
+    """A method that adds to each step: a trial is solved on true steps for several ridges, and judged by the path.
 
     RIDGES : how many ridges are solved where `ridge` is a range.
 

@@ -21,7 +21,7 @@ class StoredData:
     """Base of frozen dataclasses that are written as plain JSON and arrays, and rebuilt from them.
 
     Fields may be numbers, texts, arrays, pydantic models, other such dataclasses, and tuples, mappings and `| None` of
-    these. An array is called by the dotted path of its field, such as `networks.0.normaliser.mean`.
+    these. An array is called by its dotted path, such as `networks.0.normaliser.mean`.
     """
 
     def header(self) -> dict[str, Any]:

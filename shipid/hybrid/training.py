@@ -1,8 +1,7 @@
 """Training by PyTorch, with one loop, `minimise_losses`: stacks of small networks, and gated recurrent units.
 
-The K members of a stack share inputs, batches and structure; each has separate targets, initial weights, learning rate,
-weight decay and drop-out, and nothing it computes depends on who else is in the stack. One small network leaves a core
-waiting; nineteen of them as one batched product do not.
+The K members of a stack share inputs, batches and structure; nothing that one computes depends on the others. One small
+network leaves a core waiting; nineteen of them as one batched product do not.
 """
 
 from __future__ import annotations
@@ -33,11 +32,8 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Kingma & Ba (2015), as PyTorch's d
 
 @dataclass(frozen=True)
 class Length:
-    """How long networks are trained.
+    """How long networks are trained: `epochs` at most.
 
-    Parameters
-    ----------
-    epochs : at most so many passes over the training samples.
     batch : samples per optimiser step; 0 = all of them.
     patience : epochs without a better validation loss after which a member stops; 0 = it never does.
     """
@@ -82,14 +78,14 @@ def train_stack(
         `weight_decay` (AdamW; 0 is Adam), and `input_dropout` and `hidden_dropout`, the probabilities to be dropped.
     seeds : (K,) of the initial weights and drop-out of each member.
     order_seed : of the order of the samples in batches, the same for all members.
-    device : a PyTorch device; random numbers are drawn on the CPU, hence the same everywhere.
+    device : a PyTorch device; random numbers are drawn on the CPU.
 
-    A member that diverges keeps its best weights before that, no numbers where there are none; others go on.
+    A member that diverges keeps its best weights before that; others go on.
     """
     num_samples = len(train_idx)
     num_layers, units = int(members[0]["layers"]), int(members[0]["units"])
     widths = [inputs.shape[1], *[units] * num_layers, targets.shape[2]]
-    rates = _single_tensor([one["learning_rate"] for one in members], device)[:, None]
+    learning = _single_tensor([one["learning_rate"] for one in members], device)[:, None]
     dropout = [[one[name] for one in members] for name in ("input_dropout", *["hidden_dropout"] * num_layers)]
     x, y = _single_tensor(inputs[train_idx], device), _single_tensor(targets[:, train_idx], device)
     x_val, y_val = _single_tensor(inputs[val_idx], device), _single_tensor(targets[:, val_idx], device)
@@ -101,7 +97,10 @@ def train_stack(
 
     def loss(rows: Tensor | slice) -> Tensor:
         x_batch, y_batch = x[rows], y[:, rows]
-        masks = _dropout_masks(len(x_batch), widths, dropout, generators, device)
+        masks = [  # for the input of each layer, or None where no member drops any
+            draw_dropout(rates, (len(x_batch), width), generators).to(device) if any(rates) else None
+            for rates, width in zip(dropout, widths[:-1], strict=True)
+        ]
         return (stack_outputs(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
 
     batch = min(length.batch or num_samples, num_samples)
@@ -110,8 +109,10 @@ def train_stack(
         [leaf for layer in layers for leaf in layer],
         [one["weight_decay"] for one in members],
         length,
-        batches=lambda: _epoch_batches(num_samples, batch, order),
-        rate=lambda _: rates,
+        batches=lambda: (  # a single batch stays in order
+            [slice(None)] if batch == num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
+        ),
+        rate=lambda _: learning,
         loss=loss,
         watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
     )
@@ -158,11 +159,6 @@ def minimise_losses(
             if not watch.running.any():
                 break
     return watch
-
-
-def _epoch_batches(num_samples: int, batch: int, order: torch.Generator) -> Sequence[Tensor | slice]:
-    """Cut one epoch into batches, shuffled; a single batch stays in order."""
-    return [slice(None)] if batch >= num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
 
 
 def stack_outputs(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
@@ -242,20 +238,6 @@ def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tens
     return views
 
 
-def _dropout_masks(
-    num_samples: int,
-    widths: Sequence[int],
-    dropout: Sequence[Sequence[float]],
-    generators: Sequence[torch.Generator],
-    device: str,
-) -> Masks:
-    """Draw a mask (K, n, i) for the input of each layer, or None where no member drops any."""
-    return [
-        draw_dropout(rates, (num_samples, width), generators).to(device) if any(rates) else None
-        for rates, width in zip(dropout, widths[:-1], strict=True)
-    ]
-
-
 def draw_dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:
     """Draw inverted drop-out (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0."""
     return torch.stack(
@@ -278,7 +260,10 @@ def train_gated(
 ) -> tuple[dict[str, Array], int]:
     """Train on the first part of the data, stop by the second; layers by name and the number of epochs."""
     generator = torch.Generator().manual_seed(seed)
-    (seen, outputs), watched = map(_tensors, parts)
+    (seen, outputs), watched = (
+        ([(_single_tensor(past, "cpu"), _single_tensor(now, "cpu")) for past, now in pairs], _single_tensor(out, "cpu"))
+        for pairs, out in parts
+    )
     (past, now), *_ = seen
     shapes = {
         "W_i": (3 * units, past.shape[2]),
@@ -321,13 +306,6 @@ def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
     """Layers by name, in the memory of weights (1, P)."""
     pieces = torch.split(weights[0], [int(np.prod(shape)) for shape in shapes.values()])
     return {name: piece.view(shape) for (name, shape), piece in zip(shapes.items(), pieces, strict=True)}
-
-
-def _tensors(part: Part) -> tuple[list[tuple[Tensor, Tensor]], Tensor]:
-    """What is read, and the outputs, in single precision."""
-    seen, outputs = part
-    pairs = [(torch.as_tensor(past).float(), torch.as_tensor(now).float()) for past, now in seen]
-    return pairs, torch.as_tensor(outputs).float()
 
 
 def _gated_loss(layers: Mapping[str, Tensor], seen: Sequence[tuple[Tensor, Tensor]], outputs: Tensor) -> Tensor:

@@ -291,6 +291,8 @@ def test_parameters_with_names_are_taken_by_name() -> None:
         ({"num_steps": 4.5}, "num_steps must be a whole number, 1 or more, not 4.5"),
         ({"device": "nope"}, "PyTorch has no such device here: use cpu"),
         ({"device": None}, "PyTorch has no such device here: use cpu"),
+        ({"device": "cuda:99"}, "PyTorch has no such device here: use cpu"),
+        ({"device": "meta"}, "PyTorch has no such device here: use cpu"),
         ({"components": pd.DataFrame({"waves": [1.0]})}, "whose components are drawn, 'waves' is not known"),
         ({"every": 0}, "every must be a whole number, 1 or more, not 0"),
         ({"tau_extra": 1e5}, r"tau_extra must be \(3,\), \(2, 3\) or \(4, 2, 3\), not \(\)"),

@@ -15,6 +15,14 @@ from shipid.hybrid.physics import Physics
 Array = np.ndarray
 
 
+def azimuth_columns() -> dict[str, Array]:
+    """Columns (50,) of a ship in wind whose two azimuths act as one."""
+    rng = np.random.default_rng(0)
+    columns = {name: rng.normal(size=50) for name in ("north", "east", "psi", "u", "v", "r", "V_w", "beta_w")}
+    columns["port.n"], columns["port.alpha"] = rng.uniform(1, 3, 50), rng.uniform(-1, 1, 50)
+    return columns | {"starboard.n": columns["port.n"].copy(), "starboard.alpha": columns["port.alpha"].copy()}
+
+
 def task_of(
     columns: Mapping[str, Array],
     commands: Sequence[str],

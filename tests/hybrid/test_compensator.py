@@ -9,17 +9,12 @@ from shipid.hybrid.compensator import (
     Normaliser,
 )
 from shipid.hybrid.features import Inputs, choose_features, feature_table
-from tests.hybrid.tasks import compensation
+from tests.hybrid.tasks import azimuth_columns, compensation
 
 COMMANDS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
 
 
-@pytest.fixture
-def columns():
-    rng = np.random.default_rng(0)
-    columns = {name: rng.normal(size=50) for name in ("north", "east", "psi", "u", "v", "r", "V_w", "beta_w")}
-    columns["port.n"], columns["port.alpha"] = rng.uniform(1, 3, 50), rng.uniform(-1, 1, 50)
-    return columns | {"starboard.n": columns["port.n"].copy(), "starboard.alpha": columns["port.alpha"].copy()}
+columns = pytest.fixture(azimuth_columns)
 
 
 @pytest.fixture

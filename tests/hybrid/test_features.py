@@ -19,18 +19,14 @@ from shipid.hybrid.features import (
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.vessel.load import load_vessel
+from tests.hybrid.tasks import azimuth_columns
 from tests.study.test_commands import weaving
 
 COMMANDS = ("port.n", "port.alpha", "starboard.n", "starboard.alpha")
 SHIP = load_vessel("gunnerus-28.9")
 
 
-@pytest.fixture
-def columns():
-    rng = np.random.default_rng(0)
-    columns = {name: rng.normal(size=50) for name in ("north", "east", "psi", "u", "v", "r", "V_w", "beta_w")}
-    columns["port.n"], columns["port.alpha"] = rng.uniform(1, 3, 50), rng.uniform(-1, 1, 50)
-    return columns | {"starboard.n": columns["port.n"].copy(), "starboard.alpha": columns["port.alpha"].copy()}
+columns = pytest.fixture(azimuth_columns)
 
 
 def test_equal_azimuths_leave_the_seven_inputs_of_13(columns):

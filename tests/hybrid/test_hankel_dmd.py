@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.hybrid.hankel_dmd import HankelDMD, HankelProblem, delayed_inputs
+from shipid.hybrid.hankel_dmd import HankelDMD, HankelProblem
 from tests.hybrid.worlds import FINE, fitted, ship, world
 
 AGO = 4.0  # s
@@ -22,16 +22,6 @@ def late(nus, commands):
 def test_home_a_force_that_comes_late():
     here = world(ship(), ship(), force=late, past=8, known=True)
     assert here.removed(fitted(HankelDMD(), here)) > 0.8
-
-
-def test_a_delay_names_how_many_steps_ago():
-    now = {name: np.array([1.0]) for name in ("u", "v", "r", "port.n")}
-    before = {"u": np.array([[7.0], [8.0]]), "port.n": np.array([[5.0], [6.0]]), "missed.v": np.array([[3.0], [4.0]])}
-    table = delayed_inputs(now, before, 2, ("port.n",))
-    assert {k: float(v[0]) for k, v in table.items() if "past" in k} == {
-        **{"past-1.u": 8.0, "past-2.u": 7.0, "port.past-1.n": 6.0, "port.past-2.n": 5.0},
-        **{"missed.past-1.v": 4.0, "missed.past-2.v": 3.0},
-    }
 
 
 def test_what_the_physics_missed_before_is_what_it_missed_in_the_steps_before():

@@ -42,15 +42,14 @@ def rows(count: int, seed: int = 0, first: int = 0) -> list[dict[str, Any]]:
     return trials
 
 
-@pytest.mark.parametrize("seed", [1])
-def test_trials_come_back_to_the_digit(tmp_path: Path, seed: int) -> None:
-    written = {"a+drawn-N0010-s0": rows(9, seed), "b": rows(4, seed + 100), "c": []}
+def test_trials_come_back_to_the_digit(tmp_path: Path) -> None:
+    written = {"a+drawn-N0010-s0": rows(9, 1), "b": rows(4, 101), "c": []}
     Journal(tmp_path / "t.log").add(written, SPACE)
     read = Journal(tmp_path / "t.log")
     for cell, mine in written.items():
         assert repr(read.rows(cell)) == repr(mine)
-    read.add({"b": rows(3, seed, first=4)}, SPACE)
-    assert repr(Journal(tmp_path / "t.log").rows("b")) == repr(written["b"] + rows(3, seed, first=4))
+    read.add({"b": rows(3, 1, first=4)}, SPACE)
+    assert repr(Journal(tmp_path / "t.log").rows("b")) == repr(written["b"] + rows(3, 1, first=4))
     assert Journal(tmp_path / "t.log").rows("unknown") == []
 
 

@@ -23,7 +23,7 @@ from shipid.hybrid.learned_force import (
 from shipid.hybrid.method import Case, Task, fit_all
 from shipid.hybrid.physics import Physics
 from shipid.vessel.dynamics import vessel_dynamics
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, load_vessel
 from tests.hybrid.worlds import fitted, world
 from tests.study.test_commands import weaving
 
@@ -78,15 +78,22 @@ def block(units: int = 3, weight: float = 1.0) -> dict[str, np.ndarray]:
     return numbers | {name: weight * rng.normal(size=units) for name in (*HIDDEN, *OUTPUT)}
 
 
-def test_a_vessel_that_has_one_is_refused(windows: Windows) -> None:
-    already = WRONG.with_values({BLOCK: block_document(block())})
-    with pytest.raises(DataError, match=rf"has a learned force already: take the block {BLOCK} out"):
-        fit_all(LearnedForce(**CHEAP), task(windows, already))
-
-
-def test_a_vessel_in_drawn_waves_is_refused(windows: Windows) -> None:
-    with pytest.raises(DataError, match=r"waves\.first_order is a sum over drawn waves, which has no gradient: take"):
-        fit_all(LearnedForce(**CHEAP), task(windows, replace(WRONG, vessel=load_vessel("gunnerus-28.9-6dof"))))
+@pytest.mark.parametrize(
+    ("vessel", "message"),
+    [
+        (
+            SHIP.with_values({BLOCK: block_document(block())}),
+            f"has a learned force already: take the block {BLOCK} out",
+        ),
+        (
+            load_vessel("gunnerus-28.9-6dof"),
+            r"waves\.first_order is a sum over drawn waves, which has no gradient: take",
+        ),
+    ],
+)
+def test_a_vessel_that_can_have_none_is_refused(windows: Windows, vessel: Vessel, message: str) -> None:
+    with pytest.raises(DataError, match=message):
+        fit_all(LearnedForce(**CHEAP), task(windows, replace(WRONG, vessel=vessel)))
 
 
 def test_windows_that_the_physics_cannot_follow_do_not_train(windows: Windows) -> None:

@@ -33,17 +33,6 @@ def task(**options: object) -> Task:
     return Task(cases, windows, options.pop("folds", folds), commands, **options)  # type: ignore[arg-type]
 
 
-def test_instants_hold_what_belongs_to_the_foundation() -> None:
-    count = len(task().windows)
-    given = task(estimates={"wrong": {"observer.u": np.ones(count)}}, hidden={"right": {"port.n": np.zeros(count)}})
-    assert set(given.instants("wrong").estimates) == {"observer.u"}
-    assert given.instants("wrong").hidden is None
-    assert given.instants("right").hidden is not None
-    assert not given.instants("right").estimates
-    assert given.instants("none").planned is None
-    assert task(known=True).instants("none").planned is not None
-
-
 @pytest.mark.parametrize("empty", [0, 1])
 def test_a_fold_without_windows_is_refused(empty: int) -> None:
     fold = [np.arange(4), np.arange(4, 8)]
@@ -76,7 +65,7 @@ ROW = trial_row(0, {}, 1.0, 0.0)
 @pytest.mark.parametrize(
     ("gives", "message"),
     [
-        (None, "must return a table, foundation -> FitResult, not NoneType"),
+        (None, "must give a FitResult for 'right', not NoneType"),
         ({}, "must give a FitResult for 'right', not NoneType"),
         (dict.fromkeys(("right", "wrong", "none"), (None, [ROW], 0.0)), "must give a FitResult for 'right', not tuple"),
         ({"right": FitResult(None, [{"number": 0}], 0.0)}, "trial 0.params: missing: make trials by .*trial_row"),

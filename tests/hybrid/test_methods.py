@@ -10,49 +10,22 @@ from functools import cache
 import numpy as np
 import pytest
 
-from shipid.errors import DataError, DocumentError, ResultError
+from shipid.errors import DataError, DocumentError
 from shipid.hybrid.alone import Alone
 from shipid.hybrid.method import Case, FitResult, Method
 from shipid.hybrid.methods import METHODS, method_kind, method_of
 from shipid.hybrid.physics import Physics
-from tests.documented import module
-from tests.hybrid.worlds import HORIZON, World, ship, world
+from tests.hybrid.quick import DOCUMENTED, QUICK, list_documented, quick, small_world
+from tests.hybrid.worlds import HORIZON, ship
 
-#: settings that make slow methods quick; the laws hold for any
-QUICK = {
-    "calibrator": {"trials": 3, "units": 24, "averaged": 2},
-    "forest": {"trials": 2, "trees": 6},
-    "hankel-dmd": {"delays": (2.0, 4.0)},
-    "learned-force": {"trials": 2, "units": 4, "iterations": 4},
-    "modules": {"trials": 2, "units": 4, "centres": 16, "ridge": 1e-3},
-    "one-step": {"trials": 2, "units": 16, "averaged": 2},
-    "path-drawn": {"trials": 3, "units": 24, "averaged": 2, "search_windows": 40},
-    "path-trained": {"trials": 2, "epochs": 20, "units": 8, "layers": 1, "input_dropout": 0.0, "hidden_dropout": 0.0},
-    "recurrent": {"trials": 2, "epochs": 3, "units": 6, "seconds": 4.0},
-}
-DOCUMENTED = "linear"  # the method of docs/extending.md
+documented = pytest.fixture(autouse=True)(list_documented)
+here = pytest.fixture(scope="module")(small_world)
 EVERY = pytest.mark.parametrize("kind", [*METHODS, DOCUMENTED])
 LEARNING = [kind for kind, method in METHODS.items() if method.compensates] + [DOCUMENTED]
 COMPENSATING = pytest.mark.parametrize("kind", LEARNING)
 CLOSE = 1e-9  # m
 #: methods that train several foundations as one batch, whose rounding then grows over the epochs
 IN_STACKS = {"path-trained": 0.05}
-
-
-@pytest.fixture(autouse=True)
-def documented(monkeypatch):
-    monkeypatch.setitem(METHODS, DOCUMENTED, module("A method", "linear_of_the_page", monkeypatch).Linear)
-
-
-def quick(kind):
-    if kind == "forest":
-        pytest.importorskip("sklearn")
-    return method_of(kind, QUICK.get(kind, {}))
-
-
-@pytest.fixture(scope="module")
-def here() -> World:
-    return world(ship().with_values({"hull.derivatives.N_ur": -2.0e6}), ship(), runs=6, seconds=30, past=4, known=True)
 
 
 @pytest.fixture(scope="module")
@@ -99,15 +72,6 @@ def test_what_is_saved_says_the_same_numbers(kind, here, fitted):
         assert again.corrector.past == fit.corrector.past <= method.past
 
 
-@EVERY
-def test_arrays_that_are_missing_are_refused(kind, fitted):
-    corrector = fitted(kind).corrector
-    arrays = corrector.arrays()
-    for gone in arrays:
-        with pytest.raises(ResultError):
-            type(corrector).from_arrays(corrector.header(), {k: v for k, v in arrays.items() if k != gone})
-
-
 @pytest.mark.slow
 @EVERY
 def test_a_foundation_does_not_notice_its_company(kind, here):
@@ -120,13 +84,6 @@ def test_a_foundation_does_not_notice_its_company(kind, here):
             rtol=0,
             atol=IN_STACKS.get(kind, CLOSE),
         )
-
-
-@EVERY
-def test_the_same_seed_gives_the_same_digits(kind, here, fitted):
-    first, again = fitted(kind), quick(kind).fit(here.task())["physics"]
-    np.testing.assert_array_equal(predicted(here, first, here.physics), predicted(here, again, here.physics))
-    assert [row["value"] for row in first.trials] == [row["value"] for row in again.trials]
 
 
 @COMPENSATING
@@ -211,19 +168,9 @@ class Unfinished(Method):
     """A method without `fit`."""
 
 
-@pytest.mark.parametrize(
-    ("listed", "message"),
-    [
-        (Alone(), "must be a class of Method"),
-        (int, "must be a class of Method"),
-        ("Alone", "must be a class of Method"),
-        (Unfinished, "needs `fit`"),
-    ],
-)
-def test_what_is_listed_and_no_method_is_one_line(
-    listed: object, message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("listed", [Alone(), int, "Alone", Unfinished])
+def test_what_is_listed_and_no_method_is_one_line(listed: object, monkeypatch: pytest.MonkeyPatch) -> None:
     """A line of a user's script; it ended in a traceback."""
     monkeypatch.setitem(METHODS, "mine", listed)
-    with pytest.raises(DocumentError, match=rf"^method\.kind: METHODS\['mine'\] {message}"):
+    with pytest.raises(DocumentError, match=r"^method\.kind: METHODS\['mine'\]: must be a class of Method with `fit`"):
         method_of("mine", {})

@@ -109,10 +109,6 @@ def test_a_missing_command_is_one_line_with_those_there_are() -> None:
     assert "\n" not in str(caught.value)
 
 
-GUNNERUS = load_vessel("gunnerus-28.9")
-DRAG = "hull.derivatives.X_u|u|"
-
-
 def afloat(count: int = 4) -> Instants:
     """Instants anywhere on the chart, with what an observer knows: another filtered state, forces and a current."""
     rng = np.random.default_rng(7)
@@ -148,7 +144,7 @@ def test_water_and_air_that_move_together_carry_the_path_along() -> None:
     stream = {**still, "observer.current_east": zero + 0.4, "observer.v": zero + 0.4}
     calm = {**here.columns, "psi": zero, "V_w": zero, "beta_w": zero}
     windy = {**calm, "V_w": zero + 0.4, "beta_w": zero + np.pi / 2}
-    physics = Physics(GUNNERUS, 6, 1.0, "euler", Observer())
+    physics = Physics(SHIP, 6, 1.0, "euler", Observer())
     one = physics.paths(Instants(calm, estimates=still))
     other = physics.paths(Instants(windy, estimates=stream))
     np.testing.assert_allclose((other - one)[:, 0], 0.4 * np.arange(1, 7)[:, None] * [0.0, 1.0], atol=1e-9)

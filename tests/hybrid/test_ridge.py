@@ -10,14 +10,16 @@ from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.ridge import (
     LEAST_PIVOT,
     _BestTrials,
-    _coordinates_with_axes,
     _fold_blocks,
     _left_out_errors,
     _LeftOutErrors,
     _ridges_for_all,
     _SidePiece,
     _TrialVerdict,
+    _with_axes,
     _without_each_fold,
+    hidden_layer,
+    matrix_product,
     part_of_runs,
 )
 from tests.hybrid.tasks import compensation, tune
@@ -81,10 +83,9 @@ def predicted(fits, columns):
     return {key: compensation(one.corrector, columns) for key, one in fits.items()}
 
 
-def part_of(features, targets):
+def part_of(side, features, targets):
     """A coordinate as the search holds it."""
-    (part,) = _coordinates_with_axes(torch.tensor(features), [torch.tensor(targets)])
-    return part
+    return _with_axes((side,), torch.tensor(features), [torch.tensor(targets)])
 
 
 @pytest.mark.parametrize("units", [12, 300])  # fewer and more than windows
@@ -107,7 +108,7 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(units, ridge, kind
             gram = seen[training].T @ seen[training] + ridge * np.eye(units)
             weights = np.linalg.solve(gram, seen[training].T @ made[training])
             expected += np.square(made[judged] - seen[judged] @ weights).reshape(-1, 3, 2).sum(axis=(0, 2))
-    parts = [part_of(*pair) for pair in zip(features, wanted, strict=True)]
+    parts = [part_of(side, *pair) for side, pair in enumerate(zip(features, wanted, strict=True))]
     sums, others, errors = _left_out_errors(parts, [ridge], _fold_blocks(folds, ALL), 2)
     np.testing.assert_allclose(sums[0], expected, rtol=rtol)
     np.testing.assert_allclose(others[0].sum(axis=0), (len(folds) - 1) * expected, rtol=rtol)
@@ -129,10 +130,10 @@ def drawn_parts(seed, models=1):
     units = int(rng.integers(1, 12))
     features = [rng.normal(size=(len(windows), units)) * rng.lognormal(0, 1.5, size=units) for _ in range(2)]
     parts = []
-    for seen in features:
+    for side, seen in enumerate(features):
         made = seen @ rng.normal(size=(units, 2 * models)) * rng.uniform(0, 2)
         noise = rng.lognormal(0, 1) * rng.normal(size=made.shape)
-        parts.append(part_of(seen, made + noise * np.repeat(rng.lognormal(0, 1, count), lengths)[:, None]))
+        parts.append(part_of(side, seen, made + noise * np.repeat(rng.lognormal(0, 1, count), lengths)[:, None]))
     return parts, runs, windows
 
 
@@ -310,3 +311,31 @@ def test_shapes_are_orthonormal_and_hold_all_polynomials_from_0(horizon, terms):
         above = t ** (terms + 1)
         assert np.abs(basis @ (basis.T @ above) - above).max() > 1e-10
         assert np.abs(basis @ (basis.T @ np.ones(horizon)) - 1.0).max() > 1e-3  # an error starts from 0
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_products_are_sums_of_products(dtype: torch.dtype) -> None:
+    generator = torch.Generator().manual_seed(1)
+    left, right = (torch.randn(3, 4, 5, generator=generator, dtype=dtype) for _ in range(2))
+    expected = torch.einsum("fij,fkj->fik", left, right)
+    tight = {"rtol": 1e-5, "atol": 1e-5} if dtype == torch.float32 else {"rtol": 1e-13, "atol": 1e-13}
+    torch.testing.assert_close(matrix_product(left, right.mT), expected, **tight)
+    torch.testing.assert_close(matrix_product(left, right.mT.contiguous()), expected, **tight)
+    torch.testing.assert_close(
+        matrix_product(left[0][:, 1:], right[0].mT[1:]), left[0][:, 1:] @ right[0][:, 1:].T, **tight
+    )
+    torch.testing.assert_close(matrix_product(left, right[0].mT), torch.einsum("fij,kj->fik", left, right[0]), **tight)
+    assert matrix_product(left, right.mT).dtype == dtype
+
+
+@pytest.mark.parametrize("by_torch", [False, True])
+def test_a_layer_is_the_tanh_of_its_sums(by_torch: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shipid.hybrid.ridge._tanh_by_torch", lambda: by_torch)
+    generator = torch.Generator().manual_seed(3)
+    values, weight, offset = (
+        torch.randn(*shape, generator=generator, dtype=torch.float64) for shape in ((9, 3), (3, 5), (5,))
+    )
+    before = [part.clone() for part in (values, weight, offset)]
+    expected = torch.tanh(torch.einsum("sd,dm->sm", values, weight) + offset)
+    torch.testing.assert_close(hidden_layer(values, weight, offset), expected, rtol=1e-13, atol=1e-13)
+    assert all(torch.equal(one, other) for one, other in zip(before, (values, weight, offset), strict=True))

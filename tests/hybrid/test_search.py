@@ -12,7 +12,7 @@ import pytest
 from shipid.hybrid import search as searches
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import Task
-from shipid.hybrid.methods import METHODS, method_of
+from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import (
     CLOSING_TRIALS,
@@ -23,41 +23,23 @@ from shipid.hybrid.search import (
     affordable_trials,
 )
 from shipid.hybrid.stored import StoredData
-from tests.documented import module
-from tests.hybrid.worlds import HORIZON, World, ship, world
+from tests.hybrid.quick import DOCUMENTED, list_documented, quick, small_world
+from tests.hybrid.worlds import HORIZON, World
 
-#: settings that make slow methods quick, with as many trials as an interruption needs
-QUICK: dict[str, dict[str, Any]] = {
-    "calibrator": {"trials": 3, "units": 8, "averaged": 2},
-    "forest": {"trials": 3, "trees": 3},
+#: as many trials as an interruption needs; those of others follow from other settings
+LONGER: dict[str, dict[str, Any]] = {
     "hankel-dmd": {"delays": (2.0, 3.0, 4.0)},
-    "learned-force": {"trials": 3, "units": 3, "iterations": 2},
-    "modules": {"trials": 3, "units": 4, "centres": 16, "ridge": 1e-3},
-    "one-step": {"trials": 3, "units": 8, "averaged": 2},
-    "path-drawn": {"trials": 3, "units": 8, "averaged": 2},
-    "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12), "layers": 1},
-    "recurrent": {"trials": 3, "epochs": 2, "units": 4, "seconds": 4.0},
+    "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12)},
+    "path-drawn": {"trials": 3, "search_windows": 1000},
+    DOCUMENTED: {},
 }
-
-
-DOCUMENTED = "linear"  # the method of docs/extending.md
+documented = pytest.fixture(autouse=True)(list_documented)
+here = pytest.fixture(scope="module")(small_world)
 SEARCHING = [kind for kind, method in METHODS.items() if issubclass(method, SearchMethod)] + [DOCUMENTED]
 
 
-@pytest.fixture(autouse=True)
-def documented(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, DOCUMENTED, module("A method", "linear_of_the_page", monkeypatch).Linear)
-
-
-@pytest.fixture(scope="module")
-def here() -> World:
-    return world(ship().with_values({"hull.derivatives.N_ur": -2.0e6}), ship(), runs=6, seconds=30, past=4, known=True)
-
-
-def quick(kind: str, **settings: Any) -> Any:
-    if kind == "forest":
-        pytest.importorskip("sklearn")
-    return method_of(kind, QUICK.get(kind, {}) | settings)
+def longer(kind: str, **settings: Any) -> Any:
+    return quick(kind, **LONGER.get(kind, {"trials": 3}) | settings)
 
 
 def cases_of(here: World, kind: str) -> dict[str, Physics]:
@@ -97,7 +79,7 @@ def task_in(here: World, kind: str, journal: Journal | None) -> Task:
 
 @pytest.mark.parametrize(("kind", "after"), [*((kind, 1 + len(kind) % 2) for kind in SEARCHING), ("path-trained", 12)])
 def test_a_search_that_was_interrupted_ends_with_the_same_digits(kind: str, after: int, here: World, tmp_path) -> None:
-    method = quick(kind)
+    method = longer(kind)
     whole = digits(method.fit(task_in(here, kind, None)), here, kind)
     file = tmp_path / "trials.log"
     journal = Stopping(file)
@@ -117,7 +99,7 @@ def test_a_search_that_was_interrupted_ends_with_the_same_digits(kind: str, afte
 
 def test_the_sampler_learns_from_the_trials_before(here: World) -> None:
     """The law above would be empty if TPE had not begun: its first ten trials are drawn at random."""
-    method = quick("path-trained")
+    method = longer("path-trained")
     first = method.fit(task_in(here, "path-trained", None))["a"].trials
     other = method.model_copy(update={"epochs": 6}).fit(task_in(here, "path-trained", None))["a"].trials
     params = [[row["params"]["learning_rate"] for row in rows] for rows in (first, other)]
@@ -129,7 +111,7 @@ def test_the_sampler_learns_from_the_trials_before(here: World) -> None:
 def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World, tmp_path, monkeypatch) -> None:
     """Whatever the clock says the second time: what was decided is written down."""
     file = tmp_path / "trials.log"
-    method = quick(kind, budget=100.0) if kind != "path-drawn" else quick(kind, budget=100.0, averaged=1)
+    method = longer(kind, budget=100.0) if kind != "path-drawn" else longer(kind, budget=100.0, averaged=1)
     monkeypatch.setattr(searches, "affordable_trials", lambda *known: 2 if known[-1] else None)
     first = method.fit(task_in(here, kind, Journal(file)))
     assert {len(fit.trials) for fit in first.values()} == {2}
@@ -137,7 +119,7 @@ def test_a_budget_is_a_number_of_trials_that_is_replayed(kind: str, here: World,
     second = method.fit(task_in(here, kind, Journal(file)))
     assert digits(second, here, kind) == digits(first, here, kind)
     assert Journal(file).count("a+way-N0006-s2") == 2
-    named = quick(kind, trials=2).model_copy(update={"averaged": 1} if kind == "path-drawn" else {})
+    named = longer(kind, trials=2).model_copy(update={"averaged": 1} if kind == "path-drawn" else {})
     assert digits(named.fit(task_in(here, kind, None)), here, kind) == digits(first, here, kind)
 
 

@@ -15,9 +15,6 @@ from shipid.hybrid.search import (
     trial_row,
 )
 
-RUNS = {"u": np.arange(12.0)}
-FOLDS = [(np.arange(0, 6), np.arange(6, 9)), (np.arange(3, 9), np.arange(0, 3))]
-
 
 class Counting(SearchMethod):
     """Whole numbers, shares, and a number by its logarithm."""
@@ -48,10 +45,3 @@ def test_counts_are_whole_and_linear_settings_evenly_spread(tmp_path):
     Journal(tmp_path / "trials.log").add({"a": rows}, method.space())
     kept = Journal(tmp_path / "trials.log").rows("a")
     assert [repr(row["params"]) for row in kept] == [repr(point) for point in points]
-
-
-@pytest.mark.parametrize(("value", "state"), [(2.0, "complete"), (np.inf, "diverged"), (np.nan, "diverged")])
-def test_a_trial_that_is_no_number_has_diverged(value, state):
-    row = trial_row(3, {"ridge": 0.5}, value, 0.0, epochs=7)
-    assert (row["number"], row["params"], row["state"], row["epochs"]) == (3, {"ridge": 0.5}, state, 7)
-    assert row["seconds"] > 0

@@ -25,7 +25,7 @@ TEST = "test"  # runs whose names begin so are held out
 
 @dataclass(frozen=True)
 class World:
-    """Windows that train and windows that judge; physics: what is known of the ship; perfect: what a master would say.
+    """Windows that train and windows that judge; physics: what is known of the ship.
 
     commands : names of the command columns.
     """
@@ -33,7 +33,6 @@ class World:
     train: Windows
     test: Windows
     physics: Physics
-    perfect: Array
     commands: tuple[str, ...]
     known: bool = False
 
@@ -43,15 +42,11 @@ class World:
         }
         return replace(Task(cases, self.train, folds_of(self.train), self.commands, self.known), **changes)
 
-    def removed(self, corrector: Corrector, physics: Physics | None = None) -> float:
-        """Share of the removable error that a corrector removes on runs it never saw."""
-        physics = self.physics if physics is None else physics
+    def removed(self, corrector: Corrector) -> float:
+        """Share of the error of the physics that a corrector removes on runs it never saw."""
         instants = self.test.instants(known=self.known)
-        paths = physics.paths(instants)
-        alone, left, least = (
-            self.error(predicted) for predicted in (paths, corrector.predict(physics, instants, paths), self.perfect)
-        )
-        return (alone - left) / (alone - least)
+        paths = self.physics.paths(instants)
+        return 1 - self.error(corrector.predict(self.physics, instants, paths)) / self.error(paths)
 
     def error(self, paths: Array) -> float:
         """Mean distance [m] to the true path."""
@@ -77,19 +72,15 @@ def world(
     runs: int = 20,
     seconds: float = 60.0,
     past: int = 0,
-    seed: int = 0,
-    perfect: Vessel | None = None,
     known: bool = False,
     hold: tuple[float, float] = (8.0, 25.0),
 ) -> World:
-    """Windows of a truth, and physics for it. The master says what the truth says of itself without noise."""
-    dataset = simulated(truth, runs + 6, runs, seconds, seed, force, hold)
+    """Windows of a truth, and physics for it."""
+    dataset = simulated(truth, runs + 6, runs, seconds, 0, force, hold)
     windows = cut_windows(dataset, horizon=HORIZON, past=past)
     held_out = np.char.startswith(windows.run, TEST)
     physics = Physics(known_as, HORIZON, 1.0, "rk4")
-    test = windows.select(held_out)
-    best = test.future if perfect is None else Physics(perfect, HORIZON, 1.0, "rk4").paths(test.instants(known=known))
-    return World(windows.select(~held_out), test, physics, best, tuple(dataset.commands), known)
+    return World(windows.select(~held_out), windows.select(held_out), physics, tuple(dataset.commands), known)
 
 
 def simulated(
@@ -156,11 +147,10 @@ def fitted(method: Method, world_: World, seed: int = 0) -> Corrector:
 
 
 def missed(world_: World, error: Callable[[World, Windows], Array]) -> World:
-    """The world whose true paths are those of the physics plus an error (T, S, 2) [m]: the master knows it."""
+    """The world whose true paths are those of the physics plus an error (T, S, 2) [m]."""
 
     def changed(windows: Windows) -> Windows:
         paths = world_.physics.paths(windows.instants(known=world_.known))
         return replace(windows, future=paths + error(world_, windows))
 
-    test = changed(world_.test)
-    return replace(world_, train=changed(world_.train), test=test, perfect=test.future)
+    return replace(world_, train=changed(world_.train), test=changed(world_.test))
