@@ -23,7 +23,7 @@ from shipid.physics.inertia import total_mass
 from shipid.physics.signals import ACTUAL
 from shipid.physics.waves import TABLES
 from shipid.vessel.bindings import Binding, bind_document, parameter_units
-from shipid.vessel.ranges import UNUSUAL, first_contradiction, out_of_range
+from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, first_contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 LONGEST_CHAIN = 20  # documents that extend or patch one another
+MOST_BLOCK = 2.0  # m / (rho L_pp B T), as `LEAST_BLOCK`: far beyond any ship and its degraded models
 
 
 @dataclass(frozen=True)
@@ -333,7 +334,7 @@ def _check_behind(vessel: Vessel) -> None:
 
 
 def _check_sense(vessel: Vessel) -> None:
-    """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow."""
+    """DocumentError for impossible values: added mass of the wrong sign, a stern ahead of the bow, tonnes for kg."""
     values = vessel.parameters
     for path, value in values.items():
         group, _, name = path.rpartition(".")
@@ -346,6 +347,13 @@ def _check_sense(vessel: Vessel) -> None:
             fault = f"{value:g}: must be ahead of x_aft"
         if fault:
             raise DocumentError(fault, file=vessel.file, path=path)
+    sizes = {**vessel.document.get("constants", {}), **vessel.document.get("particulars", {})}
+    if {"rho", "L_pp", "B", "T"} <= sizes.keys():
+        m = values["inertia.m"]
+        share = m / (sizes["rho"] * sizes["L_pp"] * sizes["B"] * sizes["T"])
+        if not LEAST_BLOCK < share < MOST_BLOCK:
+            fault = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
+            raise DocumentError(fault, file=vessel.file, path="inertia.m")
 
 
 def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
