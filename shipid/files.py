@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import shlex
 import shutil
@@ -164,9 +165,20 @@ def write_json(file: Path, content: Any) -> None:
 
 def json_text(content: Any) -> str:
     """Write plain data, NumPy's numbers and paths among them, as the text of JSON; what is not finite is null."""
-    from pydantic_core import to_json
+    return json.dumps(_json_values(content), indent=1)
 
-    return to_json(content, indent=1, inf_nan_mode="null", fallback=lambda value: value.tolist()).decode()
+
+def _json_values(value: Any) -> Any:
+    """Content of JSON: mappings, lists and scalars of Python."""
+    if isinstance(value, Mapping):
+        return {str(key): _json_values(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_values(entry) for entry in value]
+    if hasattr(value, "tolist"):  # of NumPy
+        return _json_values(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
 
 
 def read_json(file: Path) -> Any:
