@@ -23,7 +23,7 @@ from shipid.answer.findings import judge_findings
 from shipid.answer.verdict import too_few_manoeuvres
 from shipid.arguments import as_path
 from shipid.document import Document
-from shipid.errors import ResultError, ShipidError
+from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
 from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
 from shipid.files import quote_argument
 from shipid.metrics import error_of_windows, position_error
@@ -84,6 +84,7 @@ def compare(folders: Sequence[str | os.PathLike[str]], pairs: Mapping[str, str] 
 
 def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = None) -> Comparison:
     """Set the cells of runs that have been read beside those of the first: `compare` without its folders."""
+    _check_pairs(runs, pairs or {})
     folders, notes, frames = [results.folder.resolve() for results in runs], [], []
     called = {other: first for first, other in (pairs or {}).items()}
     shared = os.path.commonpath(folders)
@@ -102,6 +103,19 @@ def compare_results(runs: Sequence[Results], pairs: Mapping[str, str] | None = N
     documents.columns = pd.Index(["path", *names])
     errors = pd.concat(frames, ignore_index=True)
     return Comparison(names, documents, errors[["folder", *errors.columns.drop("folder")]], tuple(notes))
+
+
+def _check_pairs(runs: Sequence[Results], pairs: Mapping[str, str]) -> None:
+    """DocumentError for a name that is no family or method of the first run, or a counterpart that no other run has."""
+    first, *others = ({*results.cells["family"], *results.cells["method"], NO_METHOD} for results in runs)
+    for words, named, known in (
+        ("the first run", pairs, first),
+        ("any other run", pairs.values(), set().union(*others)),
+    ):
+        for name in named:
+            if name not in known:
+                message = f"{name!r} is no family or method of {words}: {suggest_name(name, known)}"
+                raise DocumentError(message, path="--pair")
 
 
 def _compare_with_first(first: Results, other: Results, called: Mapping[str, str]) -> tuple[pd.DataFrame, list[str]]:

@@ -96,6 +96,10 @@ def test_counterparts_by_name_and_what_is_left_over(made: Made) -> None:
     other = made(grid(renamed), runs=8, alone=alone, claims=None)
     notes = compare_results([placed(one, "a"), placed(other, "b")]).notes
     assert "b: only the first has family good (--pair FIRST=OTHER names counterparts)" in notes
+    with pytest.raises(DocumentError, match="'goood' is no family or method of the first run: did you mean 'good'"):
+        compare_results([placed(one, "a"), placed(other, "b")], {"goood": "bad"})
+    with pytest.raises(DocumentError, match="'cleen' is no family or method of any other run: did you mean 'clean'"):
+        compare_results([placed(one, "a"), placed(other, "b")], {"good": "cleen"})
     turned = compare_results([placed(one, "a"), placed(other, "b")], {"good": "bad", "bad": "clean"})
     rows = turned.errors.set_index(["family", "N_D"])
     assert rows.loc[("good ~ bad", 10), "difference"] == pytest.approx(1.0)
