@@ -114,7 +114,14 @@ def _answer(task: Any) -> bytes:
         except Exception as error:  # of a module as it is imported, or of a class that is not there
             words = f"workers import your files anew, and there it does not go ({type(error).__name__}: {error})"
             raise ShipidError(f"{words}: write methods and terms into a file that can be imported") from None
-    result = _WORK[0](task)
+    try:
+        result = _WORK[0](task)
+    except Exception as error:
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:  # it would end the pool
+            raise RuntimeError(f"{type(error).__name__}: {error}") from None
+        raise
     try:
         return pickle.dumps(result)
     except Exception as error:
