@@ -9,7 +9,7 @@ import logging
 import pickle
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -104,10 +104,7 @@ def on_dask(
         message = "a Dask scheduler needs the package dask: pip install 'shipid[dask]'"
         raise ShipidError(message, path=f"--scheduler {scheduler}") from None
 
-    for known in [*logging.root.manager.loggerDict]:
-        if known.split(".")[0] in ("distributed", "tornado", "asyncio"):  # their errors are reported in one line
-            logging.getLogger(known).setLevel(logging.CRITICAL + 1)
-    with warnings.catch_warnings(), dask.config.set(DASK):
+    with warnings.catch_warnings(), dask.config.set(DASK), _without_logs("distributed", "tornado", "asyncio"):
         warnings.simplefilter("ignore")
         try:
             client = Client(scheduler, timeout="10s")
@@ -118,6 +115,20 @@ def on_dask(
         finally:
             with suppress(Exception):  # a client whose scheduler is gone complains in many ways
                 client.close(timeout=2)
+
+
+@contextmanager
+def _without_logs(*names: str) -> Iterator[None]:
+    """Silence loggers and those below them, whose errors are reported in one line."""
+    every = [logging.getLogger(name) for name in logging.root.manager.loggerDict if name.split(".")[0] in names]
+    before = {logger: logger.level for logger in every}
+    try:
+        for logger in every:
+            logger.setLevel(logging.CRITICAL + 1)
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)
 
 
 def _results(
