@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from shipid import document as documents
 from shipid.data.windows import Windows
@@ -48,15 +49,24 @@ PREFIXES = {
     "past": "past ",
     "states": "states ",
 }  # of the arrays of `TEST`
-ENTRIES: dict[str, type] = {
-    **dict.fromkeys(("digest", "name", "file"), str),
-    **dict.fromkeys(("sources", "changes"), dict),
-    **dict.fromkeys(("sessions", "notes"), list),
-    "wall_seconds": float,
-}
-"""Kinds of the entries of the provenance; a run has more of them."""
 UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
+
+
+class Provenance(BaseModel):
+    """What says to which study a folder belongs, and what it was computed with; entries of others stay."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+    digest: str
+    name: str
+    file: str
+    program: str = ""
+    sources: dict[str, str] = {}
+    changes: dict[str, Any] = {}
+    machine: dict[str, Any] = {}
+    sessions: list[dict[str, Any]] = []
+    notes: list[str] = []
+    wall_seconds: float = 0.0
 
 
 class NotTaken(ResultError):
@@ -174,15 +184,14 @@ def provenance(folder: Path) -> dict[str, Any]:
 
     ResultError where an entry is not of the kind that shipid writes there.
     """
-    record = read_json(folder / PROVENANCE)
-    if not isinstance(record, dict):
-        raise ResultError("damaged: run the study again into a new folder", file=folder / PROVENANCE)
-    record = {"sources": {}, "changes": {}, "sessions": [], "notes": [], "wall_seconds": 0.0, **record}
-    for name, kind in ENTRIES.items():
-        if not isinstance(record.get(name), kind):
-            message = "is not what shipid writes there: put it back, or run the study again into a new folder"
-            raise ResultError(message, file=folder / PROVENANCE, path=name)
-    return record
+    try:
+        record = Provenance.model_validate(read_json(folder / PROVENANCE))
+    except ValidationError as error:
+        path = ".".join(map(str, error.errors()[0]["loc"]))
+        message = "is not what shipid writes there: put it back, or run the study again into a new folder"
+        raise ResultError(message, file=folder / PROVENANCE, path=path) from None
+    written = record.model_dump(exclude_unset=True)
+    return {"sources": {}, "changes": {}, "sessions": [], "notes": [], "wall_seconds": 0.0, **written}
 
 
 def check_part(folder: Path, name: str, plan: Plan) -> Path:
