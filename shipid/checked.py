@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 from pydantic import BaseModel, ValidationError
 
 from shipid.document import check_numbers, parse_model
+from shipid.errors import DocumentError
 
 if TYPE_CHECKING:
     OneLine = type
@@ -18,8 +19,11 @@ else:
         Models that are inside others are made by pydantic, not by this call, so a document names the place as before.
         """
 
-        def __call__(cls, **given: Any) -> Any:
+        def __call__(cls, *values: Any, **given: Any) -> Any:
             """Return a checked model of arguments that are given by name."""
+            if values:
+                names = ", ".join(cls.model_fields)
+                raise DocumentError(f"write the name of each argument: {names}", path=f"{cls.__name__}({values[0]!r})")
             try:
                 made = super().__call__(**given)
             except ValidationError:

@@ -58,3 +58,8 @@ def test_a_wrong_value_is_named(kind: Any, given: dict[str, Any], line: str) -> 
         kind(**given)
     assert str(caught.value).startswith(line)
     assert "\n" not in str(caught.value)
+
+
+def test_an_argument_without_its_name_is_one_line() -> None:
+    with pytest.raises(DocumentError, match=r"write the name of each argument: .*parameters"):
+        Identify(["hull.*"])  # type: ignore[misc]
