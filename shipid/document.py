@@ -6,6 +6,7 @@ import copy
 import fnmatch
 import hashlib
 import json
+import os
 import re
 import tomllib
 import unicodedata
@@ -79,9 +80,9 @@ def find_document(name: str | Path, kind: str, relative_to: Path | None = None) 
     if isinstance(name, Path) or "/" in name or "\\" in name or name.endswith(".toml"):
         places = [folder / name for folder in (relative_to, Path()) if folder]
         for place in places:
-            if place.is_file():
+            if os.path.isfile(place):  # a name that is too long is none
                 return place
-        fault = "is a folder: name a document in it" if any(map(Path.is_dir, places)) else "no such file"
+        fault = "is a folder: name a document in it" if any(map(os.path.isdir, places)) else "no such file"
         raise DocumentError(fault, file=name)
     available = bundled_documents(kind)
     if name not in available:
@@ -112,7 +113,8 @@ def parse_toml(text: str, file: Path | str | None = None) -> Document:
         return tomllib.loads(text)
     except (RecursionError, ValueError) as error:
         line = re.search(r"at line (\d+)", str(error))
-        shown = f": {text.splitlines()[int(line[1]) - 1].strip()!r}" if line else ""
+        lines = text.split("\n")  # `splitlines` also cuts at separators of Unicode, inside a comment
+        shown = f": {lines[int(line[1]) - 1].strip()!r}" if line else ""
         raise DocumentError(f"not valid TOML: {error}{shown}", file=file) from None
 
 

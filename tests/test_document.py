@@ -252,3 +252,14 @@ def test_names_are_as_short_as_is_clear() -> None:
     assert documents.short_names(one_letter) == ("inertia.m", "K_T.J", "R_0")
     two_of_a_name = ["hull.derivatives.Y_v", "port.D_p", "starboard.D_p"]
     assert documents.short_names(two_of_a_name) == ("Y_v", "port.D_p", "starboard.D_p")
+
+
+def test_the_line_shown_is_that_of_the_parser() -> None:
+    """A line separator of Unicode in a comment ends no line of TOML."""
+    with pytest.raises(DocumentError, match=r"line 2, .*: 'b = = 1'"):
+        documents.parse_toml("a = 1  # x\u2028y\nb = = 1\n")
+
+
+def test_a_name_that_is_too_long_is_no_file() -> None:
+    with pytest.raises(DocumentError, match="no such file"):
+        documents.find_document("a" * 300 + ".toml", "models")
