@@ -234,7 +234,7 @@ def test_an_estimate_that_is_missing_is_named() -> None:
     strange = next(one for one in (drawn("alone", seed, 5, "mariner") for seed in range(99)) if one.instants.estimates)
     for name in strange.instants.estimates:
         estimates = {key: values for key, values in strange.instants.estimates.items() if key != name}
-        with pytest.raises(DataError, match=rf"{re.escape(name)}: the physics has an observer, and the instants lack"):
+        with pytest.raises(DataError, match=rf"{re.escape(name)}: the physics has an observer: instants must hold"):
             strange.predictor.predict(replace(strange.instants, estimates=estimates))
 
 
