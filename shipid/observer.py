@@ -234,17 +234,16 @@ def filter_function(model: Dynamics) -> ca.Function:
     before; a measurement (6,) that is NaN is left out. innovation (6,) and spread (6,) are those of the prediction,
     before any update.
     """
-    count, (num_memory, num_commands) = len(FILTER_STATES), (len(model.memory), len(model.commands))
+    count = len(FILTER_STATES)
     state = SX.sym("state", sum(filter_state_sizes(model)))
     x, packed, memory, unsettled, before, likelihood = ca.vertsplit(
         state, [0, *np.cumsum(filter_state_sizes(model)).tolist()]
     )
     covariance = ca.reshape(packed, count, count)
-    commands, environment = SX.sym("commands", num_commands), SX.sym("environment", len(model.environment))
+    commands, environment = SX.sym("commands", len(model.commands)), SX.sym("environment", len(model.environment))
     parameters, measured = SX.sym("parameters", len(model.parameters)), SX.sym("measured", 6)
     noise, numbers, dt = SX.sym("noise", 6), SX.sym("numbers", len(FILTER_NUMBERS)), SX.sym("dt")
     number = dict(zip(FILTER_NUMBERS, ca.vertsplit(numbers), strict=True))
-    assert memory.shape[0] == num_memory
 
     def rates(low: SX, inner: SX, orders: SX) -> SX:
         return _low_rates(model, low, inner, orders, environment, parameters)
@@ -301,7 +300,7 @@ def filters_function(model: Dynamics, num_filters: int) -> ca.Function:
     inputs = [ca.MX.sym(name, one.size1_in(name), each.get(name, 1)) for name in one.name_in()]
     repeated = [part if part.shape[1] == count else ca.MX(0, count) if part.is_empty() else ca.repmat(part, 1, count)
                 for part in inputs]  # fmt: skip
-    return ca.Function("filters", inputs, one.map(count).call(repeated))
+    return ca.Function("filters", inputs, one.map(count).call(repeated), one.name_in(), one.name_out())
 
 
 @lru_cache(maxsize=16)
@@ -313,11 +312,9 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     A dt beyond `Bank.longest` is to be divided by `Bank.parts`: call it for each part, with NaN for the measurement in
     all but the last. After a pause beyond `Bank.pause` take the states of `first_filter_states`.
     """
-    one = filter_function(model)
-    inputs = [ca.MX.sym(one.name_in(i), one.size1_in(i)) for i in range(one.n_in())]
-    inputs[0] = ca.MX.sym("states", one.size1_in(0), num_filters)
-    inputs[6] = ca.MX.sym("numbers", one.size1_in(6), num_filters)
-    after, estimate, innovation, spread = filters_function(model, num_filters)(*inputs)
+    filters = filters_function(model, num_filters)
+    inputs = [ca.MX.sym(name, *filters.size_in(name)) for name in filters.name_in()]
+    after, estimate, innovation, spread = filters(*inputs)
     sound = ca.sum1(ca.fabs(after) < DIVERGED) > after.size1() - 0.5  # false for what is not a number, too
     after = _bounded_expression(after)
     likelihood = after[-1, :] * sound - DIVERGED * (1 - sound)
@@ -327,8 +324,7 @@ def observer_function(model: Dynamics, num_filters: int) -> ca.Function:
     likely = after @ (best / ca.sum2(best)).T
     after = after * ca.repmat(sound, after.size1(), 1) + likely @ (1 - sound)  # a filter that diverged begins again
     results = [after, *(_bounded_expression(part) @ weights for part in (estimate, innovation, spread)), weights]
-    names = [one.name_in(i) for i in range(one.n_in())]
-    return ca.Function("observer", inputs, results, names, ["after", "estimate", "innovation", "spread", "weights"])
+    return ca.Function("observer", inputs, results, filters.name_in(), [*filters.name_out(), "weights"])
 
 
 def _bounded_expression(matrix: ca.MX) -> ca.MX:
@@ -422,22 +418,15 @@ def first_filter_states(filters: FilterBank, measured: Array, commands: Array) -
 class Estimates:
     """What the observer knows at every row of a dataset, from that row and those before it alone.
 
-    columns : `observer.u`, ... (N,), in the order of the table; see COLUMNS and AGE. `observer.test` is the normalised
-        innovation squared over the number of measurements, less those left out: 1 in the mean where the assumptions
-        hold.
-    innovation, spread : (N, 6), measured less predicted, and its variance; NaN where the observer begins.
-    weights : (N, K) of the filters.
+    columns : `observer.u`, ... (N,), in the order of the table; see ESTIMATE_COLUMNS and AGE_COLUMN. `observer.test` is
+        the mean normalised innovation squared of the measurements that are not left out: 1 where the assumptions hold.
     """
 
     columns: dict[str, Array]
-    innovation: Array
-    spread: Array
-    weights: Array
 
     def select(self, rows: Array) -> Estimates:
         """Estimates at some rows: a mask or indices."""
-        columns = {name: values[rows] for name, values in self.columns.items()}
-        return Estimates(columns, *(part[rows] for part in (self.innovation, self.spread, self.weights)))
+        return Estimates({name: values[rows] for name, values in self.columns.items()})
 
 
 def run_observer(vessel: Vessel, dataset: Dataset, settings: Observer | None = None, *, calls: float = 1) -> Estimates:
@@ -461,7 +450,7 @@ def run_observer(vessel: Vessel, dataset: Dataset, settings: Observer | None = N
         for part in np.split(rows, np.flatnonzero(after_pauses(table["t"][rows], filters.pause)))
     ]
     _check_intervals(dataset, filters, places)
-    longest = max(map(len, places))
+    places = sorted(places, key=len, reverse=True)  # those that end first last
     zero = np.zeros(len(frame))
     commands, weather = (
         np.array([table.get(name, zero) for name in names]).reshape(-1, len(frame)).T
@@ -475,20 +464,13 @@ def run_observer(vessel: Vessel, dataset: Dataset, settings: Observer | None = N
             noise[:, MEASURED_MOTION.index(name)] = np.hypot(noise[:, MEASURED_MOTION.index(name)], table[column])
     count = filters.num_filters
     innovation, spread = np.full((len(frame), 6), np.nan), np.full((len(frame), 6), np.nan)
-    estimate, weights, age = (
-        np.zeros((len(frame), NUM_LOW_STATES)),
-        np.full((len(frame), count), 1 / count),
-        np.zeros(len(frame)),
-    )
+    estimate, age = np.zeros((len(frame), NUM_LOW_STATES)), np.zeros(len(frame))
     starts = np.array([rows[0] for rows in places])
     states = np.concatenate([first_filter_states(filters, measured[row], commands[row]) for row in starts], axis=1)
     estimate[starts, :6] = np.where(np.isnan(measured[starts]), 0.0, measured[starts])
     values = np.array(list(vessel.parameters.values()))
     step = map_over_samples(filter_function(model), calls * len(frame) * count, shared=["parameters"])
-    order = sorted(range(len(places)), key=lambda i: -len(places[i]))  # those that end first last
-    states = np.concatenate([states[:, i * count : (i + 1) * count] for i in order], axis=1)
-    places = [places[i] for i in order]
-    for k in range(1, longest):
+    for k in range(1, len(places[0])):
         going = sum(len(rows) > k for rows in places)
         now, past = (np.array([rows[i] for rows in places[:going]]) for i in (k, k - 1))
         dt = table["t"][now] - table["t"][past]
@@ -496,7 +478,7 @@ def run_observer(vessel: Vessel, dataset: Dataset, settings: Observer | None = N
         seen = (np.repeat(part[now].T, count, axis=1) for part in (measured, noise))
         given = (*each, values, *seen, np.tile(filters.numbers.T, (1, going)))
         results = _step_in_parts(step, filters, states[:, : going * count], given, np.repeat(dt, count))
-        states, estimate[now], innovation[now], spread[now], weights[now] = _mix_filters(results, count)
+        states, estimate[now], innovation[now], spread[now] = _mix_filters(results, count)
         innovation[now] = np.where(np.isnan(measured[now]), np.nan, innovation[now])
         age[now] = age[past] + dt
     columns = {f"observer.{name}": estimate[:, i] for i, name in enumerate(ESTIMATE_COLUMNS)}
@@ -505,7 +487,7 @@ def run_observer(vessel: Vessel, dataset: Dataset, settings: Observer | None = N
         given = squares < SPIKE**2  # false for NaN, and for a fault of the log, which moves nothing
     columns["observer.test"] = np.where(given, squares, 0.0).sum(axis=1) / np.maximum(given.sum(axis=1), 1)
     columns[AGE_COLUMN] = age
-    return Estimates(columns, innovation, spread, weights)
+    return Estimates(columns)
 
 
 def _check_intervals(dataset: Dataset, filters: FilterBank, places: Sequence[NDArray[np.intp]]) -> None:
@@ -538,7 +520,7 @@ def _mix_filters(results: Sequence[Array], count: int) -> tuple[Array, ...]:
     """What K = `count` filters of every stretch know together: the rule of `observer_function`, in NumPy.
 
     results : of the filters, (., R K) each, those of a stretch side by side. Returns states (n, R K), then estimate,
-    innovation and spread (R, .), and weights (R, K).
+    innovation and spread (R, .).
     """
     after, *parts = (part.reshape(len(part), -1, count) for part in results)
     sound = (np.abs(after) < DIVERGED).all(axis=0)
@@ -550,7 +532,7 @@ def _mix_filters(results: Sequence[Array], count: int) -> tuple[Array, ...]:
         best = likelihood == likelihood.max(axis=1, keepdims=True)
         after = np.where(sound, after, (after * best / best.sum(axis=1, keepdims=True)).sum(axis=2, keepdims=True))
     means = (np.einsum("irk,rk->ri", _bounded_array(part), weights) for part in parts)
-    return (after.reshape(len(after), -1), *means, weights)
+    return (after.reshape(len(after), -1), *means)
 
 
 def _bounded_array(values: Array) -> Array:
@@ -618,8 +600,8 @@ def estimates_at_windows(dataset: Dataset, estimates: Estimates, windows: Window
 
     `estimates` are of the rows of `dataset`. The heading counts full turns as that of the windows does.
     """
-    if len(estimates.weights) != len(dataset.frame):
-        raise ValueError(f"{len(estimates.weights)} estimates for {len(dataset.frame)} rows")
+    if len(estimates.columns[AGE_COLUMN]) != len(dataset.frame):
+        raise ValueError(f"{len(estimates.columns[AGE_COLUMN])} estimates for {len(dataset.frame)} rows")
     frame, index = dataset.frame, np.zeros(len(windows), dtype=np.intp)
     t, names = frame["t"].to_numpy(), frame["run"].to_numpy()
     for run in windows.spans:

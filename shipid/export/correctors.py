@@ -47,10 +47,7 @@ def stacked_inputs(table: ExpressionsByName, names: Sequence[str]) -> MX:
 
 def mean_of(values: Sequence[MX]) -> MX:
     """The mean of expressions of one shape."""
-    total = values[0]
-    for value in values[1:]:
-        total = total + value
-    return total / len(values)
+    return sum(values[1:], start=values[0]) / len(values)
 
 
 def path_of_shapes(weights: MX, basis: Array) -> MX:

@@ -364,8 +364,6 @@ def estimates_of(study: Study, foundation: Foundation, dataset: Dataset, test: W
     part = run_observer(foundation.vessel, others, foundation.observer, calls=calls).select(mine)
     for name, values in part.columns.items():
         whole.columns[name][rest] = values
-    for name in ("innovation", "spread", "weights"):
-        getattr(whole, name)[rest] = getattr(part, name)
     return whole
 
 
