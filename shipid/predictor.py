@@ -229,7 +229,7 @@ class Predictor(DeployedMethod):
         """
         check_mapping("columns", columns, "a name to an array", DataError)
         given = {name: columns[name] for name in (*self.limits, AGE_COLUMN) if name in columns}
-        first = next((columns[name] for name in (*self.limits, *columns) if name in columns), [])
+        first: Any = next((columns[name] for name in (*self.limits, *columns) if name in columns), [])
         shape = np.shape(first)[:1] or (1,)
         known, outside = _locked_floats("columns", given, shape), np.full(shape, not self.limits)
         for name, ends in self.limits.items():
