@@ -21,6 +21,9 @@ TOP_SHARE = 0.2  # share of a rise that is its top
 LEVEL_DRIFT = 1.5  # tolerances by which a level differs from the next one at least
 LEAST_SLOPE = 1e-10  # of the largest coefficient of a fitted slope: smaller ones of higher powers are rounding
 TRACED_SHARE = 0.05  # of the rise of an angle in motion: how near to the level before its start is traced back
+SCATTER_SHARE = 0.1  # of that rise: how far values may scatter about a level and the line after it
+FEWEST_LINE = 3  # rows of an angle in motion that show its rate
+FEWEST_ROWS = 16  # in which to look for where an angle leaves its level
 FULL_HELM = 0.95  # of the helm angle: the helm is all the way over
 STEADY_CHANGE = 0.05  # relative change over a stretch that counts as none
 CREEPING_CHANGE, REMAINING_CHANGE = (
@@ -199,24 +202,72 @@ def start_of_change(t: Array, order: Array, index: int) -> float:
 
     A step order begins at its row; a measured angle that moves gradually is traced back to the start of its motion.
     Where noise or coarse digits end the trace on the way, the motion begins where a straight line through it meets the
-    median before.
+    level before.
     """
     sense = np.sign(order[index] - order[index - 1])
     moved = sense * np.diff(order)
     begin = index - 1
     while begin > 0 and moved[begin - 1] > 0.2 * moved[index - 1]:
         begin -= 1
-    ahead = sense * order[: index + 1]
-    level = float(np.median(ahead[:index]))
-    rise = ahead[index] - level
-    if ahead[begin] - level > TRACED_SHARE * rise and moved[index - 1] < rise / 2:  # ended on the way, and no jump
-        low = int(np.flatnonzero(ahead <= level + TOP_SHARE * rise)[-1])
-        return float(t[index] - rise * (t[index] - t[low]) / (ahead[index] - ahead[low]))
+    bend = _bend_in_motion(t[: index + 1], sense * order[: index + 1])
+    if bend is not None:
+        bent, level = bend
+        rise = sense * order[index] - level
+        if sense * order[begin] - level > TRACED_SHARE * rise and moved[index - 1] < rise / 2:  # no jump
+            return bent
     after = begin + 2
     if after >= len(t) or moved[begin + 1] <= 0.05 * moved[begin]:
         return float(t[begin + 1])
     rate = moved[begin + 1] / (t[after] - t[begin + 1])
     return float(np.clip(t[begin + 1] - moved[begin] / rate, t[begin], t[begin + 1]))
+
+
+def _bend_in_motion(t: Array, values: Array) -> tuple[float, float] | None:
+    """Time at which values, which rise at the end, leave their level, and this level; None where they do not.
+
+    The last rows are divided into a level and a straight line by least squares. So many rows are taken that at least
+    half of them are level, and that half as many give the same level.
+    """
+    count, before = FEWEST_ROWS, np.inf
+    while True:
+        some = slice(max(len(t) - count, 0), None)
+        found = _level_and_line(t[some], values[some])
+        if found is not None and found[2] < len(t[some]) / 2:
+            found = None
+        if found is not None and (count >= len(t) or abs(before - found[1]) <= TOP_SHARE * (values[-1] - found[1])):
+            return found[:2]
+        if count >= len(t):
+            return None
+        before = np.inf if found is None else found[1]
+        count *= 2
+
+
+def _level_and_line(t: Array, values: Array) -> tuple[float, float, int] | None:
+    """Time at which a level meets the straight line after it, the level, and its number of rows.
+
+    None where it does not rise, where too few rows make a line, or where both do not describe the values.
+    """
+    end, count = float(t[-1]), len(t)
+    t = t - end
+    if count < FEWEST_LINE + 1:
+        return None
+    left = np.arange(1, count - FEWEST_LINE + 1)  # rows of the level
+    right = count - left
+    sums = [np.append(0.0, np.cumsum(part)) for part in (values, values**2, t, t**2, t * values)]
+    (y, yy, *_), (line_y, line_yy, line_t, line_tt, line_ty) = (
+        [part[left] for part in sums],
+        [part[-1] - part[left] for part in sums],
+    )
+    spread = line_tt - line_t**2 / right
+    slope = (line_ty - line_t * line_y / right) / spread
+    missed = np.stack([yy - y**2 / left, line_yy - line_y**2 / right - slope**2 * spread])
+    best = int(np.argmin(missed.sum(axis=0)))
+    level = y[best] / left[best]
+    scatter = np.sqrt(np.maximum(missed[:, best], 0.0) / (left[best], right[best]))
+    if slope[best] <= 0 or scatter.max() > SCATTER_SHARE * (values[-1] - level):
+        return None
+    meets = (level - line_y[best] / right[best]) / slope[best] + line_t[best] / right[best]
+    return end + float(np.clip(meets, t[0], 0.0)), float(level), int(left[best])
 
 
 @dataclass(frozen=True)
@@ -238,21 +289,34 @@ def first_execute(record: Record) -> FirstExecute:
     """The first execute of a record.
 
     A helm may be over in the first row already. If the ship turns there, it belongs to an earlier manoeuvre, and the
-    next execute counts. If she does not turn, this is the execute.
+    next execute counts. If it does not turn, this is the execute. There is one exception: it does not turn until the
+    helm is all the way over. Then the helm held its course until there, as against wind, and the full helm is the
+    execute.
     """
     size, rate = np.abs(record.helm), np.abs(record.r)
     if not size.max() > 0:
         return FirstExecute(NAN, 0, 0.0, 1.0)
-    angle = float(np.median(size[size >= size.max() / 2]))
+    angle = _helm_angle(size)
     over = size >= angle / 2
     if over[0] and rate[0] > STEADY_CHANGE * rate.max():
         same = np.sign(record.helm) == np.sign(record.helm[0])
         over &= np.logical_or.accumulate(~(over & same))  # the helm of an earlier manoeuvre ends at its first release
+    elif over[0]:
+        angle = _helm_angle(size[int(np.argmax(rate > STEADY_CHANGE * rate.max())) :])
+        full = int(np.argmax(size >= FULL_HELM * angle))
+        before = np.interp(start_of_change(record.t, record.helm, full), record.t, rate) if full else np.inf
+        if before <= STEADY_CHANGE * rate.max():
+            over[:full] = False
     if not over.any():
         return FirstExecute(NAN, 0, 0.0, 1.0)
     row = int(np.argmax(over))
     start = start_of_change(record.t, record.helm, row) if row else float(record.t[0])
     return FirstExecute(start, row, angle, float(np.sign(record.helm[row])))
+
+
+def _helm_angle(size: Array) -> float:
+    """Median [rad] of the angles above half of the largest."""
+    return float(np.median(size[size >= size.max() / 2]))
 
 
 def row_of_release(record: Record, over: FirstExecute) -> int:

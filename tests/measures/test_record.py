@@ -109,6 +109,15 @@ def test_a_noisy_or_coarse_angle_is_traced_back_to_its_level(digits: str, interv
     assert start_of_change(t, angle, half) == pytest.approx(begin, abs=0.3)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_an_earlier_level_is_not_that_before_a_change(noise: float) -> None:
+    """A shaft at 2.0 rev/s, slower from 300 s on, and astern by a ramp from 400 s on."""
+    t = np.arange(0.0, 420.0, 0.5)
+    order = np.interp(t, [0, 300, 300.5, 400, 440], [2.0, 2.0, 1.5, 1.5, -1.5])
+    order = order + np.random.default_rng(0).normal(0, noise, len(t))
+    assert start_of_change(t, -order, len(t) - 1) == pytest.approx(400.0, abs=1.0)
+
+
 def test_plateaus_are_distinguished_from_the_way_between_them() -> None:
     t = np.arange(0, 90.0, 0.5)
     values = np.where(t < 30, 5.0, np.where(t < 60, 0.0 + 5 * np.exp(-(t - 30) / 3), -5 + 5 * np.exp(-(t - 60) / 3)))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipid.measures.recognise import recognise_kinds
 from shipid.measures.record import FirstExecute, Record
 from shipid.measures.zigzag import last_row_of_zigzag, zigzag_measures
 from shipid.units import DEGREE
@@ -109,3 +110,28 @@ def test_a_pass_between_two_rows_is_said_and_no_later_one_takes_its_place(interv
         else:
             assert "rows are too far apart" in period.why
     assert (unseen > 0) == (interval > 2)
+
+
+@pytest.mark.parametrize("held", [-7.0, -5.5, 5.5, 7.0])
+@pytest.mark.parametrize("wait", [20.0, 200.0])
+@pytest.mark.parametrize("slow", [0.0, 2.0])
+def test_a_helm_that_holds_the_course_before_is_no_execute(held: float, wait: float, slow: float) -> None:
+    """Against wind, with more than half of the helm of the zigzag, to either side, for longer than the zigzag takes.
+
+    The ship turns by what the helm is beyond that. slow : s that a measured helm takes to its order.
+    """
+    s = np.linspace(0, 400, 400001)  # from the course, straight on, until 10 deg off it
+    needed = float(s[np.argmax(GAIN * (10 - held) * (s - TIME * (1 - np.exp(-s / TIME))) >= 10)])
+    legs = [(wait, (10 - held) * DEGREE), (wait + needed, (-10 - held) * DEGREE)]
+    t = clock(wait + needed + 40)
+    psi, r, order = nomoto(t, legs)
+    shown = np.convolve(np.append(np.zeros(round(slow / FINE)), order), np.ones(round(slow / FINE) + 1), "valid")
+    shown = shown / (round(slow / FINE) + 1) + held * DEGREE
+    record = every(made_record(t, psi, r, shown, np.full_like(t, 5.0), 0 * t), 0.5)
+    measures = zigzag_measures(record)
+    assert recognise_kinds(record)[0] == ("zigzag",)
+    assert measures["execute"].value == pytest.approx(wait, abs=0.25 if slow else 1e-9)
+    assert measures["helm"].value == pytest.approx(10 * DEGREE)
+    assert measures["execute_heading"].value == pytest.approx(10 * DEGREE)
+    assert measures["initial_turning_time"].value == pytest.approx(needed, abs=0.3)
+    assert measures["overshoot_1"].value > 0
