@@ -5,6 +5,7 @@ A vessel that is meant so names the number in `unusual`, a list of dotted paths 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from shipid.units import GRAVITY
 UNUSUAL = "unusual"
 """Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
 WATER = 1000.0  # kg/m^3, to judge a mass by
+SLOWEST = 100.0  # of a lag, in sqrt(L / g)
 LEAST_BLOCK = 0.05
 # Judgement, far from ships: SOLAS asks 65 deg of helm in 28 s, which is 0.18 rad in sqrt(L / g) of a ship of 200 m.
 FASTEST = 4.0  # rad in sqrt(L / g)
@@ -98,6 +100,7 @@ def out_of_range(
     values, units : of every number that the equations use, by dotted path.
     """
     meant, size = document.get(UNUSUAL, []), _ship_size(document, values)
+    tables: dict[str, list[float]] = {}
     for path, unit in units.items():
         limits, value = _range_of(path, unit), abs(values[path])
         if limits is not None:
@@ -105,6 +108,12 @@ def out_of_range(
             if not least <= value <= most and not _is_unusual(path, meant):
                 words = f"{values[path]:g}: expected {limits.words} ({least:.3g} to {most:.3g})"
                 return path, f"{words}; {_unusual_remedy(path)}"
+        table, _, place = path.rpartition(".")
+        if unit == "deg" and place.isdecimal():
+            tables.setdefault(table, []).append(value)
+    for path, angles in tables.items():
+        if len(angles) > 1 and max(angles) <= 2 * math.pi and not _is_unusual(path, meant):
+            return path, f"angles up to {max(angles):.3g}: expected degrees, are these radians? {_unusual_remedy(path)}"
     return None
 
 
@@ -134,6 +143,8 @@ def _all_contradictions(document: Mapping[str, Any], values: Mapping[str, float]
         if path.endswith((".actuator.delta.rate", ".actuator.alpha.rate")) and abs(value) > FASTEST / time:
             most = f"at most {FASTEST / time:.3g} rad/s"
             yield path, f"{value:g} rad/s: expected {most}, 4 rad in sqrt(L / g); is it in deg/s?"
+        if ".actuator." in path and path.endswith(".T") and value > SLOWEST * time:
+            yield path, f"{value:g} s: expected at most {SLOWEST * time:.3g} s, 100 sqrt(L / g)"
         yield from _thruster_contradictions(path, value, values)
     for name, unit in document.get("thruster", {}).items():
         if isinstance(unit, Mapping) and isinstance(unit.get("behind"), str):
@@ -153,6 +164,8 @@ def _thruster_contradictions(path: str, value: float, values: Mapping[str, float
             yield path, f"{value:g} m, and the name says {sides[0]}: y counts to starboard from the centre line"
     if key in _SHARES and value >= 1:
         yield path, f"{value:g}: expected {_SHARES[key]} below 1; is it in per cent?"
+    if key == "J_max" and value <= (least := values.get(f"{block}.J_min", -1.0)):
+        yield path, f"{value:g}: expected more than J_min, {least:g}"
 
 
 def _rudder_contradictions(

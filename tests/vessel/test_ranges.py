@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
@@ -58,8 +59,22 @@ CONTRADICTIONS: dict[str, tuple[str, float, str]] = {
     "flow of the other end": ("thruster.rudder.ell_R", 4.97, "thruster.rudder.ell_R"),
     "per cent of a wake": ("thruster.propeller.w_P0", 40.0, "thruster.propeller.w_P0"),
     "thrust that the hull takes whole": ("thruster.propeller.t_P", 1.2, "thruster.propeller.t_P"),
+    "no range of advance ratios": ("thruster.propeller.J_max", -1.0, "thruster.propeller.J_max"),
 }
 """What is wrong -> the number, its value, and the number that the message names."""
+
+
+def test_a_wind_table_in_radians_is_seen() -> None:
+    ship = load_vessel("gunnerus-28.9")
+    radians = np.radians(ship.document["wind"]["gamma_deg"]).tolist()
+    with pytest.raises(DocumentError, match="are these radians"):
+        ship.with_values({"wind.gamma_deg": radians})
+    assert ship.with_values({"wind.gamma_deg": radians, "unusual": ["wind.gamma_deg"]})
+
+
+def test_a_lag_of_many_ship_lengths_is_seen() -> None:
+    with pytest.raises(DocumentError, match=r"expected at most .* s, 100 sqrt\(L / g\)"):
+        load_vessel("gunnerus-28.9").with_values({"thruster.port.actuator.n": {"kind": "first_order", "T": 900.0}})
 
 
 @pytest.mark.parametrize("name", CONTRADICTIONS)
