@@ -244,3 +244,8 @@ def test_a_changed_base_is_refused(base: Vessel, tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match="has changed since") as caught:
         load_vessel(str(file))
     assert caught.value.path == "base_digest"
+
+
+def test_a_factor_of_0_removes_what_it_selects(base: Vessel) -> None:
+    removed = draw_variant(family({"parameters": ["hull.derivatives.X_rr"], "factor": 0.0}), 0, base)
+    assert removed.values == {"hull.derivatives.X_rr": 0.0}
