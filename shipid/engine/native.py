@@ -454,7 +454,8 @@ def compile_source(source: str, further: Sequence[str] = ()) -> Any:
     """
     command = find_compiler()
     if command is None:
-        raise NoLibrary("engines 'native' and 'single' need a C compiler: install gcc, or use engine 'torch'")
+        why = _refused[0] if _refused else "install gcc"
+        raise NoLibrary(f"engines 'native' and 'single' need a C compiler ({why}), or use engine 'torch'")
     options, processor = (*OPTIONS, *further), (platform.machine(), *sorted(_processor_flags()))
     words = [source, *options, command, compiler_version(command), *processor]
     name = f"{hashlib.sha256(chr(10).join(words).encode()).hexdigest()[:24]}.so"
