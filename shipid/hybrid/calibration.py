@@ -34,6 +34,7 @@ from shipid.metrics import Array, vector_lengths
 
 FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
+PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
 TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
@@ -232,7 +233,11 @@ def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, 
     each = max(-(-CENTRES // runs.count), 1)
     chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
-    return centres, spread, nearest_distances(points / spread, centres / spread, runs.place, runs.place[chosen])
+    parts = [  # 128 numbers a window are held at once
+        nearest_distances(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen])
+        for part in np.array_split(np.arange(len(points)), -(-len(points) // PART))
+    ]
+    return centres, spread, np.concatenate(parts)
 
 
 def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:

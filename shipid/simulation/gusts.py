@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from shipid.checked import CheckedModel
 from shipid.vessel.perturb import check_rising, uniform_draw
@@ -33,6 +33,12 @@ class Gusts(CheckedModel, BaseModel):
         Field(description="Hz, lowest and highest frequency of the gusts"),
     ] = (1 / 600, 0.5)
     harmonics: Annotated[int, Field(ge=2, le=10000)] = 100
+
+    @model_validator(mode="after")
+    def _has_width(self) -> Gusts:
+        if self.frequencies[0] == self.frequencies[1]:
+            raise ValueError(f"frequencies must be [low, high], not {list(self.frequencies)} Hz")
+        return self
 
 
 def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tuple[object, ...]]) -> Array:

@@ -134,9 +134,8 @@ class Perturbation(CheckedModel, BaseModel):
     @model_validator(mode="after")
     def _one_meaning(self) -> Perturbation:
         selecting = [key for key, rule in RULES.items() if rule.places is None]
-        if bool(self.parameters) != any(key in self.given for key in selecting) or all(
-            value in ([], {}) for value in self.given.values()
-        ):
+        empty = all(value in ([], {}) for value in self.given.values())
+        if empty or bool(self.parameters) != any(key in self.given for key in selecting):
             others = ", ".join(key for key in RULES if key not in selecting)
             raise ValueError(f"give `parameters` together with {' or '.join(selecting)}, or one of {others}")
         return self

@@ -66,3 +66,8 @@ def test_a_series_depends_on_its_key_alone(gusts: Gusts) -> None:
 def test_wrong_blocks_are_refused(block: dict[str, Any], message: str) -> None:
     with pytest.raises(DocumentError, match=message):
         Gusts(**block)
+
+
+def test_gusts_of_one_frequency_are_refused() -> None:
+    with pytest.raises(DocumentError, match=r"frequencies must be \[low, high\]"):
+        Gusts(kind="npd", frequencies=(0.1, 0.1))
