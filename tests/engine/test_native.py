@@ -103,7 +103,7 @@ def test_a_library_is_made_once(empty_cache: Path, draw_inputs: Callable[..., An
 @pytest.mark.usefixtures("empty_cache")
 def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch, draw_inputs: Callable[..., Any]) -> None:
     monkeypatch.setattr(native, "find_compiler", lambda: None)
-    with pytest.raises(ShipidError, match="install gcc\), or use engine 'torch'"):
+    with pytest.raises(ShipidError, match=r"install gcc\), or use engine 'torch'"):
         rollout(SHIP, **draw_inputs(SHIP, 2), step=1.0, num_steps=2, engine="native")
 
 
