@@ -274,8 +274,7 @@ def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Ves
     changes = {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"}
     if patch.unusual:
         changes[UNUSUAL] = [*base.document.get(UNUSUAL, []), *patch.unusual]
-    named = documents.replace_values(base.document, changes)
-    return check_document(named, str(file))
+    return check_document(documents.replace_values(base.document, changes), str(file))
 
 
 def check_document(document: Document, file: str) -> Vessel:
@@ -401,11 +400,10 @@ def _check_units(vessel: Vessel) -> None:
         try:
             documents.value_at_path(vessel.document, path)
         except KeyError:
-            group, name = path.rsplit(".", 1)
             raise DocumentError(
-                f"missing: a term needs {name}, here or in the block of the term",
+                f"missing: a term needs {path.rpartition('.')[2]}, here or in the block of the term",
                 file=vessel.file,
-                path=f"{group}.{name}",
+                path=path,
             ) from None
 
 

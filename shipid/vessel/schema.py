@@ -55,9 +55,8 @@ def function_parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     hints = argument_types(function)
     result = []
     for name, argument in inspect.signature(function).parameters.items():
-        if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
-            continue
-        if get_origin(hints[name]) is not Annotated:
+        read = argument.kind in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD)
+        if not read or get_origin(hints.get(name)) is not Annotated:
             continue
         base, unit, *marks = get_args(hints[name])
         kind: Literal["number", "list", "table", "open"] = "number"
