@@ -392,8 +392,7 @@ def choose_evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) ->
     if len(indices) <= count:
         return indices
     places = np.round((np.arange(count) + phase) / count * len(indices) - 0.5).astype(int)
-    chosen: NDArray[np.int64] = indices[places]
-    return chosen
+    return np.asarray(indices[places])
 
 
 def gaps_of_runs(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:
