@@ -70,7 +70,8 @@ def gust_spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:
 
 def _band_edges(gusts: Gusts) -> Array:
     """Natural logarithm of the limits (K + 1,) of the bins in Hz."""
-    return np.linspace(*np.log(gusts.frequencies), gusts.harmonics + 1)
+    low, high = np.log(gusts.frequencies)
+    return np.linspace(low, high, gusts.harmonics + 1)
 
 
 def _bin_variances(gusts: Gusts, mean_speed: Array) -> Array:

@@ -108,8 +108,10 @@ def define_standard(
     manoeuvre.check(controls)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
-        words = f"{steps:.2g} steps of {interval / STEPS:g} s, at most {MOST_STEPS:.0e}: give a shorter duration"
-        raise ShipidError(words, path="--duration")
+        raise ShipidError(
+            f"{steps:.2g} steps of {interval / STEPS:g} s, at most {MOST_STEPS:.0e}: give a shorter duration",
+            path="--duration",
+        )
     return Standard(name, manoeuvre.title(name.replace("-", " ")), manoeuvre, float(asked), interval / STEPS, interval)
 
 

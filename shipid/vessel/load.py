@@ -238,8 +238,9 @@ def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Pat
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
     if len(above) >= LONGEST_CHAIN:
-        message = f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out"
-        raise DocumentError(message, file=file, path=path)
+        raise DocumentError(
+            f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out", file=file, path=path
+        )
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
@@ -351,8 +352,11 @@ def _check_sense(vessel: Vessel) -> None:
         m = values["inertia.m"]
         share = m / (sizes["rho"] * sizes["L_pp"] * sizes["B"] * sizes["T"])
         if not LEAST_BLOCK < share < MOST_BLOCK:
-            fault = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
-            raise DocumentError(fault, file=vessel.file, path="inertia.m")
+            raise DocumentError(
+                f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?",
+                file=vessel.file,
+                path="inertia.m",
+            )
 
 
 def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
@@ -415,10 +419,12 @@ def _check_inertia(vessel: Vessel) -> None:
                 f"missing: {len(vessel.axes)} degrees of freedom need it", file=vessel.file, path=f"inertia.{name}"
             )
     if not _is_positive(vessel._mass):
-        remedy = (
-            "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
+        raise DocumentError(
+            "mass plus added mass is not positive: added mass is written on the force side (X_udot < 0), and 4 or 6 "
+            "degrees of freedom need I_x (and I_y)",
+            file=vessel.file,
+            path="inertia",
         )
-        raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
 
 
 def _is_positive(M: list[list[float]]) -> bool:
