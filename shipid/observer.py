@@ -187,18 +187,22 @@ class FilterBank:
 def filter_bank(vessel: Vessel, settings: Observer | None = None) -> FilterBank:
     """Filters for a vessel of three degrees of freedom; DocumentError for another, and for no vessel."""
     check_class("vessel", vessel, Vessel, "as of `load_vessel`", DocumentError)
-    if settings is not None:
-        check_class("settings", settings, Observer, "such as Observer(), or None", DocumentError)
-    settings, model = settings or Observer(), vessel_dynamics(vessel)
+    settings = Observer() if settings is None else settings
+    check_class("settings", settings, Observer, "such as Observer(), or None", DocumentError)
+    model = vessel_dynamics(vessel)
     if model.num_dof != 3 or model.hidden:
-        message = (
-            f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends"
+        raise DocumentError(
+            f"{vessel.name} has {model.num_dof} degrees of freedom, the observer takes 3: use the model it extends",
+            file=vessel.file,
+            path="dof",
         )
-        raise DocumentError(message, file=vessel.file, path="dof")
     length = vessel.length or 0.0
     if not length:
-        message = f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it"
-        raise DocumentError(message, file=vessel.file, path="particulars.L_pp")
+        raise DocumentError(
+            f"{vessel.name} has no particulars.L_pp, by which the observer scales its numbers: add it",
+            file=vessel.file,
+            path="particulars.L_pp",
+        )
     time, speed = np.sqrt(length / GRAVITY), np.sqrt(GRAVITY * length)
     linear, yaw = GRAVITY, GRAVITY / length
     currents = dict.fromkeys([0.0, settings.current])
@@ -407,9 +411,8 @@ def first_filter_states(filters: FilterBank, measured: Array, commands: Array) -
     memory = np.asarray(commands)[[model.commands.index(name) for name in model.memory]]
     columns = []
     for first in filters.first:
-        deviations = first.copy()
         motion = np.hypot(2 * filters.noise, first[NUM_LOW_STATES:])
-        deviations[:6] = np.where(missing, wide, motion)
+        deviations = np.concatenate([np.where(missing, wide, motion), first[6:]])
         columns.append(np.concatenate([x, np.diag(deviations**2).ravel(), memory, np.zeros(3), commands, [0.0]]))
     return np.stack(columns, axis=1)
 
@@ -496,8 +499,11 @@ def _check_intervals(dataset: Dataset, filters: FilterBank, places: Sequence[NDA
     apart = max((float(np.max(np.diff(t[rows]), initial=0.0)) for rows in places), default=0.0)
     if apart > MOST_FILTER_STEPS * filters.longest:
         longest = f"{MOST_FILTER_STEPS * filters.longest:.3g} s"
-        limit = f"the observer takes rows of {filters.vessel.name} at most {longest} apart"
-        raise DataError(f"rows are up to {apart:.3g} s apart: {limit}; is the unit of the clock right?", path="t")
+        raise DataError(
+            f"rows are up to {apart:.3g} s apart: the observer takes rows of {filters.vessel.name} at most {longest} "
+            "apart; is the unit of the clock right?",
+            path="t",
+        )
 
 
 def _step_in_parts(

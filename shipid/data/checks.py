@@ -339,8 +339,7 @@ def check_series(dataset: Dataset) -> pd.DataFrame:
     for run, rows in stretches_of_runs(dataset):
         t = rows["t"].to_numpy()
         rate = np.gradient(np.unwrap(rows["psi"]), t) if len(t) > 2 else np.full(len(t), np.nan)
-        part = rows[["t", "r", "u", "v"]].assign(run=run, psi_rate=rate, drift=_drift_of_positions(rows))
-        parts.append(part)
+        parts.append(rows[["t", "r", "u", "v"]].assign(run=run, psi_rate=rate, drift=_drift_of_positions(rows)))
     return pd.concat(parts, ignore_index=True)
 
 

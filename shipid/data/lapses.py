@@ -97,7 +97,9 @@ def _zeros_and_spikes(name: str, t: Array, values: Array, follows: RowMask) -> I
     most = float(changes.max(initial=0.0))
     if not len(changes) or np.mean(changes > least) > STEPPED_SHARE:
         zeros = [] if is_steering(name) else _find_pauses(t, values, zeros, step)
-        spikes = [one for one in spikes if _is_beyond_orders(values, one, kept)]
+        spikes = [  # farther than all orders are apart
+            one for one in spikes if one.size > np.ptp(values[kept]) and _is_beyond_range(values, one, kept, 0.0)
+        ]
     else:
         noise = _is_noise(np.diff(values)[other])
         zeros = [one for one in zeros if _is_fast(name, values, one, most, noise)]
@@ -186,11 +188,6 @@ def _is_beyond_range(values: Array, spike: CommandFault, kept: RowMask, most: fl
     inside = values[spike.first : spike.end]
     off = np.maximum(low - inside, inside - high).min()
     return bool(off > BEYOND_RANGE * (high - low) and spike.size > NOISY_STEP_RATIO * most)
-
-
-def _is_beyond_orders(values: Array, spike: CommandFault, kept: RowMask) -> bool:
-    """Whether a spike in orders is farther than all orders are apart."""
-    return spike.size > float(np.ptp(values[kept])) and _is_beyond_range(values, spike, kept, 0.0)
 
 
 def _find_still_values(name: str, values: Array, psi: Array, follows: RowMask) -> Iterator[CommandFault]:

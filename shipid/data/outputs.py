@@ -68,6 +68,8 @@ def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
                 "unit": unit_of_column(name),
                 "measured": root_mean_square(y),
                 "predicted": root_mean_square(f),
+                "scale": scale,
+                "error": root_mean_square(y - f),
             }
-            table.append({**row, "scale": scale, "error": root_mean_square(y - f)})
+            table.append(row)
     return pd.DataFrame(table, columns=["output", "run", "unit", "measured", "predicted", "scale", "error"])

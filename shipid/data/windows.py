@@ -164,10 +164,11 @@ class Windows:
 
     def locked(self) -> Windows:
         """The same windows, whose numbers nobody can change: who writes into them gets an error."""
-        parts: dict[str, Any] = {"t": locked_view(self.t), "future": locked_view(self.future)}
-        for name in ("columns", "planned", "past", "states"):
-            parts[name] = {key: locked_view(values) for key, values in getattr(self, name).items()}
-        return replace(self, **parts)
+        tables: dict[str, Any] = {
+            name: {key: locked_view(values) for key, values in getattr(self, name).items()}
+            for name in ("columns", "planned", "past", "states")
+        }
+        return replace(self, t=locked_view(self.t), future=locked_view(self.future), **tables)
 
     def touching(self, intervals: Iterable[tuple[float, float]]) -> WindowMask:
         """Windows that share a moment, past and future included, with any closed interval of the recording, (S,)."""
@@ -391,8 +392,7 @@ def choose_evenly(indices: NDArray[np.int64], count: int, phase: float = 0.5) ->
     if len(indices) <= count:
         return indices
     places = np.round((np.arange(count) + phase) / count * len(indices) - 0.5).astype(int)
-    chosen: NDArray[np.int64] = indices[places]
-    return chosen
+    return np.asarray(indices[places])
 
 
 def gaps_of_runs(dataset: Dataset, least: float) -> dict[str, list[tuple[float, float]]]:

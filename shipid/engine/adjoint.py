@@ -243,9 +243,14 @@ def gradient_native(
     series = [pad_samples(part, wide) for part in (batch.commands, batch.environment, batch.tau_extra)]
     force = np.empty((job.num_steps, model.num_dof, wide))
     state, slope = np.empty((nx, wide)), np.empty((len(wanted), wide))
-    numbers = np.ascontiguousarray(batch.parameters[0], dtype=float)
-    given = [as_c_longs(len(part) for part in series), as_c_longs(job.rows), numbers, records, *series]
-    given.append(pad_samples(slopes.transpose(0, 2, 1), wide))
+    given = [
+        as_c_longs(len(part) for part in series),
+        as_c_longs(job.rows),
+        np.ascontiguousarray(batch.parameters[0], dtype=float),
+        records,
+        *series,
+        pad_samples(slopes.transpose(0, 2, 1), wide),
+    ]
     parts = count_parts(batch)
     work = wide / compiler_target().lanes / parts * job.num_steps
     sizes = parts, wide, job.num_steps, len(job.rows)

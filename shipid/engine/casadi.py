@@ -66,17 +66,17 @@ def casadi_scan(
             )
         ],
     )
+
+    def scan(name: str, one: ca.Function, count: int, steps: int, kept: slice) -> ca.Function:
+        """So many calls of a function, one after the other, over so many steps in all; `kept` of what they reach."""
+        x, c = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("c", len(model.commands), steps)
+        e, t = ca.MX.sym("e", len(model.environment), steps), ca.MX.sym("t", model.num_dof, steps)
+        path = one.mapaccum(count)(x, c, e, t, ca.repmat(fixed, 1, count))
+        return ca.Function(name, [x, c, e, t, fixed], [path[:, kept]])
+
     if every > 1:
-        x, c = ca.MX.sym("x", one.size1_in(0)), ca.MX.sym("c", len(model.commands), every)
-        e, t = ca.MX.sym("e", len(model.environment), every), ca.MX.sym("t", model.num_dof, every)
-        inner = one.mapaccum(every)(x, c, e, t, ca.repmat(fixed, 1, every))
-        one = ca.Function("steps", [x, c, e, t, fixed], [inner[:, -1]])
-    count = num_steps // every
-    x = ca.MX.sym("x", one.size1_in(0))
-    c, e = ca.MX.sym("c", len(model.commands), num_steps), ca.MX.sym("e", len(model.environment), num_steps)
-    t = ca.MX.sym("t", model.num_dof, num_steps)
-    path = one.mapaccum(count)(x, c, e, t, ca.repmat(fixed, 1, count))
-    return ca.Function("rollout", [x, c, e, t, fixed], [path])
+        one = scan("steps", one, every, every, slice(-1, None))
+    return scan("rollout", one, num_steps // every, num_steps, slice(None))
 
 
 def run_casadi(model: Dynamics, batch: RolloutBatch, job: RolloutJob) -> tuple[Array, Array]:

@@ -111,10 +111,8 @@ class _Collector:
                 signed = -value if operation == ca.OP_SUB else value
                 terms[monomial] = terms[monomial] + signed if monomial in terms else signed
             return _CollectedSum(terms)
-        if operation == ca.OP_NEG:
-            return self.times(operands[0], ca.SX(-1))
-        if operation == ca.OP_TWICE:
-            return self.times(operands[0], ca.SX(2))
+        if operation in (ca.OP_NEG, ca.OP_TWICE):
+            return self.times(operands[0], ca.SX(-1 if operation == ca.OP_NEG else 2))
         if operation == ca.OP_DIV and b.early:
             return self.times(operands[0], 1 / b.constant)
         if operation == ca.OP_MUL and (a.early or b.early):

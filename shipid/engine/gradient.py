@@ -83,9 +83,8 @@ def rollout_gradient(
         raise ShipidError(f"{model.drawn[0].path} draws its components and has no gradient: switch it off")
     for name in names:
         check_choice(f"parameter of {vessel.name}", name, model.parameters)
-    order = {name: place for place, name in enumerate(model.parameters)}
     job = RolloutJob(step, num_steps, method, 1, channel_places(keep, channel_names(model), vessel), device)
-    wanted = tuple(order[name] for name in names)
+    wanted = tuple(model.parameters.index(name) for name in names)
 
     def gradient(engine: Engine) -> Adjoint:
         assert engine.gradient is not None

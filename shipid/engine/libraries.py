@@ -60,8 +60,7 @@ def obtain_library(command: Sequence[str], source: str, kept: str, name: str) ->
                 if len(folders) == 1:
                     raise
                 folders.pop(0)
-                words = escape_unprintable(str(error))
-                log.warning("compiled equations are not kept for the next run: %s", words)
+                log.warning("compiled equations are not kept for the next run: %s", escape_unprintable(str(error)))
     except OSError as error:
         raise NoLibrary(f"{error}: set TMPDIR to a folder that may hold and run programs") from None
 

@@ -91,13 +91,11 @@ class LoweredFunction:
     early : one function a stage: (the stage's inputs, then what earlier stages saved) -> saved (num_saved, ...).
     main : the other inputs in the function's order, then what all stages saved -> list of output channels.
     stage_of : the stage that takes each input of the function (main takes the last).
-    num_instructions : of main.
     """
 
     early: tuple[Callable[..., torch.Tensor], ...]
     main: Callable[..., list[Any]]
     stage_of: tuple[int, ...]
-    num_instructions: int
 
     def __call__(self, *inputs: Any) -> list[Any]:
         """Output channels for all inputs in the function's order: every stage, then main."""
@@ -124,7 +122,7 @@ def lower_function(function: ca.Function) -> LoweredFunction:
         source = [f"def stage{number}({arguments}):", *split, *printed.lines[number], f"    return {end}"]
         exec(compile("\n".join(source), f"<lowered {function.name()}>", "exec"), space)
     early = tuple(space[f"stage{number}"] for number in range(last))
-    return LoweredFunction(early, space[f"stage{last}"], printed.stage_of, len(printed.lines[last]))
+    return LoweredFunction(early, space[f"stage{last}"], printed.stage_of)
 
 
 def _split_saved(saved: torch.Tensor) -> Any:

@@ -530,8 +530,11 @@ def count_parts(batch: RolloutBatch, precision: Precision = DOUBLE) -> int:
 def _run_job(model: Dynamics, batch: RolloutBatch, job: RolloutJob, precision: Precision, **wanted: Array) -> None:
     """Run a job and fill the arrays in `wanted`: `worst`, and `records`, or `sums` and `tally` for a `goal`."""
     lanes, wide, parts = compiler_target(precision).lanes, padded_width(batch, precision), count_parts(batch, precision)
-    series = {name: pad_samples(getattr(batch, name), wide, precision) for name in ("commands", "environment")}
-    series["extra"] = pad_samples(batch.tau_extra, wide, precision)
+    series = {
+        "commands": pad_samples(batch.commands, wide, precision),
+        "environment": pad_samples(batch.environment, wide, precision),
+        "extra": pad_samples(batch.tau_extra, wide, precision),
+    }
     drawn = [_pack_groups(part.transpose(2, 0, 1), lanes, precision) for part in batch.components]
     arrays: dict[str, Array] = {
         "lengths": as_c_longs(len(part) for part in series.values()),

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import casadi as ca
 
-from shipid.engine.graph import apply_operation
+from shipid.engine.graph import InstructionGraph, apply_operation
 from shipid.engine.tables import RampTable, TableLookup
 
 ARITHMETIC = {  # the same in every dialect
@@ -89,14 +89,14 @@ def print_function(
     tables : those to be looked up, by the number of the instruction that gives them.
     """
     printer = _Printer(function, stages, dialect, tables)
-    for k in range(function.n_instructions()):
-        printer.instruction(k)
+    for k, operation in enumerate(printer.graph.operation):
+        printer.instruction(k, operation)
     return printer.finish()
 
 
 @dataclass(frozen=True)
-class _SlotValue:
-    """What a work slot holds: its text, the stage that computes it (-1: a plain number), and if it is a boolean."""
+class _PrintedValue:
+    """What an instruction gives: its text, the stage that computes it (-1: a plain number), and if it is a boolean."""
 
     text: str
     stage: int
@@ -117,29 +117,27 @@ class _Printer:
         self.stage_of = [early.get(name, self.last) for name in self.names]
         self.lines: list[list[str]] = [[] for _ in range(self.last + 1)]
         self.saved: list[dict[str, int]] = [{} for _ in stages]
-        self.slot: dict[int, _SlotValue] = {}
-        self.values: dict[int, _SlotValue] = {}  # of instructions
-        self.outputs: dict[int, _SlotValue] = {}
+        self.graph = InstructionGraph(function)
+        self.values: dict[int, _PrintedValue] = {}  # of instructions
+        self.outputs: dict[int, _PrintedValue] = {}
         self.tables = tables if dialect.lookup else {}
         self.axes: dict[tuple[int, ...], str] = {}  # where x of tables on one axis lies
 
-    def instruction(self, k: int) -> None:
+    def instruction(self, k: int, operation: int) -> None:
         """Print one instruction, or note a number, an input or an output."""
-        operation = self.function.instruction_id(k)
-        source, target = self.function.instruction_input(k), self.function.instruction_output(k)
+        operands = [self.values[i] for i in self.graph.operands[k]]
         if operation == ca.OP_CONST:
-            self.slot[target[0]] = _SlotValue(repr(float(self.function.instruction_constant(k))), -1)
+            self.values[k] = _PrintedValue(repr(float(self.function.instruction_constant(k))), -1)
         elif operation == ca.OP_INPUT:
-            self.slot[target[0]] = _SlotValue(f"{self.names[source[0]]}[{source[1]}]", self.stage_of[source[0]])
+            source, entry = self.function.instruction_input(k)
+            self.values[k] = _PrintedValue(f"{self.names[source]}[{entry}]", self.stage_of[source])
         elif operation == ca.OP_OUTPUT:
-            self.outputs[target[1]] = self.slot[source[0]]
+            self.outputs[self.function.instruction_output(k)[1]] = operands[0]
         else:
             value = self.looked_up(k) if k in self.tables else None
-            self.slot[target[0]] = value or self.operation(k, operation, [self.slot[i] for i in source])
-        if operation != ca.OP_OUTPUT:
-            self.values[k] = self.slot[target[0]]
+            self.values[k] = value or self.operation(k, operation, operands)
 
-    def looked_up(self, k: int) -> _SlotValue | None:
+    def looked_up(self, k: int) -> _PrintedValue | None:
         """Print a lookup in a table whose numbers the first stage knows; None for another table."""
         table, lookup = self.tables[k], self.dialect.lookup
         x, size = self.values[table.x], len(table.knots)
@@ -155,21 +153,21 @@ class _Printer:
         rows = self.kept(*lookup.table(f"table{k}", axis, ordinate, slope, bends[: part - 1]))
         terms = [lookup.value(axis, rows), *(self.values[i].text for i in table.ramps[part - 1 :])]
         self.lines[-1].append(self.dialect.assignment.format(f"a{k}", " + ".join(terms)))
-        return _SlotValue(f"a{k}", self.last)
+        return _PrintedValue(f"a{k}", self.last)
 
     def kept(self, line: str, texts: Sequence[str]) -> list[str]:
         """Print a line into the first stage and save what it computes: the texts of it in main."""
         self.lines[0].append(line)
-        return [self.use(_SlotValue(text, 0), self.last) for text in texts]
+        return [self.use(_PrintedValue(text, 0), self.last) for text in texts]
 
-    def operation(self, k: int, operation: int, operands: list[_SlotValue]) -> _SlotValue:
+    def operation(self, k: int, operation: int, operands: list[_PrintedValue]) -> _PrintedValue:
         """Print an operation; one on numbers alone is done here and now."""
         template = self.dialect.operations.get(operation)
         if template is None:
             raise ValueError(f"CasADi operation {operation} of {self.function.name()} has no counterpart")
         stage = max(operand.stage for operand in operands)
         if stage < 0:
-            return _SlotValue(
+            return _PrintedValue(
                 repr(float(ca.evalf(apply_operation(operation, [ca.SX(float(o.text)) for o in operands])))), -1
             )
         if operation == ca.OP_DIV and 0 <= operands[1].stage < stage:  # divide once, early; then multiply
@@ -178,9 +176,9 @@ class _Printer:
         bare = _TAKES_TRUTH.get(operation, 0)
         texts = [self.use(operand, stage, place < bare) for place, operand in enumerate(operands)]
         self.lines[stage].append(self.dialect.assignment.format(f"a{k}", template.format(*texts)))
-        return _SlotValue(f"a{k}", stage, operation in _TRUTH)
+        return _PrintedValue(f"a{k}", stage, operation in _TRUTH)
 
-    def use(self, value: _SlotValue, stage: int, truth_is_fine: bool = False) -> str:
+    def use(self, value: _PrintedValue, stage: int, truth_is_fine: bool = False) -> str:
         """Text of a value inside a stage; one of an earlier stage is saved there, as a number."""
         if value.stage < 0:
             return self.dialect.constant(float(value.text))
@@ -190,10 +188,10 @@ class _Printer:
         saved = self.saved[value.stage]
         return f"s{value.stage}[{saved.setdefault(text, len(saved))}]"
 
-    def reciprocal(self, value: _SlotValue) -> _SlotValue:
+    def reciprocal(self, value: _PrintedValue) -> _PrintedValue:
         """One over a value, in the stage that computes it."""
         text = self.dialect.number.format(value.text) if value.truth else value.text
-        return _SlotValue(self.dialect.operations[ca.OP_INV].format(text), value.stage)
+        return _PrintedValue(self.dialect.operations[ca.OP_INV].format(text), value.stage)
 
     def finish(self) -> PrintedFunction:
         """The lines of all stages, what they save for later stages, and the expressions of the outputs."""

@@ -292,8 +292,9 @@ def _stack_channels(
     columns = []
     for name in names:
         if name not in given:
-            words = f"{what} {name!r} is needed by {vessel.name} and missing: give an array {shapes[0]}"
-            raise DataError(words, file=vessel.file)
+            raise DataError(
+                f"{what} {name!r} is needed by {vessel.name} and missing: give an array {shapes[0]}", file=vessel.file
+            )
         column = as_float_array(f"{what} {name!r}", given[name])
         if column.shape not in shapes:
             raise ShipidError(f"{what} {name!r} must be {' or '.join(map(str, shapes))}: {column.shape}")

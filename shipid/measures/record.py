@@ -76,8 +76,7 @@ class Record:
     def upto(self, row: int) -> Record:
         """The record up to, and without, a row; at least two rows."""
         cut = slice(0, max(row, 2))
-        given = {one.name: getattr(self, one.name) for one in fields(self)}
-        kept: dict[str, Any] = {name: values[cut] for name, values in given.items() if values is not None}
+        kept: dict[str, Any] = {name: values[cut] for name, values in vars(self).items() if values is not None}
         return replace(self, **kept)
 
     def along(self, start: float) -> tuple[Array, Array]:

@@ -106,21 +106,19 @@ def tunnel_side_force(
     return n * (F_1 + ca.fabs(n) * (F_2 + ca.fabs(n) * F_3))
 
 
-def bounded_value(value: SX, low: SX | float, high: SX | float) -> SX:
-    """The value kept within low and high; a bound that no document gives stays out of the equations."""
-    if differs_from_default(low, -UNLIMITED):
-        value = ca.fmax(value, low)
-    return ca.fmin(value, high) if differs_from_default(high, UNLIMITED) else value
-
-
 def bounded_output(
     state: SX,
     *,
     low: Annotated[SX | float, "of the command"] = -UNLIMITED,
     high: Annotated[SX | float, "of the command"] = UNLIMITED,
 ) -> SX:
-    """The actual value of a command: the actuator state, within the limits of the device."""
-    return bounded_value(state, low, high)
+    """The actual value of a command: the actuator state, within the limits of the device.
+
+    A limit that no document gives stays out of the equations.
+    """
+    if differs_from_default(low, -UNLIMITED):
+        state = ca.fmax(state, low)
+    return ca.fmin(state, high) if differs_from_default(high, UNLIMITED) else state
 
 
 def first_order_advance(
@@ -138,8 +136,8 @@ def first_order_advance(
     T [s], rate in the command's unit per second. Exact for a held command while the limit does not bind. The order c
     and the state a are kept within low and high.
     """
-    reached = bounded_value(state, low, high)
-    change = (bounded_value(command, low, high) - reached) * (1 - ca.exp(-dt / T))
+    reached = bounded_output(state, low=low, high=high)
+    change = (bounded_output(command, low=low, high=high) - reached) * (1 - ca.exp(-dt / T))
     if not differs_from_default(rate, UNLIMITED):
         return reached + change
     return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)
@@ -158,6 +156,6 @@ def rate_limit_advance(
 
     rate in the command's unit per second; the order and the state are kept within low and high.
     """
-    reached = bounded_value(state, low, high)
-    change = bounded_value(command, low, high) - reached
+    reached = bounded_output(state, low=low, high=high)
+    change = bounded_output(command, low=low, high=high) - reached
     return reached + ca.fmin(ca.fmax(change, -rate * dt), rate * dt)

@@ -248,10 +248,10 @@ def steady_approach(
                 straight = np.minimum(SETTLED, STRAIGHT * reached / length)
                 turning = np.abs(state["r"]) >= straight
                 if turning.any():
-                    words = (
-                        f"turns with the helm amidships at {_rpm_words(n, turning)} rpm, so it has no straight approach"
+                    raise NotStraight(
+                        f"{vessel.name} turns with the helm amidships at {_rpm_words(n, turning)} rpm, so it has no "
+                        f"straight approach: {REMEDY}"
                     )
-                    raise NotStraight(f"{vessel.name} {words}: {REMEDY}")
             helm = _held_helm(controls, model, state, memory, orders) if held else {}
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}

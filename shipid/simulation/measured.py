@@ -68,8 +68,8 @@ def measure_standard(
 
     Raises ShipidError as `define_standard` and `perform_manoeuvres` do.
     """
-    how: dict[str, Any] = {"speed": speed, "duration": duration, "approach": approach}
-    return measure_all(vessel, [(name, angles, side)], engine=engine, **how)[0]
+    wanted = [(name, angles, side)]
+    return measure_all(vessel, wanted, speed=speed, duration=duration, approach=approach, engine=engine)[0]
 
 
 def measure_all(
@@ -82,12 +82,13 @@ def measure_all(
     engine: str = "auto",
 ) -> list[MeasuredManoeuvre]:
     """Simulate standard manoeuvres from one approach, each a name, angles [deg] and side; see `measure_standard`."""
-    how: dict[str, Any] = {"speed": speed, "duration": duration}
     for given in (approach,) if approach else ("steady", "helmsman"):
         chosen = list[Standard]()
         for name, angles, side in wanted:
             n = chosen[0].manoeuvre.n_rpm * RPM if chosen else None
-            chosen.append(define_standard(vessel, name, angles, side=side, approach=given, n=n, **how))
+            chosen.append(
+                define_standard(vessel, name, angles, speed=speed, side=side, duration=duration, approach=given, n=n)
+            )
         runs = [
             one.manoeuvre.model_copy(update={"name": f"{one.kind}-{number + 1}"}) for number, one in enumerate(chosen)
         ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -91,14 +90,17 @@ def perform_manoeuvres(
     how: dict[str, Any] = {"step": step, "method": method, "engine": engine}
     logs: list[dict[str, Array]] = [{}] * len(manoeuvres)
     for helmsman, places in groups.items():
-        batch = _Batch(
-            [names[place] for place in places],
-            [manoeuvres[place] for place in places],
+        columns = _perform_batch(
+            controls,
+            helmsman,
+            {names[place]: manoeuvres[place] for place in places},
             max(rows[place] for place in places),
             {channel: values[:, places] for channel, values in weather.items()},
             {path: drawn[places] for path, drawn in seas.items()},
+            every,
+            how,
+            outputs,
         )
-        columns = _perform_batch(controls, helmsman, batch, every, how, outputs)
         for sample, place in enumerate(places):
             logs[place] = {name: values[: rows[place], sample] for name, values in columns.items()}
     frame: dict[str, Any] = {"run": np.repeat(names, rows)}
@@ -134,40 +136,35 @@ def _check_components(components: Mapping[str, Array], count: int) -> dict[str, 
     return seas
 
 
-@dataclass(frozen=True)
-class _Batch:
-    """Manoeuvres with equal helmsmen. rows : of the longest log. weather, seas : environment and wave components."""
-
-    names: list[str]
-    manoeuvres: list[Manoeuvre]
-    rows: int
-    weather: Mapping[str, Array]
-    seas: Mapping[str, Array]
-
-
 def _perform_batch(
     controls: Controls,
     helmsman: Helmsman | None,
-    batch: _Batch,
+    named: Mapping[str, Manoeuvre],
+    rows: int,
+    environment: Mapping[str, Array],
+    seas: Mapping[str, Array],
     every: int,
     how: Mapping[str, Any],
     outputs: Sequence[str],
 ) -> dict[str, Array]:
-    """Columns (rows, num_samples) of the logs of a batch, from one rollout with the length of the longest."""
-    vessel, num_steps = controls.vessel, every * (batch.rows - 1)
+    """Columns (rows, num_samples) of the logs of manoeuvres with equal helmsmen, by name, from one rollout.
+
+    rows : of the longest log. environment, seas : series of the channels, and wave components, of these manoeuvres.
+    """
+    vessel, num_steps, manoeuvres = controls.vessel, every * (rows - 1), list(named.values())
     model, t = vessel_dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
-    start, memory, helms = _initial_states(batch.manoeuvres, controls, how)
-    inputs = [one.inputs(controls, t, speed) for one, speed in zip(batch.manoeuvres, start["u"], strict=True)]
+    start, memory, helms = _initial_states(manoeuvres, controls, how)
+    inputs = [one.inputs(controls, t, speed) for one, speed in zip(manoeuvres, start["u"], strict=True)]
     for sample, helm in helms.items():
-        one = batch.manoeuvres[sample]
+        one = manoeuvres[sample]
         assert isinstance(one, ApproachedManoeuvre)
         inputs[sample] = one.held(inputs[sample], t, helm)
     commands = {name: np.stack([one[name] for one in inputs], axis=1) for name in inputs[0]}
     if helmsman is None:
-        ready = [sample for sample, one in enumerate(batch.manoeuvres) if one.start.at_order]
+        ready = [sample for sample, one in enumerate(manoeuvres) if one.start.at_order]
         for name, values in memory.items():
             values[ready] = commands[name][0, ready]
-    weather = {name: values[: num_steps + 1] for name, values in batch.weather.items()}
+    weather = {name: values[: num_steps + 1] for name, values in environment.items()}
     constant = all((values == values[0]).all() for values in commands.values())  # which is faster in the engines
     path = rollout(
         vessel,
@@ -178,16 +175,16 @@ def _perform_batch(
         every=every,
         memory=memory,
         helmsman=helmsman,
-        components=batch.seas,
+        components=seas,
         keep=None if helmsman else (*model.state, *(f"{ACTUAL}{name}" for name in model.memory)),
         **how,
     )
     if path.diverged.any():
-        worst = batch.names[int(np.argmax(path.diverged[0]))]
+        worst = list(named)[int(np.argmax(path.diverged[0]))]
         raise ShipidError(
             f"{vessel.name} diverges in {worst}: take a smaller step than {how['step']:g} s, or mend what drives her"
         )
-    moments = np.arange(batch.rows) * every
+    moments = np.arange(rows) * every
     felt = {name: values[np.minimum(moments, len(values) - 1)] for name, values in weather.items()}
     log = log_columns(path, model.state)
     steps = np.minimum(moments, num_steps - 1)

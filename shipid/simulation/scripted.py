@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from typing import Annotated, Any
 
 import pandas as pd
@@ -19,7 +18,6 @@ from shipid.simulation.truth import LONGEST, path_in_block
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-log = logging.getLogger(__name__)
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 

@@ -50,8 +50,7 @@ def jonswap_spectrum(omega: Array, sea: Sea) -> Array:
     def shape(w: Array) -> Array:
         width = np.where(w <= peak, 0.07, 0.09)
         bell = np.exp(-((w / peak - 1) ** 2) / (2 * width**2))
-        result: Array = w**-5.0 * np.exp(-1.25 * (peak / w) ** 4) * sea.gamma**bell
-        return result
+        return np.asarray(w**-5.0 * np.exp(-1.25 * (peak / w) ** 4) * sea.gamma**bell)
 
     whole = peak * np.linspace(0.2, 12.0, 20000)
     return np.asarray(sea.H_s**2 / 16 * shape(omega) / np.trapezoid(shape(whole), whole))

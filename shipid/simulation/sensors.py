@@ -76,9 +76,10 @@ def _sensor_samples(sensor: Sensor, truth: Array, step: float, stride: int, key:
     period = stride if sensor.interval is None else sensor.interval / step
     latest = np.floor(logged / period + SAME)  # number of the last sample taken by each logged row
     taken, which = np.unique(latest, return_inverse=True)  # samples between logged rows are not needed
-    values = _value_at_row(truth, taken * period - sensor.latency / step)
     values = (
-        values + sensor.bias * _normal_draws(1, *key, "bias") + sensor.noise * _normal_draws(len(taken), *key, "noise")
+        _value_at_row(truth, taken * period - sensor.latency / step)
+        + sensor.bias * _normal_draws(1, *key, "bias")
+        + sensor.noise * _normal_draws(len(taken), *key, "noise")
     )
     if sensor.quantum > 0:
         values = sensor.quantum * np.rint(values / sensor.quantum)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import cast, get_args
@@ -18,7 +17,6 @@ from shipid.simulation.request import Request, Side, round_to_rows
 from shipid.units import RPM, plural_word
 from shipid.vessel.load import Vessel
 
-log = logging.getLogger(__name__)
 ROWS, STEPS = 50, 10  # rows of the log per ship length, steps per row
 MOST_STEPS = 1e7  # of a manoeuvre
 APPROACHES = ("steady", "helmsman", "rest")
@@ -110,8 +108,10 @@ def define_standard(
     manoeuvre.check(controls)
     steps = manoeuvre.length / interval * STEPS
     if steps > MOST_STEPS:
-        words = f"{steps:.2g} steps of {interval / STEPS:g} s, at most {MOST_STEPS:.0e}: give a shorter duration"
-        raise ShipidError(words, path="--duration")
+        raise ShipidError(
+            f"{steps:.2g} steps of {interval / STEPS:g} s, at most {MOST_STEPS:.0e}: give a shorter duration",
+            path="--duration",
+        )
     return Standard(name, manoeuvre.title(name.replace("-", " ")), manoeuvre, float(asked), interval / STEPS, interval)
 
 

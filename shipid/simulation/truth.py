@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -137,9 +138,10 @@ def _check_sea(truth: Truth, sea: Sea, vessel: Vessel) -> None:
     low, high = wave_table_range(vessel)
     lost = share_outside(sea, low, high)
     if lost > MOST_LOST:
-        message = f"{sea.T_p:g} s: {percent_text(lost)} of the sea's energy lies outside the tables of {truth.vessel}"
         raise DocumentError(
-            f"{message}, {low:g} to {high:g} rad/s; at most {percent_text(MOST_LOST)} may", path="truth.waves.T_p"
+            f"{sea.T_p:g} s: {percent_text(lost)} of the sea's energy lies outside the tables of {truth.vessel}, "
+            f"{low:g} to {high:g} rad/s; at most {percent_text(MOST_LOST)} may",
+            path="truth.waves.T_p",
         )
 
 
@@ -199,10 +201,7 @@ def draw_manoeuvres(truth: Truth) -> list[Manoeuvre]:
     ends = np.cumsum([block.share for block in truth.manoeuvre])
     result = []
     for number in range(truth.manoeuvres):
-
-        def at(quantity: str, number: int = number) -> float:
-            return uniform_draw(truth.seed, "manoeuvre", number, quantity)
-
+        at = partial(uniform_draw, truth.seed, "manoeuvre", number)
         place = int(np.searchsorted(ends, at("kind") * ends[-1], side="right"))
         result.append(truth.manoeuvre[place].manoeuvre(truth.length, at))
     return result

@@ -65,18 +65,15 @@ def parameter_units(document: Document) -> dict[str, str]:
     """Dotted path -> unit of every parameter, in the order of use."""
     rows: list[tuple[str, str]] = []
     for path, block, parameters, moved in _equation_blocks(document):
-        declared = {parameter.name: parameter for parameter in parameters}
-        table = next((parameter for parameter in parameters if parameter.kind == "open"), None)
+        declared = {parameter.name: parameter.unit for parameter in parameters}
+        table = next((parameter.unit for parameter in parameters if parameter.kind == "open"), "")
         for keyword, target in bind_block(path, block, parameters).items():
-            parameter = declared.get(keyword, table)
-            assert parameter is not None
-            unit = parameter.unit
+            unit = declared.get(keyword, table)
             if isinstance(target, str):
                 rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else _resolve_unit(unit, moved)))
             elif isinstance(target, list):
                 rows += [(entry, str(unit)) for entry in target]
-            elif isinstance(target, dict):
-                assert isinstance(unit, Grammar)
+            elif isinstance(target, dict) and isinstance(unit, Grammar):
                 rows += [(entry, unit.unit(key)) for key, entry in target.items()]
     return dict(rows)
 

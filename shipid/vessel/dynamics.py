@@ -188,9 +188,9 @@ def _assemble_dynamics(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
     through_water = inverse(ca.densify((M_RB + M_A)[rows, rows])) @ ((force + summed)[rows] + tau_extra)
     acceleration = through_water + nu_c_dot[rows]
     more = [
-        _state_rates(key, {**available, "state": states_of[path]}, _symbol_arguments(bound[path], value_of))
+        _state_rates(key, rates, {**available, "state": states_of[path]}, _symbol_arguments(bound[path], value_of))
         for path, key, _ in terms
-        if path in states_of
+        if (rates := TERMS[key].rates) is not None
     ]
     inputs = [state, ca.vertcat(*memory.values()), commands, environment, parameters]
 
@@ -257,10 +257,11 @@ def _hidden_states(terms: Sequence[tuple[str, str, Mapping[str, Any]]]) -> dict[
     return {path: [f"{path}.{name}" for name in names] for path, names in found.items() if names}
 
 
-def _state_rates(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any]) -> SX:
-    """d(state)/dt of the additional states of a term."""
-    function, where, count = TERMS[key].rates, f"rates of {key}", available["state"].numel()
-    assert function is not None
+def _state_rates(
+    key: str, function: Callable[..., Any], available: Mapping[str, SX], keywords: Mapping[str, Any]
+) -> SX:
+    """d(state)/dt of the additional states of a term, by its function."""
+    where, count = f"rates of {key}", available["state"].numel()
     value, given = _call_term(where, key, function, available, keywords)
     words = f"{count} {plural_word(count, 'number')}, one for each of its states"
     return check_returned(where, function, value, given, count, words)

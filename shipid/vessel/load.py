@@ -238,8 +238,9 @@ def _find_base(name: Any, path: str, file: Path, above: tuple[Path, ...]) -> Pat
     except DocumentError as error:
         raise DocumentError(f"{name!r}: {error.message}", file=file, path=path) from None
     if len(above) >= LONGEST_CHAIN:
-        message = f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out"
-        raise DocumentError(message, file=file, path=path)
+        raise DocumentError(
+            f"a chain of more than {LONGEST_CHAIN} documents: write the vessel out", file=file, path=path
+        )
     if other.resolve() in (*above, file.resolve()):
         raise DocumentError(f"{name!r} depends on this document: name a vessel that does not", file=file, path=path)
     return other
@@ -274,8 +275,7 @@ def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Ves
     changes = {**patch.set, "name": patch.name or f"{base.name} ({file.stem})"}
     if patch.unusual:
         changes[UNUSUAL] = [*base.document.get(UNUSUAL, []), *patch.unusual]
-    named = documents.replace_values(base.document, changes)
-    return check_document(named, str(file))
+    return check_document(documents.replace_values(base.document, changes), str(file))
 
 
 def check_document(document: Document, file: str) -> Vessel:
@@ -352,8 +352,11 @@ def _check_sense(vessel: Vessel) -> None:
         m = values["inertia.m"]
         share = m / (sizes["rho"] * sizes["L_pp"] * sizes["B"] * sizes["T"])
         if not LEAST_BLOCK < share < MOST_BLOCK:
-            fault = f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?"
-            raise DocumentError(fault, file=vessel.file, path="inertia.m")
+            raise DocumentError(
+                f"{m:g} kg is {share:.2g} of rho L_pp B T, which is no ship's: is the unit kg?",
+                file=vessel.file,
+                path="inertia.m",
+            )
 
 
 def _check_order(path: str, block: Mapping[str, Any], file: str) -> None:
@@ -401,11 +404,10 @@ def _check_units(vessel: Vessel) -> None:
         try:
             documents.value_at_path(vessel.document, path)
         except KeyError:
-            group, name = path.rsplit(".", 1)
             raise DocumentError(
-                f"missing: a term needs {name}, here or in the block of the term",
+                f"missing: a term needs {path.rpartition('.')[2]}, here or in the block of the term",
                 file=vessel.file,
-                path=f"{group}.{name}",
+                path=path,
             ) from None
 
 
@@ -417,10 +419,12 @@ def _check_inertia(vessel: Vessel) -> None:
                 f"missing: {len(vessel.axes)} degrees of freedom need it", file=vessel.file, path=f"inertia.{name}"
             )
     if not _is_positive(vessel._mass):
-        remedy = (
-            "added mass is written on the force side (X_udot < 0), and 4 or 6 degrees of freedom need I_x (and I_y)"
+        raise DocumentError(
+            "mass plus added mass is not positive: added mass is written on the force side (X_udot < 0), and 4 or 6 "
+            "degrees of freedom need I_x (and I_y)",
+            file=vessel.file,
+            path="inertia",
         )
-        raise DocumentError(f"mass plus added mass is not positive: {remedy}", file=vessel.file, path="inertia")
 
 
 def _is_positive(M: list[list[float]]) -> bool:

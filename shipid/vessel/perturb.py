@@ -80,9 +80,7 @@ def _checked_values(values: Mapping[str, float], base: Vessel, file: Any, where:
 
 
 def _scale_number(number: float, factor: float | tuple[float, float], u: float) -> float:
-    if not isinstance(factor, tuple):
-        return number * factor
-    low, high = factor
+    low, high = factor if isinstance(factor, tuple) else (factor, factor)
     return number * (low + (high - low) * u)
 
 

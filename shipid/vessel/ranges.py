@@ -181,10 +181,8 @@ def _rudder_contradictions(
 
 
 def _range_of(path: str, unit: str) -> MagnitudeRange | None:
-    if path in _NAMED:
-        return _NAMED[path]
-    name = path.rpartition(".")[2]
-    return _BY_NAME[name] if name in _BY_NAME else (_ADDED if path.startswith("added_mass.") else _BY_UNIT).get(unit)
+    by_unit = _ADDED if path.startswith("added_mass.") else _BY_UNIT
+    return _NAMED.get(path) or _BY_NAME.get(path.rpartition(".")[2]) or by_unit.get(unit)
 
 
 def _ship_size(document: Mapping[str, Any], values: Mapping[str, float]) -> ShipSize:

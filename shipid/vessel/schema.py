@@ -55,9 +55,8 @@ def function_parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     hints = argument_types(function)
     result = []
     for name, argument in inspect.signature(function).parameters.items():
-        if argument.kind not in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD) or name not in hints:
-            continue
-        if get_origin(hints[name]) is not Annotated:
+        read = argument.kind in (argument.KEYWORD_ONLY, argument.VAR_KEYWORD)
+        if not read or get_origin(hints.get(name)) is not Annotated:
             continue
         base, unit, *marks = get_args(hints[name])
         kind: Literal["number", "list", "table", "open"] = "number"
@@ -139,14 +138,12 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
     validators: dict[str, Any] = {}
     config: dict[str, Any] = {}
     for parameter in declared:
-        if parameter.kind == "open":
-            grammar = parameter.unit
-            assert isinstance(grammar, Grammar)
-            names: dict[str, Any] = {"patternProperties": {_whole_pattern(grammar.names): {"type": "number"}}}
-            editors = {**names, "additionalProperties": False}
+        if parameter.kind == "open" and isinstance(parameter.unit, Grammar):
+            patterns = {_whole_pattern(parameter.unit.names): {"type": "number"}}
+            editors = {"patternProperties": patterns, "additionalProperties": False}
             config = {"extra": "allow", "json_schema_extra": editors}
             fields["__pydantic_extra__"] = (dict[str, FiniteFloat], Field(init=False))
-            validators["names_are_formulas"] = model_validator(mode="after")(_name_check(grammar))
+            validators["names_are_formulas"] = model_validator(mode="after")(_name_check(parameter.unit))
             continue
         note = Field(description=parameter.unit if isinstance(parameter.unit, str) else "by name")
         if parameter.kind == "list":
@@ -154,8 +151,7 @@ def block_model(name: str, declared: tuple[Parameter, ...], **extra: Any) -> typ
                 Annotated[GenericAlias(list, (_number_type(parameter),)), Field(min_length=2), note],
                 ...,
             )
-        elif parameter.kind == "table":
-            assert isinstance(parameter.unit, Grammar)
+        elif isinstance(parameter.unit, Grammar):
             table = _table_type(parameter.unit)
             fields[parameter.name] = (
                 (Annotated[table | None, note], None) if parameter.optional else (Annotated[table, note], ...)
@@ -274,15 +270,9 @@ def _vessel_model(terms: tuple[tuple[str, Term], ...], *_: object) -> type[BaseM
     return create_model("vessel", __base__=VesselBlock, **fields)
 
 
-@cache
-def _term_groups(terms: tuple[str, ...]) -> tuple[str, ...]:
-    """Blocks of a document in which these terms lie."""
-    return tuple(dict.fromkeys(group for group, _ in split_keys(terms)))
-
-
 def term_blocks(document: Mapping[str, Any], off: bool = False) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
     """Dotted path, TERMS key and block of every term of a vessel document that acts, or of those that are off."""
-    for group in _term_groups(tuple(TERMS)):
+    for group in dict.fromkeys(group for group, _ in split_keys(tuple(TERMS))):
         block = document.get(group)
         if not isinstance(block, Mapping):
             continue
