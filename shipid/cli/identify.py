@@ -295,9 +295,14 @@ def _show_estimates(outcome: Identification, answer: Answer) -> None:
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
     )
-    status = {"status": solution.status, "sentence": solution.sentence, "residuals": len(solution.residuals)}
-    status |= {"runs": outcome.runs, "held_out": outcome.held_out}
-    answer.say(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s", **status)
+    answer.say(
+        f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s",
+        status=solution.status,
+        sentence=solution.sentence,
+        residuals=len(solution.residuals),
+        runs=outcome.runs,
+        held_out=outcome.held_out,
+    )
     heads = {
         "path": "parameter",
         "with": "with",
@@ -305,8 +310,11 @@ def _show_estimates(outcome: Identification, answer: Answer) -> None:
         "base": "base",
         "value": "estimate",
         "factor": "factor",
+        "factor_error": "std error",
+        "factor_low": "95 % from",
+        "factor_high": "to",
+        "identified": "identified",
     }
-    heads |= {"factor_error": "std error", "factor_low": "95 % from", "factor_high": "to", "identified": "identified"}
     formats: dict[str, Any] = dict.fromkeys(("base", "value"), "{:.4g}".format)
     answer.records("estimates", outcome.estimates, heads, formats | {"identified": lambda one: "yes" if one else "no"})
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}

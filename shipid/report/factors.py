@@ -110,8 +110,16 @@ def _draw_strips(frame: pd.DataFrame, names: list[str]) -> Panel:
     room, ends = 0.03 * math.log10(high / low), np.log10([edge if removed else low, high])
     x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room], nticks=4, tickangle=0)
     y_axis = names_axis([shorten_name(name) for name in names], range=[len(names) - 0.4, -0.4])
-    rule = {"type": "line", "layer": "below", "yref": "paper", "x0": 1, "x1": 1, "y0": 0, "y1": 1}
-    rule |= {"line": {"color": INK, "width": 1}}
+    rule = {
+        "type": "line",
+        "layer": "below",
+        "yref": "paper",
+        "x0": 1,
+        "x1": 1,
+        "y0": 0,
+        "y1": 1,
+        "line": {"color": INK, "width": 1},
+    }
     return make_plot(traces, x_axis, y_axis, shapes=[rule])
 
 

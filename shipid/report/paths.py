@@ -151,8 +151,7 @@ def _path_line(name: str, path: Floats, keys: Sequence[str], **options: Any) -> 
 def outline_at(outline: Floats, pose: Floats) -> Floats:
     """Closed outline (k + 1, 2) of a ship at a pose: x, y [m] and heading [rad]."""
     turn = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]])
-    closed: Floats = np.vstack([outline, outline[:1]]) @ turn + pose[:2]
-    return closed
+    return np.asarray(np.vstack([outline, outline[:1]]) @ turn + pose[:2])
 
 
 def _window_chips(content: ReportContent) -> list[Chip]:
