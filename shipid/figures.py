@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     Source = Results | ReportContent | pd.DataFrame
 
-Statistic = Literal["mean", "90th percentile", "root mean square"]
 PAGES: dict[type[PageContent], dict[str, Section]] = {
     ReportContent: SECTIONS,
     CheckContent: CHECK_PAGE,
@@ -79,7 +78,7 @@ def error_map(source: Source, *, dark: bool = False) -> go.Figure:
 
 def gain(
     source: Source,
-    statistic: Statistic = "mean",
+    statistic: Literal["mean", "90th percentile", "root mean square"] = "mean",
     scale: Literal["linear", "logarithmic"] = "linear",
     *,
     dark: bool = False,

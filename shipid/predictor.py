@@ -145,9 +145,9 @@ class Predictor(DeployedMethod):
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] of `predict` that are known already; DataError as there."""
         bands, instants = self.check_level(level, kind), self._checked(instants)
-        missing = next((name for name in bands.names if name not in instants.columns), None)
-        if missing is not None:
-            raise DataError("the band was calibrated with this column, and the instants lack it", path=missing)
+        _check_names_held(
+            instants.columns, bands.names, "the band was calibrated with this column, and the instants lack it"
+        )
         paths = self._paths(paths, instants)
         return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
 
@@ -187,9 +187,7 @@ class Predictor(DeployedMethod):
     def _checked(self, instants: Instants) -> Instants:
         """The instants with arrays of floats that cannot be written to; DataError for another step or other shapes."""
         check_instants(instants)
-        missing = next((name for name in ("u", "v", "r") if name not in instants.columns), None)
-        if missing is not None:
-            raise DataError("the instants lack this column", path=missing)
+        _check_names_held(instants.columns, ("u", "v", "r"), "the instants lack this column")
         step = self.physics.step
         if instants.step is not None and abs(check_number("step", instants.step, DataError) - step) > 1e-9 * step:
             message = f"instants of windows with steps of {instants.step:g} s, the predictor has {step:g} s"
@@ -215,9 +213,7 @@ class Predictor(DeployedMethod):
         if instants.planned is None:
             raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
         needed = () if self.vessel is None else vessel_dynamics(self.vessel).commands
-        missing = next((name for name in needed if name not in instants.planned), None)
-        if missing is not None:
-            raise DataError("this command of the vessel is not among those planned", path=missing)
+        _check_names_held(instants.planned, needed, "this command of the vessel is not among those planned")
         return instants
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
@@ -335,11 +331,10 @@ class Predictor(DeployedMethod):
         try:
             arrays = read_arrays(file)
             header = {**json.loads(str(arrays.pop("header")))}
+        except IsADirectoryError:
+            raise ResultError("a folder: name one of its cells, FOLDER/cells/NAME.npz", file=file) from None
         except OSError as error:
-            words = f"cannot be read ({error.strerror or 'not a predictor'})"
-            if isinstance(error, IsADirectoryError):
-                words = "a folder: name one of its cells, FOLDER/cells/NAME.npz"
-            raise ResultError(words, file=file) from None
+            raise ResultError(f"cannot be read ({error.strerror or 'not a predictor'})", file=file) from None
         except (ValueError, KeyError, TypeError, RecursionError):
             raise ResultError("not a predictor of shipid: a run's folder has them in cells/", file=file) from None
         _check_format(header, file)
@@ -376,6 +371,13 @@ class Predictor(DeployedMethod):
             raise ResultError(error.message, file=file, path=error.path) from None
         except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError, ShipidError):
             raise ResultError("damaged: run the study again", file=file) from None
+
+
+def _check_names_held(given: Mapping[str, Array], names: Iterable[str], fault: str) -> None:
+    """Raise DataError, with the first name that is not given."""
+    for name in names:
+        if name not in given:
+            raise DataError(fault, path=name)
 
 
 def _locked_floats(part: str, given: Mapping[str, Array], shape: tuple[int | None, ...]) -> dict[str, Array]:
@@ -547,7 +549,6 @@ def check_bands(bands: Bands | None, reason: str, level: float, kind: str | None
 
 
 NO_BAND = "this predictor has no band: "
-NO_REFITS = "errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
 
 
 def bands_of(
@@ -558,7 +559,7 @@ def bands_of(
 ) -> tuple[Bands | None, str]:
     """Bands from errors (T, S, 2) [m] on windows by models that did not see their runs, and why there are none."""
     if left_out is None:
-        return None, NO_REFITS
+        return None, "errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
     bands = calibrate_bands(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step, kinds)
     return bands, "" if bands is not None else "fewer than 3 runs have errors of models that did not see them"
 

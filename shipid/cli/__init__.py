@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 import shipid
-from shipid.cli import data, export, identify, predict, replay, simulation, study, vessel
+from shipid.cli import data, identify, predict, simulation, study, vessel
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError, is_utf_8
@@ -26,11 +26,11 @@ OPTIONS: dict[str, Any] = {
 COMMANDS: dict[str, Callable[..., Any]] = {
     "simulate": simulation.simulate_command,
     "manoeuvre": simulation.manoeuvre_command,
-    "replay": replay.replay_command,
+    "replay": simulation.replay_command,
     "identify": identify.identify_command,
     "predict": predict.predict_command,
-    "export": export.export_command,
-    "aboard": export.aboard_command,
+    "export": predict.export_command,
+    "aboard": predict.aboard_command,
 }
 NAMELESS = {  # errors of the system that name no file -> what helps
     errno.EAGAIN: "this user has too many processes and threads: end some, raise `ulimit -u`, or take fewer --workers",

@@ -97,6 +97,7 @@ def identify_command(
     With --structures, hulls of several structures are fitted to the same runs and compared on runs held out.
     """
     from shipid.identification.outcome import check_identification, read_settings, write_patch
+    from shipid.identification.structures import PRESENT, STRUCTURES
     from shipid.study.structures import check_comparison
 
     if structures is None and folds is not None:
@@ -111,7 +112,9 @@ def identify_command(
         "together": together and [_split_paths([group]) for group in together],
         "prior": prior and parse_assignments(prior, "--prior", "paths=0.3"),
         "bounds": bounds and parse_assignments(bounds, "--bounds", "paths=[0.5,2]"),
-        "nuisance": nuisance and _nuisance_widths(nuisance),
+        "nuisance": parse_assignments(nuisance, "--nuisance", "current=0.3")
+        if nuisance and "=" in "".join(nuisance)
+        else nuisance,
         "horizon": horizon,
     }
     options = {key: value for key, value in given.items() if value is not None}
@@ -119,7 +122,7 @@ def identify_command(
         options["parameters"] = ["hull.*"]
     declared = read_settings(settings, options | parse_changes(changes))
     ship, log = shipid.load_vessel(vessel), shipid.read_dataset(dataset)
-    names = [] if structures is None else _structure_names(structures)
+    names = [PRESENT, *STRUCTURES] if structures == "all" else _split_paths([structures or ""])
     how: dict[str, Any] = {"runs": runs or (), "held_out": test or (), "ahead": ahead}
     how |= {} if folds is None else {"folds": folds}
     needless = [name for name, value in {"--profile": profile, "--design": design}.items() if value and structures]
@@ -167,18 +170,6 @@ def _errors_of_settings(settings: Path | None) -> Iterator[None]:
 
 def _split_paths(given: Sequence[str]) -> list[str]:
     return [path.strip() for words in given for path in words.split(",")]
-
-
-def _nuisance_widths(given: list[str]) -> list[str] | dict[str, Any]:
-    """Return the names; or name -> width, where widths are given."""
-    return parse_assignments(given, "--nuisance", "current=0.3") if "=" in "".join(given) else given
-
-
-def _structure_names(given: str) -> list[str]:
-    """Names of the structures of `--structures`."""
-    from shipid.identification.structures import PRESENT, STRUCTURES
-
-    return [PRESENT, *STRUCTURES] if given == "all" else [name.strip() for name in given.split(",")]
 
 
 def _compare_structures(
@@ -304,9 +295,14 @@ def _show_estimates(outcome: Identification, answer: Answer) -> None:
     fitted = (
         f"{len(outcome.runs)} of {len(outcome.runs) + len(outcome.held_out)} runs, {len(solution.residuals)} residuals"
     )
-    status = {"status": solution.status, "sentence": solution.sentence, "residuals": len(solution.residuals)}
-    status |= {"runs": outcome.runs, "held_out": outcome.held_out}
-    answer.say(f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s", **status)
+    answer.say(
+        f"{outcome.vessel.name}: {solution.sentence}; {fitted}, {solution.seconds:.1f} s",
+        status=solution.status,
+        sentence=solution.sentence,
+        residuals=len(solution.residuals),
+        runs=outcome.runs,
+        held_out=outcome.held_out,
+    )
     heads = {
         "path": "parameter",
         "with": "with",
@@ -314,8 +310,11 @@ def _show_estimates(outcome: Identification, answer: Answer) -> None:
         "base": "base",
         "value": "estimate",
         "factor": "factor",
+        "factor_error": "std error",
+        "factor_low": "95 % from",
+        "factor_high": "to",
+        "identified": "identified",
     }
-    heads |= {"factor_error": "std error", "factor_low": "95 % from", "factor_high": "to", "identified": "identified"}
     formats: dict[str, Any] = dict.fromkeys(("base", "value"), "{:.4g}".format)
     answer.records("estimates", outcome.estimates, heads, formats | {"identified": lambda one: "yes" if one else "no"})
     words = {"fisher": "Fisher information", "sandwich": "sandwich by runs", "blocks": "sandwich by stretches of runs"}

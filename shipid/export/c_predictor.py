@@ -22,8 +22,9 @@ def predictor_files(model: ExportModel, name: str) -> SourceFiles:
     """A predictor: physics, method, memory, observer, alarm and band as C."""
     names, filters, bands, step = model.layout, filters_of(model), model.predictor.bands, model.physics.step
     functions = {"predict": model.function, **recorder_functions(model)}
-    units = {"row": model.units("now")}
-    units |= {group: model.units(group) for group in ("reached", "past", "planned", "estimates")}
+    units = {"row": model.units("now")} | {
+        group: model.units(group) for group in ("reached", "past", "planned", "estimates")
+    }
     if bands is not None:
         units["kind"] = dict.fromkeys(("any", *bands.kinds), "-")
     limits = [model.limits.get(key, (-np.inf, np.inf)) for key in names.now]
@@ -62,8 +63,7 @@ def predictor_files(model: ExportModel, name: str) -> SourceFiles:
         "ORDERED": "planned" if names.planned else "row",
         "SPEED": names.now.index("u"),
     }
-    numbers = {"limits": np.array(limits)}
-    return source_files(name, _about(model), functions, units, numbers, _WRAPPER, values)
+    return source_files(name, _about(model), functions, units, {"limits": np.array(limits)}, _WRAPPER, values)
 
 
 def _about(model: ExportModel) -> list[str]:

@@ -69,9 +69,4 @@ def _write_function(
         }
     plain = json.loads(json.dumps(described, default=str))
     listing = {"shipid": __version__, "casadi": str(ca.CasadiMeta.version()), **plain}
-    return write_set({file: packed.encode(), listing_of(file): json_text(listing)})
-
-
-def listing_of(file: Path) -> Path:
-    """Where the names of the inputs and outputs of a written function are."""
-    return file.with_name(file.name + ".json")
+    return write_set({file: packed.encode(), file.with_name(file.name + ".json"): json_text(listing)})

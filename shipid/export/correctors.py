@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -11,7 +11,14 @@ import numpy as np
 from casadi import MX
 
 from shipid.export.equations import Equations, function_by_names, split_by_name, symbols_of
-from shipid.export.known import PredictorInputs, all_within, column_of_entries, feature_expressions, turn_vectors
+from shipid.export.known import (
+    NamedExpressions,
+    PredictorInputs,
+    all_within,
+    column_of_entries,
+    feature_expressions,
+    turn_vectors,
+)
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Layers, Normaliser
@@ -27,7 +34,6 @@ from shipid.hybrid.units import Units
 from shipid.physics.signals import measurable_signals
 
 Array = np.ndarray
-ExpressionsByName = Mapping[str, MX]
 
 
 def layer_outputs(x: MX, weight: Array, bias: Array) -> MX:
@@ -35,12 +41,12 @@ def layer_outputs(x: MX, weight: Array, bias: Array) -> MX:
     return ca.mtimes(ca.DM(weight.T), x) + ca.DM(bias)
 
 
-def normalised_inputs(table: ExpressionsByName, normaliser: Normaliser) -> MX:
+def normalised_inputs(table: NamedExpressions, normaliser: Normaliser) -> MX:
     """(value - mean) / std of the named inputs."""
     return (stacked_inputs(table, normaliser.names) - ca.DM(normaliser.mean)) / ca.DM(normaliser.std)
 
 
-def stacked_inputs(table: ExpressionsByName, names: Sequence[str]) -> MX:
+def stacked_inputs(table: NamedExpressions, names: Sequence[str]) -> MX:
     """Inputs of a method in a column; KeyError where the table lacks one."""
     return ca.vertcat(*(table[name] for name in names))
 
@@ -173,7 +179,7 @@ def gated_network_function(network: GatedNetwork) -> ca.Function:
 class StepStart(NamedTuple):
     """What holds at the start of a step: motion, orders and weather by name, and actuators."""
 
-    row: ExpressionsByName
+    row: NamedExpressions
     reached: MX
 
 

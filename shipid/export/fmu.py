@@ -160,7 +160,7 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
     values: dict[str, Any] = {"FIRST_PARAMETER": first, "X": path, "BAND": 0 if bands is None else len(BAND_ROWS)}
     values["PLAN"] = f"*({at['held']}) != 0 ? 0 : self->values + {len(names.now)}" if names.planned else 0
     values["CHOICE"] = at.get(BAND_CHOICE[0], 0)
-    what = "no physics" if model.vessel is None else model.vessel.name
+    what = "no physics" if model.physics.vessel is None else model.physics.vessel.name
     files = predictor_files(model, name)
     return FmuParts(f"{what}, {model.predictor.method}", tuple(variables), files, PREDICTOR_MODEL, values, step)
 

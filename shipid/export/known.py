@@ -137,8 +137,7 @@ class PredictorInputs:
     def _observed(self) -> tuple[MX, MX, MX]:
         """State, environment and slow force over the horizon, as `shipid.observer.observed_start`."""
         physics, model, now, seen = self.physics, self.equations.model, self.now, self.seen
-        assert physics.vessel is not None
-        filters = filter_bank(physics.vessel, physics.observer)
+        filters = filter_bank(self.equations.vessel, physics.observer)
         north, east, psi = seen["current_north"], seen["current_east"], seen["psi"]
         state = {"psi": psi, "r": seen["r"]}
         if moves_start(filters.settings, physics.path):

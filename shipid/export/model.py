@@ -24,7 +24,6 @@ from shipid.observer import ESTIMATE_COLUMNS
 from shipid.physics.signals import signal_of, signal_row
 from shipid.simulation.log import state_column
 from shipid.vessel.dynamics import vessel_dynamics
-from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 UNITS_OF_FORCES = {"X": "m/s^2", "Y": "m/s^2", "N": "rad/s^2"}
@@ -43,11 +42,6 @@ class ExportModel:
     predictor: DeployedMethod
     physics: Physics
     layout: InputLayout
-
-    @property
-    def vessel(self) -> Vessel | None:
-        """The vessel with the terms of the method; None for no physics."""
-        return self.physics.vessel
 
     @cached_property
     def function(self) -> ca.Function:

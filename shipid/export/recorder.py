@@ -62,7 +62,8 @@ def keep_function(model: ExportModel) -> ca.Function:
     """(last, row, reached, dt, anew) -> kept row, what is added to all kept before, reached after dt [s].
 
     last : the newest kept row. anew : 1 for a row before which nothing is known. Angles go on by the turn of
-    `angle_by_turn`; headings and directions by the nearest one.
+    `angle_by_turn`, the first from the turn nearest to the training, where that is narrower than a turn; headings and
+    directions go on by the nearest one.
     """
     names = model.layout
     sizes_ = {"last": len(kept_names(model)), "row": len(names.now), "reached": len(names.reached)}
@@ -71,7 +72,9 @@ def keep_function(model: ExportModel) -> ca.Function:
     last, row = split_by_name(kept_names(model), symbols["last"]), split_by_name(names.now, symbols["row"])
     moved: dict[str, MX] = {}
     for name in angles_of(names.now):
-        before = ca.if_else(anew, first_angle(row[name], model.limits.get(name)), last[name])
+        least, most = model.limits.get(name, (-np.inf, np.inf))
+        first = nearest_turn(row[name], (least + most) / 2) if most - least <= FULL_TURN else row[name]
+        before = ca.if_else(anew, first, last[name])
         row[name], moved[name] = angle_by_turn(model, name, row[name], before)
         last[name] = last[name] + moved[name]
     for name in names.now:
@@ -82,8 +85,8 @@ def keep_function(model: ExportModel) -> ca.Function:
     kept = ca.vertcat(column_of_entries(row, names.now), MX(np.zeros(2)), rate)
     shift = ca.vertcat(column_of_entries(moved, names.now), -way, MX(np.zeros(2)))
     reached = symbols["reached"] + column_of_entries(moved, names.reached)
-    if model.vessel is not None and names.reached:
-        equations = Equations(model.vessel)
+    if model.physics.vessel is not None and names.reached:
+        equations = Equations(model.physics.vessel)
         orders = column_of_entries(last, equations.model.commands)
         reached = equations.advance(reached, orders, equations.values, dt)
     results = {"kept": kept, "moved": ca.if_else(anew, 0, shift)}
@@ -110,12 +113,6 @@ def past_function(model: ExportModel) -> ca.Function:
     row |= {name: order[name] for name in every if "." in name}
     row |= split_by_name("xy", turn_vectors(place, -newest["psi"]))
     return function_by_names("past", symbols, {"past": column_of_entries(row, names.past)})
-
-
-def first_angle(angle: MX, limits: tuple[float, float] | None) -> MX:
-    """The first angle of a stretch of rows: the turn nearest to the training, where that is narrower than a turn."""
-    narrow = limits is not None and limits[1] - limits[0] <= FULL_TURN
-    return nearest_turn(angle, sum(limits) / 2) if narrow and limits is not None else angle
 
 
 def begin_function(model: ExportModel, filters: FilterBank) -> ca.Function:
@@ -186,7 +183,7 @@ def angle_by_turn(model: ExportModel, name: str, angle: MX, last: MX) -> tuple[M
     back lies within them, the past is moved by that turn.
     """
     component, _, signal = name.rpartition(".")
-    numbers = {} if model.vessel is None else model.vessel.parameters
+    numbers = {} if model.physics.vessel is None else model.physics.vessel.parameters
     stops = [numbers.get(f"thruster.{component}.actuator.{signal}.{end}", np.inf) for end in ("low", "high")]
     if np.isfinite(stops).all() and stops[1] - stops[0] < FULL_TURN:
         return nearest_turn(angle, sum(stops) / 2), MX(0)

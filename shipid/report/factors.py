@@ -1,4 +1,4 @@
-"""The models: how each was degraded, every perturbed number as a dot at its factor, and a table of all."""
+"""The models: how each was degraded, every perturbed number as a dot at its factor; tables of models and cells."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from shipid.report.figure import (
 from shipid.report.page import Section
 from shipid.report.selection import models_by_accuracy
 from shipid.report.tables import PageTable, frame_table, with_cells, word_cell
-from shipid.report.wording import counted_text, join_few_names, number_text, shorten_name
+from shipid.report.wording import counted_text, duration_text, join_few_names, number_text, shorten_name
 
 STRIP_HEIGHT = 30  # height of a model [px]
 MODEL_COLUMNS = {
@@ -37,6 +37,26 @@ MODEL_COLUMNS = {
     "A across [m]": "A_across",
     "status": "status",
     "what it is": "description",
+}
+
+
+CELLS = {
+    "model": "model",
+    "A [m]": "A",
+    "N_D [1]": "N_D",
+    "data [min]": "minutes",
+    "seed": "seed",
+    "H [m]": "H",
+    "H_90 [m]": "H_90",
+    "rms [m]": "rms",
+    "in band [1]": "coverage",
+    "radius of band [m]": "width",
+    "status": "status",
+    "time [s]": "seconds",
+    "trials [1]": "trials",
+    "stopped [1]": "stopped",
+    "diverged [1]": "diverged",
+    "chosen": "hyperparameters",
 }
 
 
@@ -90,8 +110,16 @@ def _draw_strips(frame: pd.DataFrame, names: list[str]) -> Panel:
     room, ends = 0.03 * math.log10(high / low), np.log10([edge if removed else low, high])
     x_axis = log_axis("factor [1]", range=[ends[0] - room, ends[1] + room], nticks=4, tickangle=0)
     y_axis = names_axis([shorten_name(name) for name in names], range=[len(names) - 0.4, -0.4])
-    rule = {"type": "line", "layer": "below", "yref": "paper", "x0": 1, "x1": 1, "y0": 0, "y1": 1}
-    rule |= {"line": {"color": INK, "width": 1}}
+    rule = {
+        "type": "line",
+        "layer": "below",
+        "yref": "paper",
+        "x0": 1,
+        "x1": 1,
+        "y0": 0,
+        "y1": 1,
+        "line": {"color": INK, "width": 1},
+    }
     return make_plot(traces, x_axis, y_axis, shapes=[rule])
 
 
@@ -124,6 +152,20 @@ def models_table(content: ReportContent) -> PageTable:
     )
 
 
+def cells_table(content: ReportContent) -> PageTable:
+    """Every cell of the study, with how many trials it had; a failed one shows its status in place of numbers."""
+    frame, trials = content.cells, content.trials
+    bad = int((frame.status.ne("ok") | frame.H.isna()).sum())
+    takeaway = f"{counted_text(len(frame), 'cell')} in {duration_text(float(frame.seconds.sum()))} of computing; "
+    takeaway += f"{counted_text(bad, 'cell')} gave no result." if bad else "all gave a result."
+    frame = frame.drop(columns="trials", errors="ignore")  # of a stored cell: the list of them
+    if len(trials):
+        states = pd.crosstab(trials.cell, trials.state).reindex(columns=["stopped", "diverged"], fill_value=0)
+        states = states.assign(trials=trials.groupby("cell").size())
+        frame = frame.merge(states, how="left", left_on="cell", right_index=True)
+    return frame_table("cells", "Every cell", takeaway, with_failures(frame), CELLS)
+
+
 def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
     """The frame with a `status` that says why there is no result, where it is not "ok"."""
     why = frame.get("sentence", pd.Series("", index=frame.index)).fillna("")
@@ -136,3 +178,4 @@ def with_failures(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 THE_MODELS = Section("The models", {"factors": (factors_figure, "factors"), "models": (models_table, "models")})
+THE_CELLS = Section("The cells", {"cells": (cells_table, "cells")})

@@ -268,14 +268,27 @@ def draw_alone(figure: PageFigure, chosen: Sequence[object] = (), *, dark: bool 
     if figure.scale is not None:
         whole.add_trace(_scale_bar(figure.scale))
     takeaway = "<br>".join(map(escape_name, wrap(figure.takeaway, 110)))
-    title = {"text": f"{escape_name(figure.title)}<br><sup>{takeaway}</sup>", "x": 0, "xref": "paper", "y": 1}
-    title |= {"yref": "container", "yanchor": "top", "pad": {"t": 24}}
+    title = {
+        "text": f"{escape_name(figure.title)}<br><sup>{takeaway}</sup>",
+        "x": 0,
+        "xref": "paper",
+        "y": 1,
+        "yref": "container",
+        "yanchor": "top",
+        "pad": {"t": 24},
+    }
     height = len(panels) * figure.height + 130 + 70 * (len(panels) - 1)
     beside = 1.25 if whole.layout.annotations else 1.02  # right of names that stand beside the lines
-    whole.update_layout(title=title, width=900, height=height, legend_x=beside, margin_t=90)
-    whole.update_layout(showlegend=bool(figure.chips))
     colours = page_colours("dark" if dark else "light")
-    whole.update_layout(paper_bgcolor=colours["page"])
+    whole.update_layout(
+        title=title,
+        width=900,
+        height=height,
+        margin_t=90,
+        legend_x=beside,
+        showlegend=bool(figure.chips),
+        paper_bgcolor=colours["page"],
+    )
     parts = {"data": [trace.to_plotly_json() for trace in whole.data], "layout": whole.layout.to_plotly_json()}
     plain = json.dumps(parts, cls=PlotlyJSONEncoder)
     return go.Figure(json.loads(re.sub(r"var\(--([\w-]+)\)", lambda match: colours[match[1]], plain)))
@@ -304,11 +317,22 @@ def _scale_bar(scale: ColourScale) -> Trace:
     least = least_coloured((scale.low, scale.high))
     low, high = (math.log10(max(value, least)) for value in (scale.low, scale.high))
     ticks = np.linspace(low, high, 4).tolist()
-    bar = {"title": {"text": escape_name(scale.label), "side": "top"}, "orientation": "h", "y": -0.15, "yanchor": "top"}
-    bar |= {"tickvals": ticks, "ticktext": [f"{10**tick:.3g}" for tick in ticks], "thickness": 16}
+    bar = {
+        "title": {"text": escape_name(scale.label), "side": "top"},
+        "orientation": "h",
+        "y": -0.15,
+        "yanchor": "top",
+        "tickvals": ticks,
+        "ticktext": [f"{10**tick:.3g}" for tick in ticks],
+        "thickness": 16,
+    }
     steps = [[step, f"var(--{scale.gradient}-{i})"] for i, step in enumerate(np.linspace(0, 1, COLOUR_LEVELS).tolist())]
     marker = {"color": [low, high], "colorscale": steps, "cmin": low, "cmax": high, "showscale": True, "colorbar": bar}
-    return {"type": "scatter", "x": [None, None], "y": [None, None], "mode": "markers"} | {
+    return {
+        "type": "scatter",
+        "x": [None, None],
+        "y": [None, None],
+        "mode": "markers",
         "marker": marker,
         "showlegend": False,
     }

@@ -249,8 +249,17 @@ def correlations_figure(content: IdentificationContent) -> PageFigure | None:
 def _draw_correlations(names: Sequence[str], matrix: Floats) -> Panel:
     scale = [[0.0, "var(--category-0)"], [0.5, "var(--page)"], [1.0, "var(--category-1)"]]
     bar = {"thickness": 12, "title": {"text": "correlation [1]", "side": "right"}}
-    heat: Trace = {"type": "heatmap", "z": matrix.astype(np.float32), "x": names, "y": names, "zmin": -1, "zmax": 1}
-    heat |= {"colorscale": scale, "colorbar": bar, "hovertemplate": "%{y} and %{x}: %{z:.2f}<extra></extra>"}
+    heat: Trace = {
+        "type": "heatmap",
+        "z": matrix.astype(np.float32),
+        "x": names,
+        "y": names,
+        "zmin": -1,
+        "zmax": 1,
+        "colorscale": scale,
+        "colorbar": bar,
+        "hovertemplate": "%{y} and %{x}: %{z:.2f}<extra></extra>",
+    }
     x = make_axis("", tickangle=-90, showticklabels=len(names) <= MOST_NAMED, showgrid=False)
     return make_plot([heat], x, make_axis("", autorange="reversed"), margin={"l": 8, "r": 8, "t": 8, "b": 8})
 

@@ -102,9 +102,11 @@ def render_page(
     )
 
 
-def write_page(kind: str, sections: Mapping[str, Section], content: Any, file: Path) -> Path:
+def write_page(
+    kind: str, sections: Mapping[str, Section], content: Any, file: Path, windows: Mapping[str, Any] | None = None
+) -> Path:
     """Write a page as one HTML file that makes no request; returns the file. Raises OSError if it cannot."""
-    write_text(file, render_page(kind, sections, content))
+    write_text(file, render_page(kind, sections, content, windows))
     return file
 
 

@@ -35,10 +35,6 @@ from shipid.report.wording import counted_text
 MOST_POINTS = 40  # of a path or of the outline of a band
 PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
 TO_STARBOARD, AHEAD = "y, to starboard [m]", "x, ahead [m]"
-HOW_WINDOWS = (
-    "Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at the start and "
-    "where the ship truly was at the end. The pale broad line is the true path. Arrow keys move the slider."
-)
 
 
 def windows_of(content: ReportContent) -> dict[str, list[WindowSnapshot]]:
@@ -61,7 +57,9 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
         id="browser",
         title="Look at predictions",
         takeaway=f"{counted_text(sum(map(len, runs.values())), 'window')} of {counted_text(len(runs), 'test run')}.",
-        how=HOW_WINDOWS,
+        how="Axes are the ship's at the instant of prediction (11), equal in metres; the outline is to scale, at "
+        "the start and where the ship truly was at the end. The pale broad line is the true path. Arrow "
+        "keys move the slider.",
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
@@ -153,8 +151,7 @@ def _path_line(name: str, path: Floats, keys: Sequence[str], **options: Any) -> 
 def outline_at(outline: Floats, pose: Floats) -> Floats:
     """Closed outline (k + 1, 2) of a ship at a pose: x, y [m] and heading [rad]."""
     turn = np.array([[np.cos(pose[2]), np.sin(pose[2])], [-np.sin(pose[2]), np.cos(pose[2])]])
-    closed: Floats = np.vstack([outline, outline[:1]]) @ turn + pose[:2]
-    return closed
+    return np.asarray(np.vstack([outline, outline[:1]]) @ turn + pose[:2])
 
 
 def _window_chips(content: ReportContent) -> list[Chip]:

@@ -223,14 +223,15 @@ def _isolines(shown: CellMap) -> Trace:
     physics, sizes = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], np.unique(shown.cells.N_D)
     H = shown.cells.pivot(index="model", columns="N_D", values="H").reindex(index=physics.model, columns=sizes)
     lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
-    base = {
+    return {
         "type": "contour",
         "x": sizes.tolist(),
         "y": physics.y.tolist(),
         "z": smooth_rows(H.to_numpy()),
-    }
-    base |= {"ncontours": 5, "contours": lines, "line": {"color": INK, "width": 1.5, "smoothing": 0}, "meta": ["iso"]}
-    return base | {
+        "ncontours": 5,
+        "contours": lines,
+        "line": {"color": INK, "width": 1.5, "smoothing": 0},
+        "meta": ["iso"],
         "hoverinfo": "skip",
         "showscale": False,
         "xaxis": "x2",

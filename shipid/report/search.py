@@ -140,8 +140,7 @@ def _median_ratios(frame: pd.DataFrame, name: str) -> Floats:
         return np.empty((0, 2))
     groups = values if values.nunique() <= MEDIAN_BINS else values.rank(pct=True).mul(MEDIAN_BINS).apply(np.ceil)
     medians = pd.DataFrame({"x": values, "y": frame.ratio}).groupby(groups).median().sort_values("x")
-    points: Floats = np.minimum(medians.to_numpy(dtype=float), [np.inf, HIGHEST_RATIO])
-    return points
+    return np.asarray(np.minimum(medians.to_numpy(dtype=float), [np.inf, HIGHEST_RATIO]))
 
 
 def _axis_of_values(name: str, every: pd.Series[float]) -> dict[str, Any]:

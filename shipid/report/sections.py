@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shipid.files import write_text
-from shipid.report import bands, cells, errors_over, factors, logs, methods, paths, physics_and_data, search
+from shipid.report import bands, errors_over, factors, logs, methods, paths, physics_and_data, search
 from shipid.report.content import ReportContent
-from shipid.report.page import Section, render_page
+from shipid.report.page import Section, write_page
 
 SECTIONS: dict[str, Section] = {
     "results": physics_and_data.WHAT_PHYSICS_AND_DATA_BUY,
@@ -18,12 +17,11 @@ SECTIONS: dict[str, Section] = {
     "the-models": factors.THE_MODELS,
     "data": logs.THE_DATA,
     "the-search": search.THE_SEARCH,
-    "all-cells": cells.THE_CELLS,
+    "all-cells": factors.THE_CELLS,
 }
 
 
 def write_report(content: ReportContent, file: Path) -> Path:
     """Write the page of a study as one HTML file that makes no request; returns the file. Raises OSError."""
     windows = paths.window_data(content) if content.snapshots else None
-    write_text(file, render_page("study", SECTIONS, content, windows))
-    return file
+    return write_page("study", SECTIONS, content, file, windows)

@@ -103,8 +103,11 @@ def structure_manoeuvres(content: StructuresContent) -> PageTable:
     takeaway += "Between: range over the structures not shown to be worse; within: the widest interval of one of them."
     words = [f"{name}: {why}" for name, why in content.cautions.items() if why]
     takeaway += f" Intervals may be too narrow. {'; '.join(words)}." if words else ""
-    columns = {name: name for name in (*place, *names)}
-    columns |= {"between structures": "spread", "within one": "width", "unit": "unit"}
+    columns = {name: name for name in (*place, *names)} | {
+        "between structures": "spread",
+        "within one": "width",
+        "unit": "unit",
+    }
     return frame_table("manoeuvres", "Standard manoeuvres in calm deep water", takeaway, shown, columns)
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Sequence
 
-from shipid.report.cells import cells_table
 from shipid.report.content import AnswerSentence, ReportContent
 from shipid.report.errors_over import error_by_kind
-from shipid.report.factors import models_table
+from shipid.report.factors import cells_table, models_table
 from shipid.report.page import FIRST_SENTENCES
 from shipid.report.wording import CONSTANT_MOTION, metres_text
 
