@@ -152,7 +152,11 @@ def predictor_unit(model: ExportModel, name: str) -> FmuParts:
         settings["held"] = "1: orders stay as they are over the horizon; 0: as in planned[...]", 1.0
     if bands is not None:
         kinds = ", ".join(f"{number}: {kind}" for number, kind in enumerate(("any", *bands.kinds)))
-        words = ("share of whole paths in the band, above 0 to 0.99", "1: that of positions at each step alone", f"manoeuvre, {kinds}")
+        words = (
+            "share of whole paths in the band, above 0 to 0.99",
+            "1: that of positions at each step alone",
+            f"manoeuvre, {kinds}",
+        )
         usual = next((level for level in (0.9, 0.8) if bands.promises(level)), 0.5)
         settings |= dict(zip(BAND_CHOICE, zip(words, (usual, 0.0, 0.0), strict=True), strict=True))
     at = {key: f"self->values + {place}" for place, key in enumerate(settings, len(variables))}
