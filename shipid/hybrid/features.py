@@ -97,6 +97,12 @@ class Memory(CheckedModel, BaseModel):
         """Length of the past that is needed [s]."""
         return max((*self.history, *self.turned, *self.error), default=0.0)
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of inputs that it gives, as `input_group` calls them."""
+        held = {"history": self.history or self.turned, "error": self.error, "observer": self.observer}
+        return tuple(kind for kind, one in held.items() if one)
+
 
 NO_MEMORY = Memory()
 

@@ -1,128 +1,246 @@
-"""Tuning by gradients: an Optuna study per model; models with equal architectures train as one stack."""
+"""Tuning by gradients: an Optuna study per model; networks that are alike train as one stack, and trials may race.
+
+With `at_once` above 1 so many trials are proposed at a time, and race: the better half of those of a model goes on
+(successive halving: Jamieson and Talwalkar, 2016). Where all trials run to their end, most of the time goes into those
+that are hopeless after fifty epochs.
+"""
 
 from __future__ import annotations
 
 import time
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count
+from math import ceil
 
 import numpy as np
 import optuna
-from optuna.trial import TrialState
 
 from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
-from shipid.hybrid.features import Inputs, choose_features
-from shipid.hybrid.journal import frozen_trial
-from shipid.hybrid.method import FitResult, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.features import Inputs, choose_features, input_group
+from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
+from shipid.hybrid.method import Array, FitResult, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.search import Search, SearchMethod, best_trials, seed_of, trial_row
-from shipid.hybrid.training import Length, train_stack
+from shipid.hybrid.training import Layers, Learner, Length, StackTraining
+from shipid.hybrid.units import VaryingInputs
 
-Stack = Mapping[str, Mapping[str, float]]
-"""Models that train together: name -> hyperparameters."""
+Trial = tuple[str, int]
+"""Model and number."""
+NARROW = 32  # units up to which a core waits for Python: networks of different widths train faster as one stack
+STACK = 4  # of them; with more nothing is gained
+HALVINGS = 6  # of the epochs down to those after which the first trials of a race stop
 
 
-def tune_gradient(task: Task, method: SearchMethod, inputs: Inputs, length: Length) -> dict[str, FitResult]:
+def tune_gradient(
+    task: Task, method: SearchMethod, inputs: Inputs, length: Length, *, mirror: bool = False, at_once: int = 1
+) -> dict[str, FitResult]:
     """Train networks for each foundation.
 
     The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
-    best trial. Foundations with the same inputs and architecture in a trial train as one stack. The sampler of a trial
-    is seeded by its number.
+    best trial. The sampler of a trial is seeded by its number.
+
+    mirror : whether networks are symmetric to port and starboard, where the inputs allow it.
+    at_once : trials that are proposed at a time; more than one race.
     """
-    trainer, search = _StackTrainer(task, method, inputs, length), Search(task, task.cases, method)
+    trainer, search = _Trainer(task, method, inputs, length, mirror), Search(task, task.cases, method)
     space = method.space()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
+    if search.done != search.count:  # a round that was interrupted begins again
+        search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
     studies = {key: optuna.create_study(direction="minimize") for key in search.rows}
     for key, study in studies.items():
         study.add_trials([frozen_trial(row, space) for row in search.rows[key]])
     best: dict[str, _TrialOutcome] = {}  # of the trials that were trained here
-    for number, _ in search.left(count()):
-        for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
-            seed = seed_of(task.seed, key, number)
-            study.sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=False, seed=seed)
-        trials = {key: study.ask(space) for key, study in studies.items()}
-        fixed = {name: getattr(method, name) for name in method.SEARCHED}
-        rows: dict[str, Row] = {}
-        for stack in trainer.stacks({key: fixed | trial.params for key, trial in trials.items()}):
-            start = time.process_time()
-            for key, one in trainer.train(stack, number).items():
-                rows[key] = trial_row(number, stack[key], one.value, start, one.epochs)
-                rows[key]["seconds"] /= len(stack)
-                if key not in best or one.value < best[key].value or np.isnan(best[key].value):
-                    best[key] = one
-        for key, trial in trials.items():
-            complete = rows[key]["state"] == "complete"
-            told = (rows[key]["value"], TrialState.COMPLETE) if complete else (None, TrialState.FAIL)
-            studies[key].tell(trial, *told)
-        search.record({key: rows[key] for key in studies})
-    return {key: trainer.fitted(key, search.rows, best.get(key)) for key in studies}
+    fixed = {name: getattr(method, name) for name in method.SEARCHED}
+    for first, _ in search.left(count()):
+        numbers = range(first, min(first + at_once, search.count or first + at_once))
+        trials: dict[Trial, optuna.Trial] = {}
+        for number in numbers:
+            for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
+                seed = seed_of(task.seed, key, number)
+                study.sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=at_once > 1, seed=seed)
+                trials[key, number] = study.ask(space)
+        outcomes = trainer.train({one: fixed | trial.params for one, trial in trials.items()})
+        for (key, number), trial in trials.items():
+            one, row = outcomes[key, number], outcomes[key, number].row
+            if row["state"] == "stopped":
+                trial.report(row["value"], row["epochs"])
+            studies[key].tell(trial, row["value"] if row["state"] == "complete" else None, TRIAL_STATES[row["state"]])
+            if row["state"] == "complete" and (key not in best or row["value"] < best[key].row["value"]):
+                best[key] = one
+        for number in numbers:
+            search.record({key: outcomes[key, number].row for key in studies})
+    return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in studies}
 
 
 @dataclass(frozen=True)
 class _TrialOutcome:
-    """A trial of a model: networks of the folds, mean validation loss [m^2], nan where one diverged, and epochs."""
+    """A trial of a model: its row, and the networks of the folds."""
 
-    number: int
+    row: Row
     networks: tuple[Network, ...]
-    value: float
-    epochs: int
 
 
-class _StackTrainer:
+@dataclass(frozen=True, eq=False)
+class _StackMember:
+    """A network in training: its trial and fold, what its inputs are, the scales (d,) that divide them, its data."""
+
+    trial: Trial
+    fold: int
+    varying: VaryingInputs
+    scales: Array
+    learner: Learner
+
+    def networks(self, layers: Layers) -> list[Network]:
+        """The network as it predicts, twice as large; with a mirror also its image, whose mean with it is symmetric."""
+        (weight, bias), *others = layers
+        scaled, mirror = weight / self.scales[:, None], self.varying.reflection
+        every: list[Layers] = [((scaled, bias), *others)]
+        if mirror is not None:
+            *hidden, (last, offset) = ((mirror @ scaled, bias), *others)
+            sign = np.repeat([1.0, -1.0], len(offset) // 2)
+            every.append((*hidden, (last * sign, offset * sign)))
+        basis = np.eye(len(layers[-1][1]) // 2)
+        return [Network(self.varying.features, self.varying.normaliser, basis, one) for one in every]
+
+
+_RunningStack = tuple[list[_StackMember], StackTraining]
+
+
+class _Trainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(self, task: Task, method: SearchMethod, inputs: Inputs, length: Length) -> None:
-        self.task, self.method, self.inputs, self.length = task, method, inputs, length
+    def __init__(self, task: Task, method: SearchMethod, inputs: Inputs, length: Length, mirror: bool) -> None:
+        self.task, self.method, self.inputs, self.length, self.mirror = task, method, inputs, length, mirror
         self.tables = shared_tables(task, inputs)
         self.outputs = {key: flatten_paths(paths) for key, paths in task.targets.items()}
+        self._seen: dict[object, tuple[VaryingInputs, Array]] = {}
+        self._again: dict[int, dict[Trial, _TrialOutcome]] = {}
 
-    def stacks(self, asked: Stack) -> list[Stack]:
-        """Group models by inputs and architecture, in the order of their first member."""
-        stacks: dict[tuple[object, ...], dict[str, Mapping[str, float]]] = {}
-        for key, parameters in asked.items():
-            alike = (input_table_key(self.tables[key]), *(parameters[name] for name in self.method.COUNTS))
-            stacks.setdefault(alike, {})[key] = parameters
-        return list(stacks.values())
+    def _inputs(self, key: str, fold: int) -> tuple[VaryingInputs, Array]:
+        """What varies in the training windows of a fold, and its values (S, d), normalised; once for equal inputs."""
+        table = self.tables[key]
+        place = (fold, input_table_key(table))
+        if place not in self._seen:
+            training = {name: values[self.task.folds[fold][0]] for name, values in table.items()}
+            if self.mirror:
+                varying = VaryingInputs.of(training, mirror=True)
+            else:
+                features = choose_features(training)
+                varying = VaryingInputs(features, Normaliser.fit(training, tuple(features)), None)
+            self._seen[place] = varying, varying.normaliser.apply(table)
+        return self._seen[place]
 
-    def train(self, stack: Stack, number: int) -> dict[str, _TrialOutcome]:
-        """Train the networks of a stack in a trial, those of each fold together."""
-        table, outputs = self.tables[next(iter(stack))], np.stack([self.outputs[key] for key in stack])
-        networks: dict[str, list[Network]] = {key: [] for key in stack}
-        losses, epochs = [], []
-        for i, (training, validation) in enumerate(self.task.folds):
-            entropy = self.task.seed, number, i
-            seen = {name: values[training] for name, values in table.items()}
-            features = choose_features(seen)
-            normaliser = Normaliser.fit(seen, tuple(features))
-            trained = train_stack(
-                normaliser.apply(table),
-                outputs,
-                training,
-                validation,
-                list(stack.values()),
-                self.length,
-                [seed_of(*entropy, key) for key in stack],
-                order_seed=seed_of(*entropy),
-                device=self.task.device,
-            )
-            losses.append(trained.loss)
-            epochs.append(trained.epochs)
-            for key, layers in zip(stack, trained.layers, strict=True):
-                networks[key].append(Network(features, normaliser, np.eye(outputs.shape[-1] // 2), layers))
-        made = zip(stack, np.transpose(losses), np.max(epochs, axis=0), strict=True)
-        return {
-            key: _TrialOutcome(number, tuple(networks[key]), float(np.mean(mine)), int(most))
-            for key, mine, most in made
-        }
+    def _stacks(self, asked: Mapping[Trial, Mapping[str, float]]) -> list[list[_StackMember]]:
+        """Members of all trials and folds; those that are alike, and several that are narrow, as one stack."""
+        stacks: dict[tuple[object, ...], list[_StackMember]] = defaultdict(list)
+        race = len(asked) > len(self.tables) and not self.length.batch
+        for (key, number), settings in asked.items():
+            for fold, (training, validation) in enumerate(self.task.folds):
+                varying, values = self._inputs(key, fold)
+                names = varying.normaliser.names
+                scales = np.array([settings.get(f"{input_group(name)}_scale", 1.0) for name in names])
+                scaled = values if (scales == 1).all() else values / scales
+                seed = seed_of(self.task.seed, number, fold, key)
+                learner = Learner(scaled, self.outputs[key], training, validation, settings, seed)
+                narrow = race and settings["units"] <= NARROW
+                alike = (number, fold, input_table_key(self.tables[key]), settings["units"])
+                sizes = (settings["layers"], len(names), len(training), len(validation))
+                mirror = varying.reflection if varying.reflection is None else varying.reflection.tobytes()
+                place = (sizes, mirror, None if narrow else alike)
+                stacks[place].append(_StackMember((key, number), fold, varying, scales, learner))
+        return [
+            members[start : start + size]
+            for place, members in stacks.items()
+            for size in (len(members) if place[-1] else STACK,)
+            for start in range(0, len(members), size)
+        ]
 
-    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None) -> FitResult:
-        """The networks of the best trial; those of an earlier session are trained once more, in the same stack."""
+    def train(self, asked: Mapping[Trial, Mapping[str, float]]) -> dict[Trial, _TrialOutcome]:
+        """Train the networks of some trials; several of a model race."""
+        running = [self._begin(members) for members in self._stacks(asked)]
+        seconds = dict.fromkeys(asked, 0.0)
+        stopped: set[Trial] = set()
+        rounds = len(asked) // len(self.tables)
+        halvings = range(HALVINGS, -1, -1) if rounds > 1 else range(1)
+        epoch = 0
+        for place, halving in enumerate(halvings, start=1):
+            further, epoch = (self.length.epochs >> halving) - epoch, self.length.epochs >> halving
+            for members, training in running:
+                start = time.process_time()
+                training.advance(further)
+                for one in members:
+                    seconds[one.trial] += (time.process_time() - start) / len(members)
+            if halving:
+                stopped |= _stop_worst(running, ceil(rounds / 2**place))
+        outcomes = {}
+        for trial, (value, epochs, networks) in _gather_trials(running).items():
+            row = trial_row(trial[1], asked[trial], value, 0.0, epochs) | {"seconds": seconds[trial]}
+            if trial in stopped and row["state"] == "complete":
+                row["state"] = "stopped"
+            outcomes[trial] = _TrialOutcome(row, networks)
+        return outcomes
+
+    def _begin(self, members: list[_StackMember]) -> _RunningStack:
+        """Begin to train a stack."""
+        first = members[0]
+        training = StackTraining(
+            [one.learner for one in members],
+            self.length,
+            order_seed=seed_of(self.task.seed, first.trial[1], first.fold),
+            reflection=first.varying.reflection,
+            device=self.task.device,
+        )
+        return members, training
+
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None, at_once: int) -> FitResult:
+        """The networks of the best trial; those of an earlier session are trained once more, in the same company."""
         seconds = sum(row["seconds"] for row in rows[key])
         kept = best_trials(rows[key])
         if not kept:
             return FitResult(None, rows[key], seconds)
         number = kept[0]["number"]
-        if best is None or number != best.number:
-            stacks = self.stacks({name: mine[number]["params"] for name, mine in rows.items()})
-            best = self.train(next(stack for stack in stacks if key in stack), number)[key]
+        if best is None or number != best.row["number"]:
+            first = number - number % at_once
+            if first not in self._again:
+                again = {
+                    (name, row["number"]): row["params"] for name in rows for row in rows[name][first : first + at_once]
+                }
+                self._again[first] = self.train(again)
+            best = self._again[first][key, number]
         return FitResult(Compensator(self.inputs, best.networks, kept[0]["params"]), rows[key], seconds)
+
+
+def _stop_worst(running: list[_RunningStack], kept: int) -> set[Trial]:
+    """Stop the trials of each model that are not among so many best ones by now, unless they have ended."""
+    losses, going = defaultdict(list), set()
+    for members, training in running:
+        for one, loss, goes in zip(members, training.losses(), training.best.running.tolist(), strict=True):
+            losses[one.trial].append(loss)
+            going |= {one.trial} if goes else set()
+    order = sorted(losses, key=lambda trial: (trial[0], np.nan_to_num(np.mean(losses[trial]), nan=np.inf)))
+    per_model = len(order) // len({key for key, _ in order})
+    worst = {trial for place, trial in enumerate(order) if place % per_model >= kept} & going
+    for members, training in running:
+        for k, one in enumerate(members):
+            if one.trial in worst:
+                training.best.running[k] = False
+    return worst
+
+
+def _gather_trials(running: list[_RunningStack]) -> dict[Trial, tuple[float, int, tuple[Network, ...]]]:
+    """Mean validation loss [m^2] over the folds, the most epochs of a fold, and the networks, for each trial."""
+    ended: dict[Trial, list[tuple[int, float, int, list[Network]]]] = defaultdict(list)
+    for members, training in running:
+        parts = zip(members, training.losses(), training.best.epochs.tolist(), training.layers(), strict=True)
+        for one, loss, epochs, layers in parts:
+            ended[one.trial].append((one.fold, float(loss), epochs, one.networks(layers)))
+    return {
+        trial: (
+            float(np.mean([loss for _, loss, _, _ in folds])),
+            max(epochs for _, _, epochs, _ in folds),
+            tuple(network for _, _, _, networks in sorted(folds, key=lambda fold: fold[0]) for network in networks),
+        )
+        for trial, folds in ended.items()
+    }

@@ -26,6 +26,7 @@ from shipid.hybrid.method import Row, Space
 COUNT = "trials"  # attribute of a study: how many it will have
 DIGEST = "digest"  # attribute of a study: of the plan that it belongs to
 ROW, CHECKSUM = "row", "crc32"  # attributes of a trial: its row as it was added; of its cell and row
+TRIAL_STATES = {"complete": TrialState.COMPLETE, "stopped": TrialState.PRUNED, "diverged": TrialState.FAIL}
 REMEDY = "take the journal away, and searches that were interrupted begin again"
 
 
@@ -114,10 +115,10 @@ def _read_whole_lines(file: Path) -> list[bytes]:
 def frozen_trial(row: Row, space: Space, cell: str = "") -> FrozenTrial:
     """A trial of a cell that ended, as Optuna keeps it; what is not searched stands in its row alone."""
     searched = {name: value for name, value in row["params"].items() if name in space}
-    complete = row["state"] == "complete"
     return create_trial(
-        state=TrialState.COMPLETE if complete else TrialState.FAIL,
-        value=row["value"] if complete else None,
+        state=TRIAL_STATES[row["state"]],
+        value=row["value"] if row["state"] == "complete" else None,
+        intermediate_values={row["epochs"]: row["value"]} if row["state"] == "stopped" else None,
         params=searched,
         distributions={name: _widen_distribution(space[name], value) for name, value in searched.items()},
         user_attrs={ROW: row, CHECKSUM: _row_checksum(cell, row)},

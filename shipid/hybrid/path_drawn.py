@@ -89,7 +89,7 @@ class PathDrawn(SearchMethod):
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high); scales of a memory that is not taken are left out."""
-        idle = {f"{kind}_scale" for kind in MEMORY_KINDS if kind not in self.kinds}
+        idle = {f"{kind}_scale" for kind in MEMORY_KINDS if kind not in self.memory.kinds}
         return {name: pair for name, pair in super().ranges().items() if name not in idle}
 
     def left_out(self, point: Mapping[str, float]) -> frozenset[str]:
@@ -98,17 +98,10 @@ class PathDrawn(SearchMethod):
         return frozenset(set(MEMORY_KINDS) - set(taken))
 
     @property
-    def kinds(self) -> list[str]:
-        """Kinds of memory that the inputs hold."""
-        memory = self.memory
-        held = memory.history or memory.turned, memory.error, memory.observer
-        return [kind for kind, one in zip(MEMORY_KINDS, held, strict=True) if one]
-
-    @property
     def memories(self) -> tuple[int, ...]:
         """What validation chooses from, as places in `MEMORIES`."""
         choices = (*MEMORY_CHOICES, *OBSERVER_CHOICES) if self.memory.observer else MEMORY_CHOICES
-        kept = (tuple(kind for kind in choice if kind in self.kinds) for choice in choices)
+        kept = (tuple(kind for kind in choice if kind in self.memory.kinds) for choice in choices)
         return tuple(dict.fromkeys(map(MEMORIES.index, kept)))
 
     @validator(mode="after")

@@ -1,21 +1,22 @@
 """Training by PyTorch, with one loop, `minimise_losses`: stacks of small networks, and gated recurrent units.
 
-The K members of a stack share inputs, batches and structure; nothing that one computes depends on the others. One small
-network leaves a core waiting; nineteen of them as one batched product do not.
+The K members of a stack have equally many layers and samples; nothing that one computes depends on the others. One
+small network leaves a core waiting for Python; four of 16 units as one batched product do not. Wide ones gain nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from math import cos, pi
+from itertools import islice, pairwise
+from math import ceil, cos, pi
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from torch import Tensor
+from torch.nn.functional import pad
 
 from shipid.hybrid.method import Array
 
@@ -43,85 +44,153 @@ class Length:
     patience: int = 0
 
 
-@dataclass(frozen=True)
-class TrainedStack:
-    """What a stack of K members learned: the weights of its best epoch.
+@dataclass(frozen=True, eq=False)
+class Learner:
+    """One network to be trained, and its data.
 
-    layers : K tuples of (weight (i, o), bias (o,)) per layer. epochs : (K,) until the member stopped.
-    loss : (K,) best validation loss [m^2], per coordinate; NaN where a loss stopped being a number.
+    inputs : (n, d), normalised. targets : (n, m) [m]. training, validation : samples to learn from, and to watch.
+    settings : `layers` hidden layers of `units` tanh, `learning_rate`, `weight_decay` (AdamW; 0 is Adam), and
+        `input_dropout` and `hidden_dropout`, the probabilities to be dropped.
+    seed : of the initial weights and drop-out.
     """
 
-    layers: tuple[Layers, ...]
-    loss: Array
-    epochs: NDArray[np.int64]
+    inputs: Array
+    targets: Array
+    training: NDArray[np.int64]
+    validation: NDArray[np.int64]
+    settings: Mapping[str, float]
+    seed: int
+
+    @property
+    def widths(self) -> list[int]:
+        """Number of inputs, of units in each hidden layer, and of outputs."""
+        hidden = [int(self.settings["units"])] * int(self.settings["layers"])
+        return [self.inputs.shape[1], *hidden, self.targets.shape[1]]
 
 
-def train_stack(
-    inputs: Array,
-    targets: Array,
-    train_idx: NDArray[np.int64],
-    val_idx: NDArray[np.int64],
-    members: Sequence[Mapping[str, float]],
-    length: Length,
-    seeds: Sequence[int],
-    *,
-    order_seed: int = 0,
-    device: str = "cpu",
-) -> TrainedStack:
-    """Train K networks, sample -> target, on the mean squared error.
+class StackTraining:
+    """K networks, sample -> target, that are trained together on the mean squared error, some epochs at a time.
 
     Parameters
     ----------
-    inputs : (n, d), normalised; the same for all members. targets : (K, n, m) [m].
-    train_idx, val_idx : samples to learn from, and to watch.
-    members : hyperparameters of each: `layers` hidden layers of `units` tanh, alike for all, `learning_rate`,
-        `weight_decay` (AdamW; 0 is Adam), and `input_dropout` and `hidden_dropout`, the probabilities to be dropped.
-    seeds : (K,) of the initial weights and drop-out of each member.
-    order_seed : of the order of the samples in batches, the same for all members.
+    learners : with as many layers, inputs, outputs and samples each. Narrower ones are padded: what is added to a
+        weight is 0, and stays 0.
+    order_seed : of the order of the samples in batches, the same for all.
+    reflection : (d, d) of inputs, image = inputs @ it: x is made even and y odd; None without a mirror.
     device : a PyTorch device; random numbers are drawn on the CPU.
 
     A member that diverges keeps its best weights before that; others go on.
     """
-    num_samples = len(train_idx)
-    num_layers, units = int(members[0]["layers"]), int(members[0]["units"])
-    widths = [inputs.shape[1], *[units] * num_layers, targets.shape[2]]
-    learning = _single_tensor([one["learning_rate"] for one in members], device)[:, None]
-    dropout = [[one[name] for one in members] for name in ("input_dropout", *["hidden_dropout"] * num_layers)]
-    x, y = _single_tensor(inputs[train_idx], device), _single_tensor(targets[:, train_idx], device)
-    x_val, y_val = _single_tensor(inputs[val_idx], device), _single_tensor(targets[:, val_idx], device)
 
-    generators = [torch.Generator().manual_seed(int(seed)) for seed in seeds]
-    order = torch.Generator().manual_seed(order_seed)
-    weights = initial_weights(widths, generators).to(device)
-    layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, widths)]  # leaves, same memory
-
-    def loss(rows: Tensor | slice) -> Tensor:
-        x_batch, y_batch = x[rows], y[:, rows]
-        masks = [  # for the input of each layer, or None where no member drops any
-            draw_dropout(rates, (len(x_batch), width), generators).to(device) if any(rates) else None
-            for rates, width in zip(dropout, widths[:-1], strict=True)
+    def __init__(
+        self,
+        learners: Sequence[Learner],
+        length: Length,
+        *,
+        order_seed: int = 0,
+        reflection: Array | None = None,
+        device: str = "cpu",
+    ) -> None:
+        self.learners = learners
+        widths = [one.widths for one in learners]
+        self.widest = list(map(max, zip(*widths, strict=True)))
+        settings = [one.settings for one in learners]
+        learning = _single_tensor([one["learning_rate"] for one in settings], device)[:, None]
+        dropout = [
+            [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(self.widest) - 2))
         ]
-        return (stack_outputs(x_batch, layers, masks) - y_batch).square().mean(dim=(1, 2))
+        (x, y), watched = (
+            (self._inputs(samples, reflection, device), self._targets(samples, device))
+            for samples in ([one.training for one in learners], [one.validation for one in learners])
+        )
+        num_samples = y.shape[1]
+        generators = [torch.Generator().manual_seed(int(one.seed)) for one in learners]
+        order = torch.Generator().manual_seed(order_seed)
+        weights = initial_weights(widths, generators).to(device)
+        layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, self.widest)]  # leaves
 
-    batch = min(length.batch or num_samples, num_samples)
-    best = minimise_losses(
-        weights,
-        [leaf for layer in layers for leaf in layer],
-        [one["weight_decay"] for one in members],
-        length,
-        batches=lambda: (  # a single batch stays in order
-            [slice(None)] if batch == num_samples else torch.split(torch.randperm(num_samples, generator=order), batch)
-        ),
-        rate=lambda _: learning,
-        loss=loss,
-        watched=lambda: (stack_outputs(x_val, layers) - y_val).square().mean(dim=(1, 2)),
-    )
-    arrays = [
-        (w.cpu().numpy().astype(float), b[:, 0].cpu().numpy().astype(float)) for w, b in _layer_views(best.kept, widths)
-    ]
-    losses = torch.where(best.finite & best.best.isfinite(), best.best, torch.nan).cpu().numpy().astype(float)
-    kept = tuple(tuple((w[k], b[k]) for w, b in arrays) for k in range(len(members)))
-    return TrainedStack(kept, losses, best.epochs.cpu().numpy())
+        def loss(rows: Tensor | slice) -> Tensor:
+            seen = torch.cat([side[:, rows] for side in x], dim=1)
+            masks = [  # for the input of each layer, or None where no member drops any
+                draw_dropout(rates, seen.shape[1], sizes, generators).to(device) if any(rates) else None
+                for rates, *sizes in zip(dropout, *widths, strict=False)
+            ]
+            return _stack_losses(stack_outputs(seen, layers, masks), y[:, rows], len(x) == 2)
+
+        def watch() -> Tensor:
+            return _stack_losses(stack_outputs(torch.cat(watched[0], dim=1), layers), watched[1], len(x) == 2)
+
+        batch = min(length.batch or num_samples, num_samples)
+        self.best = BestEpochs(weights, length.patience)
+        self._epochs = minimise_losses(
+            weights,
+            [leaf for layer in layers for leaf in layer],
+            [one["weight_decay"] for one in settings],
+            length,
+            self.best,
+            batches=lambda: (  # a single batch stays in order
+                [slice(None)]
+                if batch == num_samples
+                else torch.split(torch.randperm(num_samples, generator=order), batch)
+            ),
+            rate=lambda _: learning,
+            loss=loss,
+            watched=watch,
+        )
+
+    def _inputs(self, samples: Sequence[NDArray[np.int64]], reflection: Array | None, device: str) -> list[Tensor]:
+        """Inputs of some samples of each, and then their images if there is a mirror, (K or 1, n, d)."""
+        first = self.learners[0]
+        alike = all(
+            one.inputs is first.inputs and rows is samples[0] for one, rows in zip(self.learners, samples, strict=True)
+        )
+        own = [one.inputs[rows] for one, rows in zip(self.learners[: 1 if alike else None], samples, strict=False)]
+        plain = np.stack(own)
+        both = [plain] if reflection is None else [plain, plain @ reflection]
+        return [_single_tensor(side, device) for side in both]
+
+    def _targets(self, samples: Sequence[NDArray[np.int64]], device: str) -> Tensor:
+        """Targets (K, n, m) of some samples of each."""
+        own = [one.targets[rows] for one, rows in zip(self.learners, samples, strict=True)]
+        return _single_tensor(np.stack(own), device)
+
+    def advance(self, epochs: int | None = None) -> None:
+        """Train for so many further epochs, by default to the end."""
+        with threadpool_limits(1):  # for the same digits anywhere; networks as small as these are slower on more
+            for _ in islice(self._epochs, epochs):
+                pass
+
+    def losses(self) -> Array:
+        """Best validation losses (K,) [m^2] so far, per coordinate; NaN where a loss stopped being a number."""
+        best = self.best
+        kept = torch.where(best.finite & best.best.isfinite(), best.best, torch.nan)
+        return np.asarray(kept.cpu().numpy().astype(float))
+
+    def layers(self) -> tuple[Layers, ...]:
+        """Weight (i, o) and bias (o,) of each layer of each network, of its best epoch."""
+        arrays = [
+            (w.detach().cpu().numpy().astype(float), b[:, 0].detach().cpu().numpy().astype(float))
+            for w, b in _layer_views(self.best.kept, self.widest)
+        ]
+        return tuple(
+            tuple((w[k, :i, :o], b[k, :o]) for (w, b), (i, o) in zip(arrays, pairwise(one.widths), strict=True))
+            for k, one in enumerate(self.learners)
+        )
+
+
+def _stack_losses(made: Tensor, targets: Tensor, mirrored: bool) -> Tensor:
+    """Mean squared errors (K,) of outputs (K, n, m); mirrored ones (K, 2 n, m) are followed by those of the images."""
+    if mirrored:
+        made = mirrored_outputs(made)
+    return (made - targets).square().mean(dim=(1, 2))
+
+
+def mirrored_outputs(made: Tensor) -> Tensor:
+    """Outputs (..., n, 2 r), x made even and y odd, of those of inputs and then of their images (..., 2 n, 2 r)."""
+    sign = torch.ones(made.shape[-1], device=made.device)
+    sign[len(sign) // 2 :] = -1.0
+    plain, image = made.chunk(2, dim=-2)
+    return (plain + sign * image) / 2
 
 
 def minimise_losses(
@@ -129,41 +198,41 @@ def minimise_losses(
     leaves: Sequence[Tensor],
     decay: Sequence[float],
     length: Length,
+    best: BestEpochs,
     *,
     batches: Callable[[], Iterable[Tensor | slice]],
     rate: Callable[[int], Tensor],
     loss: Callable[[Tensor | slice], Tensor],
     watched: Callable[[], Tensor],
-) -> BestEpochs:
-    """Minimise the losses of K members by AdamW, and keep the weights of the best epoch of each.
+) -> Iterator[None]:
+    """Minimise the losses of K members by AdamW, an epoch at a time.
 
     Parameters
     ----------
     weights : (K, P), changed in place. leaves : parts of the same memory that have gradients, in order.
-    decay : (K,) of the weights.
+    decay : (K,) of the weights. best : keeps the weights of the best epoch of each.
     batches : rows of the batches of the next epoch. rate : epoch, from 0 -> learning rates (K, 1).
     loss : rows -> losses (K,). watched : validation losses (K,) now.
     """
-    adam, watch = Adam(weights, decay), BestEpochs(weights, length.patience)
-    with threadpool_limits(1):  # for the same digits anywhere; networks as small as these are slower on more
-        for epoch in range(length.epochs):
-            total = torch.zeros(len(weights), device=weights.device)
-            for rows in batches():
-                losses = loss(rows)
-                gradients = torch.autograd.grad(losses.sum(), leaves)
-                with torch.no_grad():
-                    adam.step(torch.cat([one.reshape(len(weights), -1) for one in gradients], dim=1), rate(epoch))
-                total += losses.detach()
+    adam = Adam(weights, decay)
+    for epoch in range(length.epochs):
+        total = torch.zeros(len(weights), device=weights.device)
+        for rows in batches():
+            losses = loss(rows)
+            gradients = torch.autograd.grad(losses.sum(), leaves)
             with torch.no_grad():
-                watch.compare(total, watched())
-            if not watch.running.any():
-                break
-    return watch
+                adam.step(torch.cat([one.reshape(len(weights), -1) for one in gradients], dim=1), rate(epoch))
+            total += losses.detach()
+        with torch.no_grad():
+            best.compare(total, watched())
+        yield
+        if not best.running.any():
+            return
 
 
 def stack_outputs(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
-    """Return outputs (K, n, m) of K networks for inputs (n, d): tanh layers, a linear one; masks (K, n, i) drop."""
-    h = x.expand(len(layers[0][0]), *x.shape)
+    """Return outputs (K, n, m) of K networks for inputs (K or 1, n, d): tanh layers, a linear one; masks drop."""
+    h = x.expand(len(layers[0][0]), *x.shape[1:])
     for i, (weight, bias) in enumerate(layers):
         mask = masks[i] if masks else None
         h = torch.baddbmm(bias, h if mask is None else h * mask, weight)
@@ -172,14 +241,19 @@ def stack_outputs(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
     return h
 
 
-def initial_weights(widths: Sequence[int], generators: Sequence[torch.Generator]) -> Tensor:
-    """Draw PyTorch's default start of `Linear`, U(-1, 1) / sqrt(i), as flat weights (K, P), a member per generator."""
+def initial_weights(widths: Sequence[Sequence[int]], generators: Sequence[torch.Generator]) -> Tensor:
+    """Draw PyTorch's default start of `Linear`, U(-1, 1) / sqrt(i), as flat weights (K, P), a member per generator.
+
+    widths : of each member; those that are less than the widest are padded with zeros.
+    """
+    widest = list(map(max, zip(*widths, strict=True)))
     members = []
-    for generator in generators:
+    for generator, own in zip(generators, widths, strict=True):
         parts = []
-        for i, o in pairwise(widths):
+        for (i, o), (rows, columns) in zip(pairwise(own), pairwise(widest), strict=True):
             draws = [torch.empty(shape).uniform_(-1.0, 1.0, generator=generator) for shape in ((o, i), (o,))]
-            parts += [draws[0].T.reshape(-1) / i**0.5, draws[1] / i**0.5]
+            weight, bias = draws[0].T / i**0.5, draws[1] / i**0.5
+            parts += [pad(weight, (0, columns - o, 0, rows - i)).reshape(-1), pad(bias, (0, columns - o))]
         members.append(torch.cat(parts))
     return torch.stack(members)
 
@@ -238,17 +312,24 @@ def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tens
     return views
 
 
-def draw_dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:
-    """Draw inverted drop-out (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0."""
-    return torch.stack(
-        [
-            # A member without drop-out draws nothing, alone or in company.
-            torch.empty(shape).bernoulli_(1 - p, generator=generator).div_(1 - p if p < 1 else 1.0)
-            if p > 0
-            else torch.ones(shape)
-            for p, generator in zip(rates, generators, strict=True)
-        ]
-    )
+def draw_dropout(
+    rates: Sequence[float], samples: int, widths: Sequence[int], generators: Sequence[torch.Generator]
+) -> Tensor:
+    """Draw inverted drop-out (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0.
+
+    widths : of each member; the widest is i, and what lies beyond the width of another is 0. A member without drop-out
+    draws nothing, alone or in company.
+    """
+    masks = []
+    for p, width, generator in zip(rates, widths, generators, strict=True):
+        if p > 0:  # the draws of `bernoulli_`, bit by bit, in less than half of its time
+            bits = torch.empty((samples, width), dtype=torch.int64).random_(generator=generator)
+            kept = bits.bitwise_and_(2**53 - 1) < ceil((1 - p) * 2**53)
+            mask = kept.float().div_(1 - p if p < 1 else 1.0)
+        else:
+            mask = torch.ones(samples, width)
+        masks.append(pad(mask, (0, max(widths) - width)))
+    return torch.stack(masks)
 
 
 def _single_tensor(values: object, device: str) -> Tensor:
@@ -281,16 +362,21 @@ def train_gated(
     def loss(rows: Tensor | slice) -> Tensor:
         return _gated_loss(layers, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows])
 
-    best = minimise_losses(
+    best = BestEpochs(weights, length.patience)
+    epochs = minimise_losses(
         weights,
         list(layers.values()),
         [decay],
         length,
+        best,
         batches=lambda: torch.split(torch.randperm(len(outputs), generator=generator), length.batch),
         rate=lambda epoch: torch.tensor([[learning_rate * (1 + cos(pi * epoch / length.epochs)) / 2]]),
         loss=loss,
         watched=lambda: _gated_loss(layers, *watched),
     )
+    with threadpool_limits(1):
+        for _ in epochs:
+            pass
     kept = {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
     return kept, int(best.epochs[0])
 
@@ -317,8 +403,5 @@ def _gated_loss(layers: Mapping[str, Tensor], seen: Sequence[tuple[Tensor, Tenso
     full = torch.cat([hidden[0], now], dim=1)
     made = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
     if len(seen) == 2:
-        sign = torch.ones(made.shape[1])
-        sign[len(sign) // 2 :] = -1.0
-        plain, image = made.chunk(2)
-        made = (plain + sign * image) / 2
+        made = mirrored_outputs(made)
     return (made - outputs).square().mean()[None]
