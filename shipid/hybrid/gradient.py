@@ -11,7 +11,7 @@ import time
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, pairwise
 from math import ceil
 
 import numpy as np
@@ -162,18 +162,17 @@ class _Trainer:
         running = [self._begin(members) for members in self._stacks(asked)]
         seconds = dict.fromkeys(asked, 0.0)
         stopped: set[Trial] = set()
-        rounds = len(asked) // len(self.tables)
-        halvings = range(HALVINGS, -1, -1) if rounds > 1 else range(1)
-        epoch = 0
-        for place, halving in enumerate(halvings, start=1):
-            further, epoch = (self.length.epochs >> halving) - epoch, self.length.epochs >> halving
+        per_model = len(asked) // len(self.tables)
+        ends = [self.length.epochs >> halving for halving in range(HALVINGS if per_model > 1 else 0, -1, -1)]
+        for place, (before, epoch) in enumerate(pairwise([0, *filter(None, ends)]), start=1):
             for members, training in running:
                 start = time.process_time()
-                training.advance(further)
+                training.advance(epoch - before)
+                spent = (time.process_time() - start) / len(members)
                 for one in members:
-                    seconds[one.trial] += (time.process_time() - start) / len(members)
-            if halving:
-                stopped |= _stop_worst(running, ceil(rounds / 2**place))
+                    seconds[one.trial] += spent
+            if epoch < self.length.epochs:
+                stopped |= _stop_worst(running, ceil(per_model / 2**place))
         outcomes = {}
         for trial, (value, epochs, networks) in _gather_trials(running).items():
             row = trial_row(trial[1], asked[trial], value, 0.0, epochs) | {"seconds": seconds[trial]}

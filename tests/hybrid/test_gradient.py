@@ -7,7 +7,7 @@ import torch
 from shipid.hybrid.features import Inputs
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
-from shipid.hybrid.training import train_stack
+from shipid.hybrid.training import StackTraining
 from tests.hybrid.tasks import compensation, tune
 
 torch.set_num_threads(1)
@@ -37,16 +37,36 @@ def targets(columns):
 def test_equal_architectures_train_as_one_stack_and_others_alone(columns, targets, monkeypatch):
     stacks = []
 
-    def counted(inputs, targets, *args, **kwargs):
-        stacks.append(len(targets))
-        return train_stack(inputs, targets, *args, **kwargs)
+    def counted(learners, *args, **kwargs):
+        stacks.append(len(learners))
+        return StackTraining(learners, *args, **kwargs)
 
-    monkeypatch.setattr("shipid.hybrid.gradient.train_stack", counted)
+    monkeypatch.setattr("shipid.hybrid.gradient.StackTraining", counted)
     tune(columns, COMMANDS, targets, [FOLD], SMALL, seed=4)
     assert stacks == [2] * 3
     stacks.clear()
     tune(columns, COMMANDS, targets, [FOLD], SEARCHED.model_copy(update={"epochs": 2}), seed=4)
     assert stacks == [1] * 6
+
+
+def test_narrow_networks_of_a_race_train_in_stacks_and_the_best_goes_to_the_end(columns, targets, monkeypatch):
+    stacks = []
+
+    def counted(learners, *args, **kwargs):
+        stacks.append(len(learners))
+        return StackTraining(learners, *args, **kwargs)
+
+    monkeypatch.setattr("shipid.hybrid.gradient.StackTraining", counted)
+    race = {"trials": 5, "at_once": 3, "layers": 1, "units": (4, 20), "epochs": 128, "patience": 0}
+    tuned = tune(columns, COMMANDS, targets, [FOLD], PathTrained(**race), seed=4)
+    assert stacks == [4, 2, 4]  # six networks of three trials, then four
+    for fit in tuned.values():
+        rows = fit.trials
+        assert [row["state"] == "complete" for row in rows].count(True) == 2  # one a round
+        for part in (rows[:3], rows[3:]):
+            assert [row["epochs"] for row in part if row["state"] == "complete"] == [128]
+        assert min(len(rows), *(row["epochs"] for row in rows)) >= 2
+        assert {row["epochs"] for row in rows if row["state"] == "stopped"} <= {2, 4}  # 3, 2 and 1 trials go on
 
 
 def test_the_objective_is_the_mean_loss_of_the_folds(columns, targets):

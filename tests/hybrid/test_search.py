@@ -77,9 +77,18 @@ def task_in(here: World, kind: str, journal: Journal | None) -> Task:
     return replace(here.task(cases_of(here, kind), seed=2), journal=journal, cells={"a": "a+way-N0006-s2"})
 
 
-@pytest.mark.parametrize(("kind", "after"), [*((kind, 1 + len(kind) % 2) for kind in SEARCHING), ("path-trained", 12)])
-def test_a_search_that_was_interrupted_ends_with_the_same_digits(kind: str, after: int, here: World, tmp_path) -> None:
-    method = longer(kind)
+CUT = [(kind, 1 + len(kind) % 2, {}) for kind in SEARCHING]
+RACE = {"at_once": 4, "epochs": 64, "mirror": True, "groups": (0.5, 4.0)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "after", "more"),
+    [*CUT, ("path-trained", 12, {}), *(("path-trained", after, RACE) for after in (6, 13))],
+)
+def test_a_search_that_was_interrupted_ends_with_the_same_digits(
+    kind: str, after: int, more: dict[str, Any], here: World, tmp_path
+) -> None:
+    method = longer(kind, **more)
     whole = digits(method.fit(task_in(here, kind, None)), here, kind)
     file = tmp_path / "trials.log"
     journal = Stopping(file)

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from shipid.hybrid import training
-from shipid.hybrid.training import Length, train_stack
+from shipid.hybrid.training import Learner, Length, StackTraining
 
 torch.set_num_threads(1)
 TRAIN, VAL = np.arange(96), np.arange(96, 128)
@@ -29,6 +29,15 @@ def problem():
     return x, y
 
 
+def train_stack(x, y, training_idx, val_idx, members, length, seeds, order_seed=0, **options):
+    """Train to the end: a member for each of the targets (K, n, m)."""
+    pieces = zip(y, members, seeds, strict=True)
+    learners = [Learner(x, mine, training_idx, val_idx, member, seed) for mine, member, seed in pieces]
+    stack = StackTraining(learners, length, order_seed=order_seed, **options)
+    stack.advance()
+    return stack
+
+
 def torch_network(seed, widths):
     torch.manual_seed(seed)
     parts = []
@@ -46,7 +55,9 @@ def assert_same_weights(layers, network, tolerance):
 
 def test_networks_start_as_those_of_pytorch():
     widths = [5, 16, 16, 4]
-    flat = training.initial_weights(widths, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)])
+    flat = training.initial_weights(
+        [widths] * 2, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)]
+    )
     for k, seed in enumerate((11, 12)):
         layers = [(w[k].numpy(), b[k, 0].numpy()) for w, b in training._layer_views(flat, widths)]
         assert_same_weights(layers, torch_network(seed, widths), 1e-7)
@@ -67,7 +78,7 @@ def test_the_loop_is_that_of_torch_optim(problem, decay):
         optimiser.zero_grad()
         torch.nn.functional.mse_loss(network(inputs), targets).backward()
         optimiser.step()
-    assert_same_weights(trained.layers[0], network, 2e-5)
+    assert_same_weights(trained.layers()[0], network, 2e-5)
 
 
 def test_a_member_does_not_notice_its_company(problem):
@@ -83,24 +94,46 @@ def test_a_member_does_not_notice_its_company(problem):
     for k in range(3):
         alone = {name: value[k] for name, value in wide.items()}
         one = train_stack(x, y[k : k + 1], TRAIN, VAL, *settings(**alone, **shared), [k + 1], order_seed=5)
-        assert one.epochs[0] == together.epochs[k]
-        assert one.loss[0] == pytest.approx(together.loss[k], rel=1e-4)
-        for mine, theirs in zip(one.layers[0], together.layers[k], strict=True):
+        assert one.best.epochs[0] == together.best.epochs[k]
+        assert one.losses()[0] == pytest.approx(together.losses()[k], rel=1e-4)
+        for mine, theirs in zip(one.layers()[0], together.layers()[k], strict=True):
             np.testing.assert_allclose(mine[0], theirs[0], atol=2e-4)
+
+
+def test_a_narrow_member_does_not_notice_that_it_is_padded_nor_that_it_is_trained_in_parts(problem):
+    x, y = problem
+    widths, run = (3, 12, 7), {"epochs": 40, "patience": 6, "input_dropout": 0.1, "hidden_dropout": 0.2}
+    members, length = settings(3, units=widths, **run)
+    learners = [Learner(x, y[k], TRAIN, VAL, members[k], k) for k in range(3)]
+    stack = StackTraining(learners, length)
+    for part in (7, 3, None):
+        stack.advance(part)
+    for k, units in enumerate(widths):
+        alone = train_stack(x, y[k : k + 1], TRAIN, VAL, *settings(units=units, **run), [k])
+        assert alone.losses()[0] == pytest.approx(stack.losses()[k], rel=1e-3)
+        assert [w.shape for w, _ in alone.layers()[0]] == [w.shape for w, _ in stack.layers()[k]]
+
+
+@pytest.mark.parametrize("rate", [0.1, 0.5, 0.999])
+def test_drop_out_is_that_of_torch_bit_by_bit(rate):
+    one, other = torch.Generator().manual_seed(3), torch.Generator().manual_seed(3)
+    drawn = training.draw_dropout([rate], 40, [30], [one])[0]
+    assert torch.equal(drawn, torch.empty(40, 30).bernoulli_(1 - rate, generator=other).div_(1 - rate))
+    assert torch.equal(one.get_state(), other.get_state())
 
 
 def test_early_stopping_keeps_the_best_epoch(problem):
     x, y = problem
     y = np.random.default_rng(1).normal(size=y.shape)  # nothing to learn: the validation loss soon rises
     run = {"learning_rate": 3e-2, "units": 64}
-    losses = [train_stack(x, y[:1], TRAIN, VAL, *settings(**run, epochs=n), [4]).loss[0] for n in range(1, 40)]
+    losses = [train_stack(x, y[:1], TRAIN, VAL, *settings(**run, epochs=n), [4]).losses()[0] for n in range(1, 40)]
     best = int(np.argmin(losses)) + 1
     stopped = train_stack(x, y[:1], TRAIN, VAL, *settings(**run, epochs=500, patience=12), [4])
     assert best < 25
-    assert stopped.epochs[0] == best + 12
-    assert stopped.loss[0] == losses[best - 1]
+    assert stopped.best.epochs[0] == best + 12
+    assert stopped.losses()[0] == losses[best - 1]
     kept = train_stack(x, y[:1], TRAIN, VAL, *settings(**run, epochs=best), [4])
-    np.testing.assert_array_equal(stopped.layers[0][0][0], kept.layers[0][0][0])
+    np.testing.assert_array_equal(stopped.layers()[0][0][0], kept.layers()[0][0][0])
 
 
 def test_a_diverged_member_harms_nobody(problem):
@@ -109,5 +142,5 @@ def test_a_diverged_member_harms_nobody(problem):
     broken[1, 3, 2] = np.nan
     config = settings(3, epochs=10, batch=32)
     good, bad = (train_stack(x, targets, TRAIN, VAL, *config, [1, 2, 3]) for targets in (y, broken))
-    assert np.isnan(bad.loss).tolist() == [False, True, False]
-    np.testing.assert_array_equal(bad.loss[[0, 2]], good.loss[[0, 2]])
+    assert np.isnan(bad.losses()).tolist() == [False, True, False]
+    np.testing.assert_array_equal(bad.losses()[[0, 2]], good.losses()[[0, 2]])
