@@ -92,3 +92,17 @@ def test_the_statistics_are_those_of_the_training_windows(columns, targets):
     np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
     assert after.features == before.features
     assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
+
+
+def test_a_mirrored_ship_gets_the_mirrored_path_and_the_loss_is_that_of_the_saved_networks(columns, targets):
+    """Scales of groups and the mirror are in the weights: plain networks predict."""
+    settings = {"mirror": True, "groups": (0.25, 4.0), "input_dropout": 0.0, "hidden_dropout": 0.0}
+    tuned = tune(columns, COMMANDS, targets, [FOLD], SMALL.model_copy(update=settings), seed=4)["high-1"]
+    odd = ("psi", "v", "r", "beta_w", "port.delta", "starboard.delta")
+    image = {name: -values if name in odd else values for name, values in columns.items()}
+    here, there = (compensation(tuned.corrector, seen) for seen in (columns, image))
+    assert np.abs(here).max() > 0.01
+    np.testing.assert_allclose(there, here * [1.0, -1.0], atol=1e-9)
+    best = min(tuned.trials, key=lambda row: row["value"])
+    assert {"motion_scale", "command_scale", "wind_scale"} < set(best["params"])
+    assert np.square(here - targets["high-1"])[:, FOLD[1]].mean() == pytest.approx(best["value"], rel=1e-4)
