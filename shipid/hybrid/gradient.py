@@ -29,7 +29,7 @@ Trial = tuple[str, int]
 """Model and number."""
 NARROW = 32  # units up to which a core waits for Python: networks of different widths train faster as one stack
 STACK = 4  # of them; with more nothing is gained
-HALVINGS = 6  # of the epochs down to those after which the first trials of a race stop
+HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
 
 def tune_gradient(

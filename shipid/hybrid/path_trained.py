@@ -33,7 +33,7 @@ class PathTrained(SearchMethod):
     mirror : whether port and starboard are mirror images, where the inputs allow it.
     groups : range of the scales, one for each kind of input (motion, command, wind, and of the memory), that divide
         the inputs in their standard deviations: searched by their logarithm. None: all are 1.
-    at_once : trials that are proposed at a time. More than one race: the better half goes on, after 1/64, 1/32, ... of
+    at_once : trials that are proposed at a time. More than one race: the better half goes on, after 1/16, 1/8, ... of
         the epochs.
     """
 
