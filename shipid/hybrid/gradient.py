@@ -2,7 +2,7 @@
 
 With `at_once` above 1 so many trials are proposed at a time, and race: the better half of those of a model goes on
 (successive halving: Jamieson and Talwalkar, 2016). Where all trials run to their end, most of the time goes into those
-that are hopeless after fifty epochs.
+that are hopeless early.
 """
 
 from __future__ import annotations
