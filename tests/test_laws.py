@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipid import document as documents
-from shipid.engine.lowering import lower_function
+from shipid.engine.torch import lower_function
 from shipid.physics import GIVEN, MOTION, TERMS
 from shipid.physics.grammar import Grammar
 from shipid.physics.signals import SIGNALS, rows_of_role

@@ -10,7 +10,7 @@ import pandas as pd
 from shipid.data.checks import check_dataset, travelled_path
 from shipid.data.dataset import Dataset, stretches_by_run, stretches_of_runs
 from shipid.physics.signals import is_steering
-from shipid.study.kinds import kinds_of_runs, longest_piece
+from shipid.study.prepare import kinds_of_runs, longest_piece
 
 LEAST_OF_A_KIND = 3  # runs of a kind from which one may be set aside: two are left that train
 

@@ -17,10 +17,9 @@ from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
 from shipid.observer import Observer, run_observer
 from shipid.predictor import Predictor
-from shipid.study import foundations, run, store
+from shipid.study import cells, run, store
 from shipid.study import prepare as preparing
-from shipid.study.cells import accuracy_of
-from shipid.study.foundations import predictions
+from shipid.study.cells import accuracy_of, predictions
 from shipid.study.plan import Plan, whole_unit
 from shipid.study.prepare import instants_of, prepare
 from shipid.study.results import read_results
@@ -88,7 +87,7 @@ def test_what_cannot_be_fitted_says_what_it_was(
     def fails(*_: Any, **__: Any) -> Any:
         raise DataError("no")
 
-    monkeypatch.setattr(foundations, "chosen_observer", fails)
+    monkeypatch.setattr(cells, "chosen_observer", fails)
     monkeypatch.setattr(solve, "identify", fails)
     plan, dataset = study(recorded, [WRONG, family])
     prepared = prepare(plan, dataset)

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from shipid.logs.kinds import LOW_SPEED, RANDOM
-from shipid.study.kinds import kinds_of_runs
-from shipid.study.prepare import obtain_runs
+from shipid.study.prepare import kinds_of_runs, obtain_runs
 from tests.study.tiny import logged, tiny_plan
 
 T = np.arange(0.0, 200.0)
