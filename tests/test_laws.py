@@ -20,7 +20,7 @@ from shipid.engine.torch import lower_function
 from shipid.physics import GIVEN, MOTION, TERMS
 from shipid.physics.grammar import Grammar
 from shipid.physics.signals import SIGNALS, rows_of_role
-from shipid.simulation.sea import wave_loads
+from shipid.simulation.weather import wave_loads
 from shipid.vessel.bindings import bind_document
 from shipid.vessel.load import Vessel, check_document, load_vessel
 from shipid.vessel.perturb import uniform_draw

@@ -47,7 +47,7 @@ def simulate_command(
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
     """A log of a vessel: manoeuvres by a document."""
     from shipid.files import write_table
-    from shipid.simulation.scripted import simulate_script
+    from shipid.simulation.truth import simulate_script
 
     check_output(out, endings=TABLES)
     ship = shipid.load_vessel(vessel)

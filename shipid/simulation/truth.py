@@ -1,4 +1,4 @@
-"""Simulated truth of a study: random manoeuvres, weather and sea, simulated and logged like a sea trial."""
+"""Simulated runs, logged like a sea trial: the truth of a study, drawn at random, and a document of manoeuvres."""
 
 from __future__ import annotations
 
@@ -9,20 +9,28 @@ import numpy as np
 import pandas as pd
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from shipid import document as documents
 from shipid.arguments import check_class, whole_steps
+from shipid.capacity import excess_memory_words
 from shipid.checked import CheckedModel
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics.signals import ACTUAL, is_output, measurable_signals
-from shipid.simulation import gusts
 from shipid.simulation.approach import Controls
 from shipid.simulation.draw import ManoeuvreDraw, range_limits
-from shipid.simulation.gusts import Gusts
 from shipid.simulation.log import state_column
-from shipid.simulation.manoeuvre import Manoeuvre, order_keys, order_unit
+from shipid.simulation.manoeuvre import KINDS, Manoeuvre, order_keys, order_unit
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.sea import Sea, draw_components, share_outside, wave_loads, wave_table_range
 from shipid.simulation.sensors import Sensor, measure_record
+from shipid.simulation.weather import (
+    Gusts,
+    Sea,
+    draw_components,
+    gust_series,
+    share_outside,
+    wave_loads,
+    wave_table_range,
+)
 from shipid.units import DEGREE, percent_text
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
@@ -35,6 +43,7 @@ NotNegative = Annotated[
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
+Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 
 class Truth(CheckedModel, BaseModel):
@@ -177,7 +186,7 @@ def simulate_truth(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     if truth.gusts is not None and "V_w" in environment:
         instants = np.arange(whole_steps(truth.length, truth.step) + 1, dtype=float)
         mean = environment["V_w"]
-        environment["V_w"] = mean + gusts.gust_series(truth.gusts, mean, truth.step * instants, keys)
+        environment["V_w"] = mean + gust_series(truth.gusts, mean, truth.step * instants, keys)
     try:
         frame = perform_manoeuvres(
             vessel,
@@ -227,3 +236,55 @@ def _draw_weather(truth: Truth, vessel: Vessel) -> tuple[dict[str, Array], Array
         "beta_c": between("beta_c", around, DEGREE),
     }
     return {name: weather[name] for name in vessel_dynamics(vessel).environment}, between("chi", around, DEGREE)
+
+
+class Script(BaseModel):
+    """Given manoeuvres: blocks with a `kind` and the keys of the kind, a run each; times in s."""
+
+    model_config = ConfigDict(extra="forbid")
+    manoeuvre: Annotated[list[dict[str, Any]], Field(min_length=1)]
+    step: Annotated[Positive, Field(description="s, of the integration")] = 0.05
+    interval: Annotated[Positive, Field(description="s between logged rows, a multiple of step")] = 1.0
+
+
+def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
+    """Simulate a vessel by the manoeuvres of a document; the columns are those of a dataset.
+
+    name : path of a TOML document. Its `[[manoeuvre]]` blocks are performed in calm water.
+
+    Raises DocumentError with file, path and remedy for what this vessel cannot perform.
+    """
+    file = documents.find_document(name, "studies")
+    document = documents.read_document(file)
+    try:
+        if "truth" in document:
+            raise DocumentError("is a study: simulate it by its name, with --set truth.vessel=...")
+        script = documents.parse_model(Script, document, file)
+        manoeuvres = _script_manoeuvres(script, vessel)
+        length = max(one.length for one in manoeuvres)
+        if length > LONGEST:
+            raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s, make it shorter", path="manoeuvre")
+        instants = len(manoeuvres) * length / script.step
+        if fault := excess_memory_words(instants * 2 * len(vessel_dynamics(vessel).commands)):
+            raise DocumentError(f"{len(manoeuvres)} runs in steps of {script.step:g} s {fault}", path="step")
+        frame = perform_manoeuvres(vessel, manoeuvres, step=script.step, interval=script.interval)
+    except ShipidError as error:
+        raise DocumentError(error.message, file=file, path=error.path) from None
+    return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
+
+
+def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
+    """The manoeuvres of a document, which this vessel can perform."""
+    controls, manoeuvres = Controls(vessel), []
+    for place, block in enumerate(script.manoeuvre):
+        kind, where = str(block.get("kind", "")), f"manoeuvre.{place}"
+        if kind not in KINDS:
+            raise DocumentError(f"{kind!r} is no kind of manoeuvre: {suggest_name(kind, KINDS)}", path=f"{where}.kind")
+        rest = {key: value for key, value in block.items() if key != "kind"}
+        one: Manoeuvre = documents.parse_model(KINDS[kind], rest, None, where)
+        try:
+            one.check(controls)
+        except DocumentError as error:
+            raise DocumentError(error.message, path=path_in_block(error.path, where)) from None
+        manoeuvres.append(one)
+    return manoeuvres

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms"), np.nan)  # of no physics
 Errors = dict[tuple[str, str], tuple[Array, float]]
+Array = np.ndarray
 
 
 class Work(NamedTuple):
@@ -259,9 +260,6 @@ def _predictor(
         run_up=windows.num_past * windows.step if foundation.observer is not None else 0.0,
         provenance={**origin, **named, "runs": list(windows.spans), "shipid": __version__},
     )
-
-
-Array = np.ndarray
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
-from shipid.study.code import users_code
 from shipid.study.declared import (
     NO_MODEL,
     Foundation,
@@ -38,7 +37,7 @@ from shipid.study.declared import (
     named_vessel,
 )
 from shipid.study.schema import Data, Study
-from shipid.users import is_user_code
+from shipid.users import is_user_code, users_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve_families
 from shipid.vessel.schema import equation_functions

@@ -32,13 +32,13 @@ from shipid.hybrid.method import TrialJournal as Searches
 from shipid.study import seals, store
 from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
 from shipid.study.cluster import Line, SentJournal, on_dask
-from shipid.study.code import code_digest
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import USER_SCRIPT, Plan, Unit, own_code
 from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
 from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
+from shipid.users import code_digest
 from shipid.version import __version__
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share

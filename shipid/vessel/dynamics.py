@@ -28,16 +28,18 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.schema import (
     BEHIND,
     active_actuators,
+    call_user_function,
+    check_term,
     equation_functions,
     function_signals,
     structural_keys,
     term_blocks,
     term_parameters,
+    term_states,
     upstream_signals,
     vessel_model,
 )
 from shipid.vessel.schema import function_parameters as declared
-from shipid.vessel.terms import call_user_function, check_term, term_states
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from shipid.answer.error_table import ErrorTable
-from shipid.answer.worth import _quantile_estimate, break_even, runs_without_physics
+from shipid.answer.error_table import ErrorTable, _quantile_estimate, break_even, runs_without_physics
 
 
 def table(

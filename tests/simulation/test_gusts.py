@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.simulation.gusts import Gusts, _bin_variances, gust_series, gust_spectrum
+from shipid.simulation.weather import Gusts, _bin_variances, gust_series, gust_spectrum
 
 KINDS = {
     "npd": Gusts(kind="npd"),

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 import shipid
-from shipid.study.code import code_digest, users_code
+from shipid.users import code_digest, users_code
 
 
 def digest_of(copy: Path) -> str:
     """What a process says that runs a copy of the package."""
-    words = "from shipid.study.code import code_digest; print(code_digest())"
+    words = "from shipid.users import code_digest; print(code_digest())"
     command = [sys.executable, "-B", "-c", f"import sys; sys.path.insert(0, {str(copy)!r}); {words}"]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 

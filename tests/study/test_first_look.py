@@ -8,7 +8,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.simulation.manoeuvre import StepManoeuvre, TurningCircle, Zigzag
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.study.first_look import Look, first_look
+from shipid.study.survey import Look, first_look
 from shipid.vessel.load import Vessel, load_vessel
 
 SHIP, RPM = "kvlcc2-l7", 627.0

@@ -14,8 +14,7 @@ from shipid.physics import ACTUATORS, TERMS, Term
 from shipid.units import unit_fault
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
-from shipid.vessel.schema import function_parameters
-from shipid.vessel.terms import check_term, split_keys
+from shipid.vessel.schema import check_term, function_parameters, split_keys
 from tests.cli.running import ended
 from tests.documented import code
 

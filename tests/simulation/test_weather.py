@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.simulation.sea import (
+from shipid.simulation.weather import (
     Sea,
     draw_components,
     heading_series,
