@@ -25,7 +25,6 @@ ELSEWHERE = {
     "export/fmu_c.py": "export/test_fmu.py",
     "hybrid/deployed.py": "test_predictor.py",
     "identification/contents.py": "identification/test_command.py",
-    "report/motion.py": "cli/test_replay.py",
 }
 
 

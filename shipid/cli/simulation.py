@@ -114,7 +114,7 @@ def manoeuvre_command(
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
     from pandas import DataFrame
 
-    from shipid.report.manoeuvre import write_manoeuvre
+    from shipid.report.motion import write_manoeuvre
     from shipid.simulation.measured import approach_words, manoeuvre_content
 
     out = check_output(out or Path(f"{document_stem(vessel)}-{name}.html"), endings=(".html",))

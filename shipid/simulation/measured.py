@@ -15,7 +15,7 @@ from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
 from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import ACTUAL, is_steering, neutral_value, signal_of
-from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.report.motion import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.standard import Standard, define_standard

@@ -8,16 +8,15 @@ from typing import Annotated, Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from shipid.arguments import whole_steps
-from shipid.checked import CheckedModel
+from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.errors import DocumentError
 from shipid.physics.signals import is_wrapped_angle
 from shipid.vessel.perturb import uniform_draw
 
 Array = NDArray[np.float64]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
@@ -31,9 +30,7 @@ class Sensor(CheckedModel, BaseModel):
         NotNegative, Field(description="standard deviation over runs of an offset that is constant in a run")
     ] = 0.0
     latency: Annotated[NotNegative, Field(description="s by which a sample is old when it is taken")] = 0.0
-    interval: Annotated[
-        Annotated[FiniteFloat, Field(gt=0)] | None, Field(description="s between samples; absent: one per logged row")
-    ] = None
+    interval: Annotated[Positive | None, Field(description="s between samples; absent: one per logged row")] = None
     quantum: Annotated[NotNegative, Field(description="samples are rounded to its multiples; 0: not rounded")] = 0.0
 
 

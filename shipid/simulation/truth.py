@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Annotated, Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
 import pandas as pd
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from shipid import document as documents
 from shipid.arguments import check_class, whole_steps
 from shipid.capacity import excess_memory_words
-from shipid.checked import CheckedModel
+from shipid.checked import CheckedModel, NotNegative, Positive
+from shipid.document import requirement_words, taken_for_numbers
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics.signals import ACTUAL, is_output, measurable_signals
 from shipid.simulation.approach import Controls
-from shipid.simulation.draw import ManoeuvreDraw, range_limits
 from shipid.simulation.log import state_column
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre, order_keys, order_unit
 from shipid.simulation.perform import perform_manoeuvres
@@ -36,14 +38,119 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import check_rising, uniform_draw
 
+At = Callable[[str], float]
+"""Name of a quantity -> where in its range it lies, in [0, 1)."""
+
+SHARED = ("name", "duration")  # keys of a kind that [truth] sets for all runs
+SEEDS = 2**31  # number of different seeds that may be drawn
+COURSE = "course_deg"
 Array = np.ndarray
-NotNegative = Annotated[
-    tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]], AfterValidator(check_rising)
-]
+SpeedRange = Annotated[tuple[NotNegative, NotNegative], AfterValidator(check_rising)]
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
-Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+class ManoeuvreDraw(CheckedModel, BaseModel):
+    """`[[truth.manoeuvre]]`: a kind of manoeuvre, its share of the runs, and the keys of the kind.
+
+    A number is a fixed value. A pair [low, high] in place of a number is a range; each run draws from it uniformly.
+    From a list of texts each run draws one with equal probability. `course_deg` and `seed` are drawn if absent. In
+    kinds with `orders`, every other key is an order to commands: `n_rpm`, `alpha_deg`, `bow.n_rpm`.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    kind: str = "turning"
+    share: Annotated[FiniteFloat, Field(gt=0, description="weight among all blocks")] = 1.0
+
+    @model_validator(mode="after")
+    def _fits(self) -> ManoeuvreDraw:
+        if self.kind not in KINDS:
+            raise ValueError(f"{self.kind!r} is no kind of manoeuvre: {suggest_name(self.kind, KINDS)}")
+        for place in (0.0, 1.0):  # valid at both ends of every range: valid between them
+            self.manoeuvre(1.0, lambda _, place=place: place)  # type: ignore[misc]
+        return self
+
+    def manoeuvre(self, duration: float, at: At) -> Manoeuvre:
+        """Return the manoeuvre of one run.
+
+        duration : length of the log [s].
+        at : quantity -> position in its range, in [0, 1). A quantity is a key without its unit (`n`, `angle`), or `psi`
+            for the course.
+
+        Raises
+        ------
+        ValueError : a key that the kind does not have, or an invalid value.
+        """
+        kind = KINDS[self.kind]
+        fields = {name: field.annotation for name, field in kind.model_fields.items() if name not in SHARED}
+        given: dict[str, Any] = {}
+        orders: dict[str, Any] = {}
+        level = get_args(fields["orders"])[1] if "orders" in fields else None
+        for key, value in _flatten_keys(self.model_extra or {}):
+            if key in fields and key != "orders":
+                given[key] = value if is_collection_type(fields[key]) else _draw_value(key, value, at)
+            elif level is not None and key not in SHARED:
+                orders[key] = range_limits(key, value) if is_collection_type(level) else _draw_value(key, value, at)
+            else:
+                remedy = "[truth] gives it for all runs" if key in SHARED else suggest_name(key, fields)
+                raise ValueError(f"{key}: no key of {self.kind}: {remedy}")
+        if level is not None:
+            given["orders"] = orders
+        if "seed" in fields:
+            given.setdefault("seed", int(at("seed") * SEEDS))
+        if "duration" in kind.model_fields:
+            given["duration"] = duration
+        given.setdefault(COURSE, 360.0 * at("psi"))
+        try:
+            manoeuvre: Manoeuvre = kind.__pydantic_validator__.validate_python(given)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            key = ".".join(str(part) for part in first["loc"] if part != "orders")
+            raise ValueError(f"{key or self.kind}: {requirement_words(first)}") from None
+        for key, value in taken_for_numbers(given, manoeuvre):
+            raise ValueError(f"{key}: {value!r}: must be a number")
+        return manoeuvre
+
+
+def _flatten_keys(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Pairs of key and value; a key in a table becomes `table.key`, because `bow.n_rpm = 0` is a table in TOML."""
+    return [
+        (f"{key}.{inner}" if inner else key, one)
+        for key, value in given.items()
+        for inner, one in (value.items() if isinstance(value, Mapping) else [("", value)])
+    ]
+
+
+def is_collection_type(annotation: Any) -> bool:
+    """Whether the type of a field is a tuple, list or table, so that a list is its value and not a range."""
+    if get_origin(annotation) is Annotated:
+        return is_collection_type(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        return any(map(is_collection_type, get_args(annotation)))
+    return get_origin(annotation) in (tuple, list, dict)
+
+
+def _draw_value(key: str, value: Any, at: At) -> Any:
+    """The value itself, a number from the range [low, high], or one of several texts."""
+    if not isinstance(value, list | tuple):
+        return value
+    if value and all(isinstance(one, str) for one in value):
+        return value[min(int(at(key) * len(value)), len(value) - 1)]
+    low, high = range_limits(key, value)
+    quantity = "psi" if key == COURSE else key.removesuffix("_rpm").removesuffix("_deg")
+    return low + (high - low) * at(quantity)
+
+
+def range_limits(key: str, value: Any) -> tuple[float, float]:
+    """(low, high) of a pair; (x, x) of a number x; ValueError for anything else."""
+    pair = value if isinstance(value, list | tuple) else [value, value]
+    if len(pair) != 2 or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in pair):
+        raise ValueError(f"{key}: give a number or [low, high], not {value!r}")
+    low, high = pair
+    if low > high:
+        raise ValueError(f"{key} has low > high: give [low, high], not [{low:g}, {high:g}]")
+    return low, high
 
 
 class Truth(CheckedModel, BaseModel):
@@ -63,10 +170,10 @@ class Truth(CheckedModel, BaseModel):
     method: Method = "rk4"
     interval: Annotated[FiniteFloat, Field(gt=0, description="s between logged rows")] = 1.0
     seed: int = 0
-    wind_speed: NotNegative = (0.0, 6.0)
+    wind_speed: SpeedRange = (0.0, 6.0)
     gusts: Gusts | None = None
     waves: Sea | None = None
-    current_speed: Annotated[NotNegative, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
+    current_speed: Annotated[SpeedRange, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
     environment: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(
         default={},
         description="other signals of the environment: signal with its unit -> value or [low, high]",

@@ -21,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from shipid.checked import CheckedModel
+from shipid.checked import CheckedModel, Positive
 from shipid.physics.grammar import AXES
 from shipid.physics.waves import EVEN
 from shipid.units import GRAVITY
@@ -30,7 +30,6 @@ from shipid.vessel.perturb import check_rising, uniform_draw
 from shipid.vessel.schema import term_blocks
 
 Array = NDArray[np.float64]
-Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between

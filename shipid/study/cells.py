@@ -36,7 +36,6 @@ from shipid.units import percent_text
 from shipid.version import __version__
 
 if TYPE_CHECKING:
-    from shipid.identification.settings import Identify
     from shipid.identification.solve import Solution
 
 
@@ -321,14 +320,18 @@ def _fit_foundation(
     study = prepared.study
     now, sentence, seconds, estimates = foundation, "", 0.0, None
     try:
-        if foundation.identify is not None:
-            solution = _solution(foundation, foundation.identify, runs, data, known)
-            if solution.status != "ok":
-                raise ShipidError(solution.sentence)
-            assert foundation.variant is not None
-            values: Mapping[str, float] = {**foundation.variant.values, **solution.values}
-            now = replace(foundation, variant=replace(foundation.variant, values=values))
-            sentence, seconds = solution.sentence, solution.seconds
+        variant, vessel = foundation.variant, foundation.vessel
+        if foundation.identify is not None and variant is not None and vessel is not None:
+            from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers import
+
+            key = variant.name, foundation.identify.model_dump_json()
+            if key not in known:
+                known[key] = identify(vessel, data, runs, foundation.identify)
+            if known[key].status != "ok":
+                raise ShipidError(known[key].sentence)
+            values: Mapping[str, float] = {**variant.values, **known[key].values}
+            now = replace(foundation, variant=replace(variant, values=values))
+            sentence, seconds = known[key].sentence, known[key].seconds
         if now.observer is not None:
             begun = time.thread_time()
             if now.observer.choose:
@@ -344,17 +347,3 @@ def _fit_foundation(
         here, there = (np.full_like(part.future, np.nan) for part in (windows, prepared.test))
         return FoundationPrediction(foundation, here, there, f"{words}: {error.message}")
     return FoundationPrediction(now, *pair, sentence, seconds, estimates)
-
-
-def _solution(
-    foundation: Foundation, settings: Identify, runs: tuple[str, ...], data: Dataset, known: dict[Any, Solution]
-) -> Solution:
-    """What identification from the runs gives, once for a variant and its settings."""
-    from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers would import
-
-    assert foundation.variant is not None
-    assert foundation.vessel is not None
-    key = foundation.variant.name, settings.model_dump_json()
-    if key not in known:
-        known[key] = identify(foundation.vessel, data, runs, settings)
-    return known[key]

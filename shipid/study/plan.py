@@ -257,11 +257,6 @@ def grid_seeds(plan: Plan) -> tuple[int, ...]:
     return tuple(sorted(set(plan.study.grid.seeds)))
 
 
-def whole_unit(plan: Plan, batch: Batch) -> Unit:
-    """All cells of a batch as one unit."""
-    return Unit(batch, tuple((name, way.name) for name, way in plan.pairs), batch.key)
-
-
 def verdict_method(plan: Plan) -> str:
     """Name of the method that findings and the answer speak of."""
     named = plan.study.claims.method if plan.study.claims else None

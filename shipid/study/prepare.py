@@ -47,7 +47,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
 from shipid.logs.segments import run_kind
-from shipid.metrics import ErrorSummary, position_error, summarise_errors
+from shipid.metrics import position_error
 from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
@@ -93,10 +93,6 @@ class PreparedStudy:
     def commands(self) -> tuple[str, ...]:
         """Command columns of the runs."""
         return tuple(self.data.commands)
-
-    def accuracy(self, foundation: str) -> ErrorSummary:
-        """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
-        return summarise_errors(position_error(self.test_paths[foundation], self.test.future))
 
     @cached_property
     def naive(self) -> Array:
@@ -312,11 +308,7 @@ def _roll_out(
         again = []
         for foundation, paths, share in _one_round(study, dataset, parts, waiting, device, known):
             if share:
-                drawn = _redraw(foundation, families[foundation.family], share, plan.file)
-                assert drawn.variant is not None
-                words = f"{foundation.name} diverged on {percent_text(share, 1)} of the training windows"
-                notes.append(f"{words}: redrawn, counter {drawn.variant.counter}")
-                again.append(drawn)
+                again.append(_redraw(foundation, families[foundation.family], share, plan.file, notes))
             else:
                 finished[foundation.name] = (foundation, paths)
         waiting = again
@@ -469,8 +461,8 @@ def paths_of(
     return (np.full_like(pool[:, 0], np.nan), test[:, 0]) if pool_bad.any() else (pool[:, 0], test[:, 0])
 
 
-def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> Foundation:
-    """The member drawn again with the next counter; Diverges where nothing can be drawn, or no more."""
+def _redraw(foundation: Foundation, family: Family, share: float, file: str, notes: list[str]) -> Foundation:
+    """The member drawn again with the next counter, which is noted; Diverges where nothing can be drawn, or no more."""
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1
@@ -479,6 +471,8 @@ def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> 
         words = f"{foundation.name} diverges on {percent_text(share, 1)} of the training windows{tries}"
         remedy = "take a smaller [prediction] step, rk4, or narrower factors"
         raise DivergenceError(f"{words}: {remedy}", path=f"family.{foundation.family}")
+    words = f"{foundation.name} diverged on {percent_text(share, 1)} of the training windows"
+    notes.append(f"{words}: redrawn, counter {counter}")
     return replace(foundation, variant=draw_variant(family, foundation.member, foundation.base, counter, file))
 
 

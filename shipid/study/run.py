@@ -36,7 +36,6 @@ from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import USER_SCRIPT, Plan, Unit, own_code
 from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
-from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
 from shipid.users import code_digest
 from shipid.version import __version__
@@ -122,11 +121,11 @@ def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "
 def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     """Run a study of one part, or a shard of it, alone in its folder."""
     start, shard = time.perf_counter(), means.shard
-    place = folder if shard is None else shard_folder(folder, shard)
+    place = folder if shard is None else store.shard_folder(folder, shard)
     if shard is not None:
-        check_prepared(folder, plan, (DATA, COMMON))
+        store.check_prepared(folder, plan, (DATA, COMMON))
     with store.open_folder(place, plan):
-        for words in (*seals.unseal_missing(place), *(take_in(folder, plan) if shard is None else ())):
+        for words in (*seals.unseal_missing(place), *(store.take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
         begun = session_on(means.device, own_code(plan))
         if changed := store.note_session(place, begun):
@@ -288,7 +287,7 @@ def _run_parts(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
 def _units(plan: Plan, folder: Path, shard: tuple[int, int] | None) -> tuple[Sequence[Unit], list[Unit]]:
     """The units of a plan, or of a shard of it, and those that are not finished."""
     mine = plan.units if shard is None else plan.units[shard[0] - 1 :: shard[1]]
-    places = (folder,) if shard is None else (folder, shard_folder(folder, shard))
+    places = (folder,) if shard is None else (folder, store.shard_folder(folder, shard))
     finished = {unit.key for place in places for unit in store.finished_units(place, mine)}
     return mine, [unit for unit in mine if unit.key not in finished]
 

@@ -20,11 +20,11 @@ from shipid.predictor import Predictor
 from shipid.study import cells, run, store
 from shipid.study import prepare as preparing
 from shipid.study.cells import accuracy_of, predictions
-from shipid.study.plan import Plan, whole_unit
+from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
-from tests.study.tiny import run_here
+from tests.study.tiny import run_here, whole_unit
 
 PATHS = ["hull.derivatives.X_u|u|", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
 WEIGHTS = {"u": 0.01, "v": 0.01, "r": 0.001}

@@ -32,13 +32,13 @@ from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
 from shipid.study import run, seals, store
 from shipid.study.check import check_folder
-from shipid.study.plan import Plan, whole_unit
+from shipid.study.plan import Plan
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.results import read_results
 from shipid.study.run import run_study, run_unit
 from shipid.vessel.load import load_vessel
 from tests.documented import code
-from tests.study.tiny import events_here, make_run, mixed_plan, run_here, tiny_plan
+from tests.study.tiny import events_here, make_run, mixed_plan, run_here, tiny_plan, whole_unit
 
 
 class Silent:

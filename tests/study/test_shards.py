@@ -14,7 +14,7 @@ from shipid.files import read_json, write_json
 from shipid.study import seals, store
 from shipid.study.plan import Plan
 from shipid.study.run import prepare_study, run_study
-from shipid.study.shards import SHARDS, shard_folder
+from shipid.study.store import SHARDS, shard_folder
 from tests.faults.folders import stored
 from tests.study.tiny import mixed_plan, run_here, tiny_plan, without_workers
 

@@ -7,8 +7,8 @@ import copy
 import pytest
 
 from shipid.document import value_at_path
-from shipid.vessel.bindings import bind_document, parameter_units
 from shipid.vessel.load import load_vessel
+from shipid.vessel.schema import bind_document, parameter_units
 
 
 @pytest.mark.parametrize("name", ["gunnerus-28.9", "kvlcc2-l7", "mariner"])
