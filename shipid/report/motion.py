@@ -180,7 +180,7 @@ write_replay = partial(write_page, "replay", REPLAY_PAGE)
 class ManoeuvreContent(PageContent):
     """Everything the page shows.
 
-    first : names of the measures that the answer says. measures, criteria : rows from `shipid.measures.rows`.
+    first : names of the measures that the answer says. measures, criteria : rows from `shipid.measures.criteria`.
     log : t [s], north, east [m], psi, helm [rad], u, v [m/s], r [rad/s], shaft [rev/s].
     levels : helm [rad], rate [rad/s] of a spiral in the order performed. outline : (k, 2) of the ship [m].
     """

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.measures.criteria import judge_criteria
-from shipid.measures.rows import criterion_rows, measure_rows
+from shipid.measures.criteria import criterion_rows, judge_criteria, measure_rows
 from shipid.measures.spiral import helm_levels
 from shipid.report import motion
 from shipid.report.figure import MOST_LINE_POINTS, even_places
