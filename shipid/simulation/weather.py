@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -29,7 +28,7 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import check_rising, uniform_draw
 from shipid.vessel.schema import term_blocks
 
-Array = NDArray[np.float64]
+Array = np.ndarray
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 LOWEST, HIGHEST = 0.5, 3.2  # of the peak frequency: 99.2 % of the energy of a JONSWAP spectrum lies between
@@ -70,7 +69,7 @@ def gust_series(gusts: Gusts, mean_speed: Array, time: Array, keys: Sequence[tup
     for column, key, amplitude in zip(result.T, keys, amplitudes, strict=True):
         frequencies, phases = _draw_harmonics(gusts, key)
         column[:] = np.cos(2 * np.pi * np.outer(time, frequencies) + phases) @ amplitude
-    return np.maximum(result, -mean_speed)
+    return np.asarray(np.maximum(result, -mean_speed))
 
 
 def gust_spectrum(gusts: Gusts, mean_speed: Array, frequency: Array) -> Array:

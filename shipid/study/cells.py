@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms"), np.nan)  # of no physics
 Errors = dict[tuple[str, str], tuple[Array, float]]
-Array = np.ndarray
 
 
 class Work(NamedTuple):
