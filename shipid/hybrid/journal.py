@@ -15,6 +15,7 @@ from typing import Any
 
 import optuna
 from optuna.distributions import BaseDistribution, FloatDistribution
+from optuna.exceptions import DuplicatedStudyError
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState, create_trial
@@ -87,7 +88,7 @@ class Journal:
         if cell not in self._studies:
             try:
                 self._studies[cell] = optuna.create_study(study_name=cell, storage=self.storage)
-            except AssertionError:  # of Optuna, which does not find the study that it has just written
+            except (AssertionError, DuplicatedStudyError):  # of Optuna, where lines before say something else by now
                 raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=self.file) from None
             self._studies[cell].set_user_attr(DIGEST, self.digest)
         return self._studies[cell]

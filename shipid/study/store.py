@@ -97,6 +97,10 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
             if os.path.realpath(folder) == os.getcwd():  # it is made anew, under the feet of this process
                 raise ResultError("is the working folder: name a new one by --out, such as --out run", file=folder)
             _make(folder, plan)
+        elif provenance(folder)["digest"] != plan.digest and _is_without_results(folder):
+            with sole_writer(folder), temporary_folder(folder.parent) as above:
+                os.rename(os.path.realpath(folder), above / folder.name)
+            _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
     if provenance(folder)["digest"] != plan.digest:
@@ -143,6 +147,15 @@ def _make(folder: Path, plan: Plan) -> None:
         except OSError:
             if not (folder / STUDY).exists():
                 raise
+
+
+def _is_without_results(folder: Path) -> bool:
+    """Whether a run ended before its first cell: each file in its folder can be made again from a study."""
+    made = {STUDY, VESSELS, PROVENANCE, FOUNDATIONS, DATASET, TEST, ENVELOPE}
+    files = [place for place in folder.rglob("*") if not place.is_dir()]
+    return not (folder / "shards").exists() and all(
+        place.name in made or place.parent.name == seals.FOLDER or place.suffix == ".lock" for place in files
+    )
 
 
 def _write_plan(folder: Path, plan: Plan) -> None:

@@ -297,6 +297,7 @@ def test_a_folder_of_before_a_vessel_changed_says_so(tmp_path: Path) -> None:
     vessel.write_text('extends = "gunnerus-28.9"\n')
     changes = {"truth.vessel": "ship.toml", "family.0.base": "ship.toml"}
     make_run(folder, tiny_plan(tmp_path, changes))
+    (folder / "notes.txt").write_text("of the user")  # else the folder of a run without results is made anew
     vessel.write_text('extends = "gunnerus-28.9"\n[inertia]\nm = 5e5\n')
     words = r"from before a vessel, .* changed: choose another --out, or go on with it as it was: `shipid study resume"
     with pytest.raises(ResultError, match=words):
