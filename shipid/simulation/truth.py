@@ -18,12 +18,11 @@ from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.document import requirement_words, taken_for_numbers
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, suggest_name
-from shipid.physics.signals import ACTUAL, is_output, measurable_signals
+from shipid.physics.signals import ACTUAL, is_output, is_wrapped_angle, measurable_signals
 from shipid.simulation.approach import Controls
 from shipid.simulation.log import state_column
 from shipid.simulation.manoeuvre import KINDS, Manoeuvre, order_keys, order_unit
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.sensors import Sensor, measure_record
 from shipid.simulation.weather import (
     Gusts,
     Sea,
@@ -49,6 +48,7 @@ SpeedRange = Annotated[tuple[NotNegative, NotNegative], AfterValidator(check_ris
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
+SAME = 1e-6  # of a step of the record: two instants closer than this are equal
 
 
 class ManoeuvreDraw(CheckedModel, BaseModel):
@@ -395,3 +395,82 @@ def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
             raise DocumentError(error.message, path=path_in_block(error.path, where)) from None
         manoeuvres.append(one)
     return manoeuvres
+
+
+class Sensor(CheckedModel, BaseModel):
+    """One sensor of a `sensors` table: column -> block, in the SI unit of the column."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    noise: Annotated[NotNegative, Field(description="standard deviation of the white noise on each sample")] = 0.0
+    bias: Annotated[
+        NotNegative, Field(description="standard deviation over runs of an offset that is constant in a run")
+    ] = 0.0
+    latency: Annotated[NotNegative, Field(description="s by which a sample is old when it is taken")] = 0.0
+    interval: Annotated[Positive | None, Field(description="s between samples; absent: one per logged row")] = None
+    quantum: Annotated[NotNegative, Field(description="samples are rounded to its multiples; 0: not rounded")] = 0.0
+
+
+def measure_record(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
+    """Measured log of a true record: a frame with the columns of `fine` and a row every `interval` [s] of each run.
+
+    A sample is the true value at the time minus `latency` (linear between rows; the first value before the start), plus
+    bias and noise, rounded to `quantum`. Samples are taken every `Sensor.interval` from the first row on and held until
+    the next. Bias and noise are normal, drawn by hash(seed, run, column). A column without a sensor is copied.
+
+    fine : columns `run`, `t` [s] and others (SI), `t` in equal steps within each run.
+
+    DocumentError where `interval` is no multiple of the record's step.
+    """
+    logs = [_measure_run(str(run), rows, sensors, interval, seed) for run, rows in fine.groupby("run", sort=False)]
+    return pd.concat(logs, ignore_index=True)
+
+
+def _measure_run(
+    run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int
+) -> pd.DataFrame:
+    """Measured log of one run."""
+    step = float(rows["t"].iloc[-1] - rows["t"].iloc[0]) / (len(rows) - 1)
+    stride = whole_steps(interval, step)
+    if not stride:
+        raise DocumentError(
+            f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s", path="interval"
+        )
+    log = rows.iloc[::stride].copy()
+    for name, sensor in sensors.items():
+        truth = rows[name].to_numpy(dtype=np.float64)
+        truth = np.unwrap(truth) if is_wrapped_angle(name) else truth
+        log[name] = _sensor_samples(sensor, truth, step, stride, (seed, run, name))
+    return log
+
+
+def _sensor_samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[Any, ...]) -> Array:
+    """Output of a sensor at every `stride`-th row of the true values (N,), which are `step` [s] apart."""
+    logged = np.arange(0, len(truth), stride)  # all clocks below count rows of the record from the run's first
+    period = stride if sensor.interval is None else sensor.interval / step
+    latest = np.floor(logged / period + SAME)  # number of the last sample taken by each logged row
+    taken, which = np.unique(latest, return_inverse=True)  # samples between logged rows are not needed
+    values = (
+        _value_at_row(truth, taken * period - sensor.latency / step)
+        + sensor.bias * _normal_draws(1, *key, "bias")
+        + sensor.noise * _normal_draws(len(taken), *key, "noise")
+    )
+    if sensor.quantum > 0:
+        values = sensor.quantum * np.rint(values / sensor.quantum)
+    return np.asarray(values[which])
+
+
+def _value_at_row(truth: Array, place: Array) -> Array:
+    """Values (N,) at fractional row numbers: linear between rows, constant before the first, exact at a row."""
+    nearest = np.rint(place)
+    place = np.where(np.abs(place - nearest) < SAME, nearest, place)
+    return np.asarray(np.interp(place, np.arange(len(truth)), truth))
+
+
+def _normal_draws(count: int, *key: Any) -> Array:
+    """Standard normal draws (count,) that depend only on the key; a longer series begins with the shorter one.
+
+    Box-Muller transform of PCG64's raw output: NumPy guarantees the raw output for all versions, but not its normals.
+    """
+    raw = np.random.PCG64(int(uniform_draw(*key) * 2**53)).random_raw(2 * count).reshape(count, 2)
+    first, second = ((raw >> np.uint64(11)) / 2.0**53).T
+    return np.asarray(np.sqrt(-2 * np.log1p(-first)) * np.cos(2 * np.pi * second))
