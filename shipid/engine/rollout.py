@@ -82,7 +82,7 @@ def rollout(
     memory : hidden state -> (S,); default: each actuator has reached its first order.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
     components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
-        from `shipid.simulation.sea`; default: none, calm water.
+        from `shipid.simulation.weather`; default: none, calm water.
     helmsman : control law that gives the orders; `commands` are then its inputs; see `shipid.physics.helm`.
     keep : channels to record, default all states and memories.
     engine : of `ENGINES`, or `auto`: by size and by what there is; `repeated` is `auto` where so many calls follow that
