@@ -19,8 +19,7 @@ import pandas as pd
 from shipid import read_plan
 from shipid.study.plan import Plan
 from shipid.study.run import prepare_study, run_study
-from shipid.study.shards import shard_folder
-from shipid.study.store import read_rows
+from shipid.study.store import read_rows, shard_folder
 from shipid.version import __version__
 
 FILE = Path(__file__).parent / "records" / "paper-grid.csv"
