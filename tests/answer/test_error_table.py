@@ -132,6 +132,16 @@ def test_break_even_beyond_the_models_tried_is_a_bound(none: float, where: str) 
     assert worth.value == {"above": 16.0, "below": 1.0}[where]
 
 
+@pytest.mark.parametrize(("none", "value"), [(1.3, 16.0), (0.8, 1.0)])
+@pytest.mark.parametrize("gain", [1.0, 0.9])
+def test_where_accuracy_does_not_pay_all_models_serve_or_none_does(none: float, value: float, gain: float) -> None:
+    worth = break_even(
+        table(A, {m: [gain**k] for k, m in enumerate(A)} | {"none": [none * gain**2]}, (10,)), list(A), 0
+    )
+    assert worth is not None
+    assert worth.value == value
+
+
 def test_runs_are_interpolated_between_amounts() -> None:
     """4 m at 10 runs, 1 m at 40: 2 m takes 20."""
     worth = runs_without_physics(table(A, {"m0": [2.0, 1.0], "none": [4.0, 1.0]}, (10, 40)), "m0", 0)

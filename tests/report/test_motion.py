@@ -72,6 +72,8 @@ def test_answer_counts_the_criteria_that_are_judged() -> None:
     assert shown.answer[1].text == "3 of 3 criteria of IMO MSC.137(76) are met."
     worse = shown.criteria.assign(verdict=["met", "not met", "not judged"])
     assert replace(shown, criteria=worse).answer[1].text == "1 of 2 criteria of IMO MSC.137(76) are met."
+    for notes, words in ((["in ballast"] * 3, "met; in ballast."), (["in ballast", "", ""], "met.")):
+        assert replace(shown, criteria=shown.criteria.assign(note=notes)).answer[1].text.endswith(words)
     table = motion.criteria_table(replace(shown, criteria=worse))
     assert table is not None
     assert [row[4].bad for row in table.rows] == [False, True, False]

@@ -318,11 +318,11 @@ def test_every_path_leads_to_a_number(name: str) -> None:
 def test_numbers_of_an_actuator_have_the_unit_of_its_command() -> None:
     """Exports and tables said `1/s of the command`."""
     document = copy.deepcopy(load_vessel("gunnerus-28.9-6dof").document)
-    gear = {"kind": "rate_limit", "rate": 0.2, "low": -1.0, "high": 1.0}
+    gear = {"kind": "first_order", "T": 2.0, "rate": 0.2, "low": -1.0, "high": 1.0}
     document["thruster"]["port"]["actuator"] = {"n": gear, "alpha": gear}
     known = parameter_units(document)
     shaft, unit = "thruster.port.actuator.n", "thruster.port.actuator.alpha"
-    assert [known[f"{shaft}.{name}"] for name in ("rate", "low", "high")] == ["rev/s^2", "rev/s", "rev/s"]
+    assert [known[f"{shaft}.{name}"] for name in ("T", "rate", "low", "high")] == ["s", "rev/s^2", "rev/s", "rev/s"]
     assert [known[f"{unit}.{name}"] for name in ("rate", "low", "high")] == ["rad/s", "rad", "rad"]
     document["thruster"]["port"] = {
         "kind": "controllable_pitch", "x": -10.0, "D_p": 1.0, "k_P": 0.4, "k_J": 0.4, "actuator": {"pitch": gear},
