@@ -24,7 +24,7 @@ from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, Variant, draw_members
+from shipid.vessel.perturb import Family, Variant, change_structure, draw_members
 
 Array = np.ndarray
 CutWindows = tuple[Windows, Windows, list[str]]  # what `partition` gives
@@ -47,10 +47,15 @@ def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     return chosen
 
 
+def base_of_family(plan: Plan, family: Family) -> Vessel:
+    """The vessel that the members of a family of a study change: its base, with its structure."""
+    return change_structure(family, plan.vessels[str(family.base)])
+
+
 def notes_on_windows(plan: Plan, cut: CutWindows, wanted: Sequence[Family]) -> list[str]:
     """Windows that a study leaves out, and inputs that the base vessels need and the runs do not have."""
     pool, _, left_out = cut
-    return [*left_out, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
+    return [*left_out, *dict.fromkeys(note for f in wanted for note in not_measured(base_of_family(plan, f), pool))]
 
 
 def screen(
@@ -79,7 +84,7 @@ def screen(
     pool, test, _ = partition(plan, dataset) if cut is None else cut
     size = min(MEMBERS_OF_BLOCK, max(1, NUMBERS_OF_BLOCK // (len(pool) + len(test) + BINS)))
     for family in wanted:
-        base = plan.vessels[str(family.base)]
+        base = base_of_family(plan, family)
         check_columns(base, test.columns, plan.file)
         for first in range(0, count, size):
             numbers = range(first, min(first + size, count))
