@@ -7,7 +7,7 @@ CasADi runs it sample by sample, or PyTorch in batches. The results of all engin
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -39,9 +39,9 @@ class Trajectories:
     interval : time between records [s].
     """
 
-    states: Array
+    states: Array = field(repr=False)
     names: tuple[str, ...]
-    diverged: Array
+    diverged: Array = field(repr=False)
     interval: float
 
     def __getitem__(self, name: str) -> Array:

@@ -154,7 +154,7 @@ def _perform_batch(
     vessel, num_steps, manoeuvres = controls.vessel, every * (rows - 1), list(named.values())
     model = vessel_dynamics(vessel, helmsman)
     weather = {name: values[: num_steps + 1] for name, values in environment.items()}
-    commands, begun = _rollout_inputs(controls, helmsman, manoeuvres, num_steps, how)
+    commands, begun = rollout_inputs(controls, helmsman, manoeuvres, num_steps, how)
     constant = all((values == values[0]).all() for values in commands.values())  # which is faster in the engines
     path = rollout(
         vessel,
@@ -188,8 +188,12 @@ def _perform_batch(
     return log | {name: felt[name] for name in measurable_signals(felt)}
 
 
-def _rollout_inputs(
-    controls: Controls, helmsman: Helmsman | None, manoeuvres: Sequence[Manoeuvre], num_steps: int, how: Mapping[str, Any]
+def rollout_inputs(
+    controls: Controls,
+    helmsman: Helmsman | None,
+    manoeuvres: Sequence[Manoeuvre],
+    num_steps: int,
+    how: Mapping[str, Any],
 ) -> tuple[dict[str, Array], dict[str, Any]]:
     """Commands (num_steps, num_manoeuvres) by name; start, actuator states and helmsman as arguments of `rollout`."""
     t = np.arange(num_steps) * how["step"]
@@ -205,31 +209,6 @@ def _rollout_inputs(
         for name, values in memory.items():
             values[ready] = commands[name][0, ready]
     return commands, {"start": start, "memory": memory, "helmsman": helmsman}
-
-
-def perform_by_variants(
-    vessel: Vessel,
-    manoeuvre: Manoeuvre,
-    parameters: Array,
-    *,
-    step: float,
-    interval: float,
-    engine: str = "auto",
-) -> Trajectories:
-    """Simulate one manoeuvre by many variants (V, P) of a vessel in one rollout; the records are its states.
-
-    All begin in the state that the approach of the vessel itself ends in, in calm water, with the same shaft speed; a
-    helmsman reacts to each. step, interval : of the integration, and between records [s].
-
-    DocumentError for a manoeuvre that this vessel cannot perform, ShipidError where its approach does not settle.
-    """
-    controls, how = Controls(vessel), {"step": step, "method": "rk4", "engine": engine}
-    every, helmsman = whole_steps(interval, step), manoeuvre.helmsman(controls)
-    num_steps = every * max(int(manoeuvre.length / interval + 1e-9), 1)
-    model = vessel_dynamics(vessel, helmsman)
-    commands, begun = _rollout_inputs(controls, helmsman, [manoeuvre], num_steps, how)
-    calm, more = {name: np.zeros(1) for name in model.environment}, {"parameters": parameters, "keep": model.state}
-    return rollout(vessel, commands=commands, environment=calm, num_steps=num_steps, every=every, **more, **begun, **how)
 
 
 def _environment_series(

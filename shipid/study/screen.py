@@ -47,15 +47,11 @@ def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
     return chosen
 
 
-def base_of_family(plan: Plan, family: Family) -> Vessel:
-    """The vessel that the members of a family of a study change: its base, with its structure."""
-    return change_structure(family, plan.vessels[str(family.base)])
-
-
 def notes_on_windows(plan: Plan, cut: CutWindows, wanted: Sequence[Family]) -> list[str]:
     """Windows that a study leaves out, and inputs that the base vessels need and the runs do not have."""
     pool, _, left_out = cut
-    return [*left_out, *dict.fromkeys(note for f in wanted for note in not_measured(base_of_family(plan, f), pool))]
+    bases = [change_structure(family, plan.vessels[str(family.base)]) for family in wanted]
+    return [*left_out, *dict.fromkeys(note for base in bases for note in not_measured(base, pool))]
 
 
 def screen(
@@ -84,7 +80,7 @@ def screen(
     pool, test, _ = partition(plan, dataset) if cut is None else cut
     size = min(MEMBERS_OF_BLOCK, max(1, NUMBERS_OF_BLOCK // (len(pool) + len(test) + BINS)))
     for family in wanted:
-        base = base_of_family(plan, family)
+        base = change_structure(family, plan.vessels[str(family.base)])
         check_columns(base, test.columns, plan.file)
         for first in range(0, count, size):
             numbers = range(first, min(first + size, count))

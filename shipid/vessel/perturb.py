@@ -38,7 +38,6 @@ from shipid.vessel.ranges import UNUSUAL
 
 _CONDITION = re.compile(r"(?P<pattern>[^\[\]]+)(?:\[\s*order\s*(?P<relation>>=|<=|==|>|<)\s*(?P<order>\d+)\s*\])?")
 _BETWEEN = "\x1f"  # of the parts of a key
-SOBOL_BITS = 30  # of a coordinate, as in SciPy
 _RELATIONS = {">=": operator.ge, "<=": operator.le, "==": operator.eq, ">": operator.gt, "<": operator.lt}
 
 
@@ -82,10 +81,6 @@ def _number_between(ends: float | tuple[float, float], u: float) -> float:
     return low + (high - low) * u
 
 
-def _is_range(ends: Any) -> bool:
-    return isinstance(ends, tuple)
-
-
 def check_rising(value: Any) -> Any:
     """A number as it is, or a pair [low, high]; ValueError if the first is above the second."""
     if isinstance(value, tuple) and value[0] > value[1]:
@@ -106,19 +101,19 @@ RULES: dict[str, PerturbationRule] = {
     "range": PerturbationRule(
         Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
         lambda _number, ends, u: _number_between(ends, u),
-        drawn=_is_range,
+        drawn=lambda _: True,
         note="[low, high] of a new value, in the unit of the number, drawn uniformly",
     ),
     "factor": PerturbationRule(
         Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
         lambda number, ends, u: number * _number_between(ends, u),
-        drawn=_is_range,
+        drawn=lambda ends: isinstance(ends, tuple),
         note="a number is fixed, a pair is a range drawn from uniformly",
     ),
     "bias": PerturbationRule(
         Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
         lambda number, ends, u: number + _number_between(ends, u),
-        drawn=_is_range,
+        drawn=lambda ends: isinstance(ends, tuple),
         note="added, in the unit of the number: fixed, or a pair drawn from uniformly",
     ),
 }
@@ -153,9 +148,9 @@ class Perturbation(CheckedModel, BaseModel):
             raise ValueError(f"give `parameters` together with {' or '.join(selecting)}, or one of {others}")
         factor = self.given.get("factor")
         if isinstance(factor, tuple) and factor[0] <= 0 and not self.change_sign:
-            spread = f"for 1 +- {factor[1]:g} write [{1 + factor[0]:g}, {1 + factor[1]:g}]; "
-            hint = spread if factor[0] == -factor[1] and factor[1] < 1 else ""
-            raise ValueError(f"factor {list(factor)} holds 0 or less: {hint}change_sign = true allows it")
+            raise ValueError(
+                f"factor {list(factor)} holds 0 or less: +-30 % is [0.7, 1.3]; change_sign = true allows it"
+            )
         return self
 
     @classmethod
@@ -271,11 +266,9 @@ def patch_text(
     patch.update({"name": name, "base": base, "base_digest": base_digest, "source": source})
     if unusual:
         patch[UNUSUAL] = list(unusual)
-    if structure:
-        patch["structure"] = dict(structure)
-    patch["set"] = dict(values)
-    if provenance:
-        patch["provenance"] = dict(provenance)
+    for table, content in {"structure": structure, "set": values, "provenance": provenance}.items():
+        if content or table == "set":
+            patch[table] = dict(content or {})
     return tomlkit.dumps(patch)
 
 
@@ -306,8 +299,11 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
         changes: dict[str, Any] = {"base": base, "perturb": perturb, "identify": identify, "observer": observer}
         if family.members > 1 and not family.equal and not any(block.drawn for block in perturb):
-            words = f"the {family.members} members are equal: give a range to draw from; equal = true allows it"
-            raise DocumentError(words, file=file, path=f"{where}.members")
+            raise DocumentError(
+                f"the {family.members} members are equal: give a range to draw from; equal = true allows it",
+                file=file,
+                path=f"{where}.members",
+            )
         changes |= {"seen": seen, "extends": None, "structure": structure}
         resolved = family.model_copy(update=changes)
         resolved._inherited = inherited
@@ -347,15 +343,19 @@ def draw_members(
 
     Ranges are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
 
-    base : with the `structure` of the family, see `change_structure`. counter : how often each was redrawn. Raises ShipidError where a number is no whole one, DocumentError for a path
-    that the base lacks or a member that is no valid vessel.
+    base : with the `structure` of the family, see `change_structure`. counter : how often each was redrawn.
+
+    Raises ShipidError where a number is no whole one, DocumentError for a path that the base lacks or a member that is
+    no valid vessel.
     """
     steps, original, result = _draw_steps(family, base, file), base.parameters, list[Variant]()
     counter, numbers = check_whole_number("counter", counter), range(family.members) if numbers is None else numbers
     if not isinstance(numbers, Iterable):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
-    draw = _unit_draws(family, [key for *_, key in steps if key is not None], counter)
+    draw = _unit_draws(family, (key for *_, key in steps if key is not None), counter)
     for number in (check_whole_number("member", number) for number in numbers):  # of 1.0 is another hash
+        if family.sample != "independent" and number >= family.members:
+            raise DocumentError(f"no member {number}: a {family.sample} sample has {family.members}, from 0")
         values: dict[str, float] = {}
         for path, change, argument, key in steps:
             u = 0.0 if key is None else draw(number, key)
@@ -370,8 +370,8 @@ def draw_members(
         factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
         name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
         of, digest = family.base or base.key, base.digest
-        source = (name, family.name, number, of, digest)
-        result.append(Variant(*source, values, factors, counter, family.seed, original, family.structure))
+        more = (counter, family.seed, original, family.structure)
+        result.append(Variant(name, family.name, number, of, digest, values, factors, *more))
     return result
 
 
@@ -405,39 +405,32 @@ def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[S
     return result
 
 
-def _unit_draws(family: Family, keys: Sequence[str], counter: int) -> Callable[[int, str], float]:
-    """What gives the number in [0, 1] that a member has for the key of a draw, by the sample of the family.
+def _unit_draws(family: Family, keys: Iterable[str], counter: int) -> Callable[[int, str], float]:
+    """What gives the number in [0, 1] of a member for the key of a draw, by the sample of the family.
 
-    Latin hypercube (McKay 1979): each member has one of as many equal parts of every range as there are members, so
-    their number counts. Sobol: a point of SciPy's sequence, each dimension shifted digitally by the hash of its key.
-    A member that is drawn again is drawn independently.
+    Latin hypercube (McKay 1979): each member has one of as many equal parts of a range as there are members, in an
+    order hashed from the key. Sobol: SciPy's sequence, each dimension rotated by a hash of its key (Cranley and
+    Patterson 1976). A member that is drawn again is drawn independently.
     """
     seed, name, count = family.seed, family.name, family.members
 
-    def hashed(member: int, key: str) -> float:
+    def hashed_draw(member: int, key: str) -> float:
         return uniform_draw(seed, name, member, key, counter)
 
-    def check_member(member: int) -> int:
-        if not 0 <= member < count:
-            raise DocumentError(f"no member {member}: a {family.sample} sample has numbers from 0 to {count - 1}")
-        return member
-
-    columns = {key: place for place, key in enumerate(dict.fromkeys(keys))}
-    if counter or family.sample == "independent" or not columns:
-        return hashed
-    if family.sample == "sobol":
+    if counter or family.sample == "independent":
+        return hashed_draw
+    columns: dict[str, Any] = dict.fromkeys(keys)
+    if family.sample == "latin-hypercube":
+        for key in columns:
+            parts = sorted(range(count), key=lambda part: uniform_draw(seed, name, part, key, "part"))
+            columns[key] = [(part + hashed_draw(member, key)) / count for member, part in enumerate(parts)]
+    else:
         from scipy.stats import qmc  # most families are drawn without it
 
-        points = qmc.Sobol(len(columns), scramble=False, bits=SOBOL_BITS).random_base2((count - 1).bit_length())
-        shifts = {key: int(2**SOBOL_BITS * uniform_draw(seed, name, "sobol", key)) for key in columns}
-        return lambda member, key: (
-            (int(2**SOBOL_BITS * points[check_member(member), columns[key]]) ^ shifts[key]) / 2**SOBOL_BITS
-        )
-    parts = dict[str, list[int]]()
-    for key in columns:
-        order = sorted(range(count), key=lambda member: uniform_draw(seed, name, member, key, "part"))  # noqa: B023
-        parts[key] = sorted(range(count), key=order.__getitem__)
-    return lambda member, key: (parts[key][check_member(member)] + hashed(member, key)) / count
+        points = qmc.Sobol(len(columns) or 1, scramble=False).random_base2((count - 1).bit_length()).T
+        shifts = [uniform_draw(seed, name, "rotation", key) for key in columns]
+        columns = {key: (point + shift) % 1 for key, point, shift in zip(columns, points, shifts, strict=False)}
+    return lambda member, key: float(columns[key][member])
 
 
 def uniform_draw(*key: Any) -> float:

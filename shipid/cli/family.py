@@ -1,0 +1,127 @@
+"""`shipid family`: families of degraded vessels in a document of their own, drawn, simulated, locked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import shipid
+from shipid.cli.answer import Json, open_answer
+from shipid.cli.options import VesselName
+from shipid.errors import ShipidError
+
+app = typer.Typer(no_args_is_help=True, help="Families: vessels made worse by rules, drawn, simulated, locked.")
+FamilyDocumentName = Annotated[str, typer.Argument(help="document of families, lock or study: path, or bundled study")]
+FamilyName = Annotated[str | None, typer.Option("--family", help="which, where the document has several")]
+
+
+@app.command("new")
+def family_new(
+    vessel: VesselName,
+    out: Annotated[Path, typer.Option(help="TOML file to write; an existing file is not overwritten")],
+    members: Annotated[int, typer.Option(min=1, help="of each family that is drawn")] = 20,
+) -> None:
+    """Write a document of families for a vessel: as it is, with wrong damping, with wrong inertia too."""
+    from shipid.files import write_new
+    from shipid.study.new import draft_families
+
+    typer.echo(f"families -> {write_new(draft_families(vessel, members, out), out)}")
+
+
+@app.command("show")
+def family_show(
+    document: FamilyDocumentName,
+    family: FamilyName = None,
+    csv: Annotated[Path | None, typer.Option(help="table to write: a row a member, two columns a number")] = None,
+    as_json: Json = False,
+) -> None:
+    """Show the families of a document; of one, each number in the base and over the members."""
+    from shipid.simulation.families import read_families
+
+    every = family is None and csv is None
+    chosen = read_families(document) if every else {"family": shipid.read_family(document, family)}
+    with open_answer(as_json) as answer:
+        for name, one in chosen.items():
+            base, rules, table = one.base, one.rules, one.table()
+            answer.say(f"{rules.name}: {rules.members} of {base.name}, seed {rules.seed}, {rules.sample}")
+            rows = [
+                {"number": path, "base": base.parameters[path], "unit": base.units[path]}
+                | {"least": table[path, "value"].min(), "greatest": table[path, "value"].max()}
+                | {"factors": "{:.3g} to {:.3g}".format(*table[path, "factor"].agg(["min", "max"]))}
+                for path in one.members[0].values
+            ]
+            answer.records(name, rows)
+            answer.save("table", csv, table.set_axis(table.columns.map(" ".join), axis=1).reset_index())
+
+
+@app.command("diff")
+def family_diff(
+    document: FamilyDocumentName,
+    other: Annotated[str, typer.Argument(help="the other document, lock or study")],
+    family: FamilyName = None,
+    as_json: Json = False,
+) -> None:
+    """Compare a family of two documents: base and rules, and how many members have another value of a number."""
+    from shipid.simulation.families import compare_contents, family_content
+
+    one, two = (family_content(shipid.read_family(name, family)) for name in (document, other))
+    changes = {path: pair for path, pair in compare_contents(one, two).items() if not path.startswith("values.")}
+    values = [path.rpartition(".")[0] for path in compare_contents(one["values"], two["values"])]
+    with open_answer(as_json) as answer:
+        answer.records("rules", [{"what": path, "one": a, "other": b} for path, (a, b) in changes.items()])
+        counts = [{"number": path, "members that differ": values.count(path)} for path in dict.fromkeys(values)]
+        answer.records("numbers", counts)
+        answer.say("" if changes or values else "the same members, bit for bit")
+
+
+@app.command("rollout")
+def family_rollout(
+    document: FamilyDocumentName,
+    manoeuvre: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral or stop")] = "zigzag",
+    angles: Annotated[list[float] | None, typer.Argument(help="helm in deg, of a zigzag also the heading")] = None,
+    family: FamilyName = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV or Parquet file of all motions to write")] = None,
+    html: Annotated[Path | None, typer.Option(help="figure of the spread to write")] = None,
+    as_json: Json = False,
+) -> None:
+    """Simulate a standard manoeuvre of all members in one rollout: how far they come apart, and which diverge."""
+    from shipid.simulation.families import divergence_times, motion_table
+
+    drawn = shipid.read_family(document, family)
+    done = drawn.trajectories(manoeuvre, angles or ())
+    frame, lost = motion_table(drawn, done), divergence_times(drawn, done)
+    spread = frame.groupby("member").last().drop(columns="t").quantile([0.05, 0.5, 0.95]).T
+    with open_answer(as_json) as answer:
+        answer.say(f"{drawn.base.name}: {len(drawn.members)} members after {frame['t'].max():g} s, SI units")
+        answer.records("spread", spread.set_axis(["5 %", "median", "95 %"], axis=1).reset_index(names="channel"))
+        answer.records("diverge", [{"member": name, "diverges at [s]": time} for name, time in lost.items()])
+        answer.save("motions", csv, frame)
+        if html is not None:
+            shipid.figures.spread(done).write_html(html)
+            answer.say(f"figure -> {html}", figure=html)
+
+
+@app.command("export")
+def family_export(
+    document: FamilyDocumentName,
+    out: Annotated[Path, typer.Option(help="folder to write a lock and a vessel patch a member into")],
+    family: FamilyName = None,
+) -> None:
+    """Write a lock with all values and digests to cite, and a patch document of each member."""
+    from shipid.simulation.families import export_family
+
+    typer.echo(f"lock -> {export_family(shipid.read_family(document, family), out)}")
+
+
+@app.command("verify")
+def family_verify(lock: Annotated[Path, typer.Argument(help="lock, as of `family export`")]) -> None:
+    """Draw and simulate the family of a lock again, and compare base, rules, every value and what diverges."""
+    from shipid.simulation.families import verify_lock
+
+    digest, faults = verify_lock(lock)
+    if faults:
+        typer.echo("\n".join(f"{path}: {then} in the lock, {now} now" for path, (then, now) in [*faults.items()][:10]))
+        raise ShipidError(f"{len(faults)} entries are not as they were locked", path=str(lock))
+    typer.echo(f"as locked: digest {digest}")
