@@ -147,8 +147,9 @@ def factors(source: Source | VesselFamily, *, dark: bool = False) -> go.Figure:
 
 def spread(source: Trajectories, *, dark: bool = False) -> go.Figure:
     """Tracks and headings of all members of a family, as of `VesselFamily.trajectories`; those of the first sample."""
-    if not hasattr(source, "diverged"):
-        raise ShipidError(f'source must be trajectories, as of `family.trajectories("zigzag")`, not {source!r}')
+    from shipid.engine.rollout import Trajectories
+
+    check_class("source", source, Trajectories, "as of `family.trajectories`")
     motion = {name: source[name][:, ~source.diverged[:, 0], 0] for name in ("north", "east", "psi")}
     return draw_alone(spread_figure(source.interval, motion, int(source.diverged[:, 0].sum())), dark=dark)
 

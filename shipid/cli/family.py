@@ -38,10 +38,8 @@ def family_show(
     as_json: Json = False,
 ) -> None:
     """Show the families of a document; of one, each number in the base and over the members."""
-    from shipid.simulation.families import read_families
-
     every = family is None and csv is None
-    chosen = read_families(document) if every else {"family": shipid.read_family(document, family)}
+    chosen = shipid.read_families(document) if every else {"family": shipid.read_family(document, family)}
     with open_answer(as_json) as answer:
         for name, one in chosen.items():
             base, rules, table = one.base, one.rules, one.table()
@@ -49,10 +47,10 @@ def family_show(
             rows = [
                 {"number": path, "base": base.parameters[path], "unit": base.units[path]}
                 | {"least": table[path, "value"].min(), "greatest": table[path, "value"].max()}
-                | {"factors": "{:.3g} to {:.3g}".format(*table[path, "factor"].agg(["min", "max"]))}
+                | {"factors": "{:.3g}..{:.3g}".format(*table[path, "factor"].agg(["min", "max"]))}
                 for path in one.members[0].values
             ]
-            answer.records(name, rows)
+            answer.records(name, rows, formats=dict.fromkeys(("base", "least", "greatest"), "{:.4g}".format))
             answer.save("table", csv, table.set_axis(table.columns.map(" ".join), axis=1).reset_index())
 
 
@@ -64,9 +62,9 @@ def family_diff(
     as_json: Json = False,
 ) -> None:
     """Compare a family of two documents: base and rules, and how many members have another value of a number."""
-    from shipid.simulation.families import compare_contents, family_content
+    from shipid.simulation.families import compare_contents
 
-    one, two = (family_content(shipid.read_family(name, family)) for name in (document, other))
+    one, two = (shipid.read_family(name, family).content() for name in (document, other))
     changes = {path: pair for path, pair in compare_contents(one, two).items() if not path.startswith("values.")}
     values = [path.rpartition(".")[0] for path in compare_contents(one["values"], two["values"])]
     with open_answer(as_json) as answer:
@@ -82,16 +80,15 @@ def family_rollout(
     manoeuvre: Annotated[str, typer.Argument(help="zigzag, turning, pull-out, spiral or stop")] = "zigzag",
     angles: Annotated[list[float] | None, typer.Argument(help="helm in deg, of a zigzag also the heading")] = None,
     family: FamilyName = None,
+    approach: Annotated[str, typer.Option(help="helmsman (holds the course), steady or rest")] = "helmsman",
     csv: Annotated[Path | None, typer.Option(help="CSV or Parquet file of all motions to write")] = None,
     html: Annotated[Path | None, typer.Option(help="figure of the spread to write")] = None,
     as_json: Json = False,
 ) -> None:
     """Simulate a standard manoeuvre of all members in one rollout: how far they come apart, and which diverge."""
-    from shipid.simulation.families import divergence_times, motion_table
-
     drawn = shipid.read_family(document, family)
-    done = drawn.trajectories(manoeuvre, angles or ())
-    frame, lost = motion_table(drawn, done), divergence_times(drawn, done)
+    done = drawn.trajectories(manoeuvre, angles or (), approach=approach)
+    frame, lost = drawn.motion_table(done), drawn.divergence_times(done)
     spread = frame.groupby("member").last().drop(columns="t").quantile([0.05, 0.5, 0.95]).T
     with open_answer(as_json) as answer:
         answer.say(f"{drawn.base.name}: {len(drawn.members)} members after {frame['t'].max():g} s, SI units")
@@ -110,18 +107,14 @@ def family_export(
     family: FamilyName = None,
 ) -> None:
     """Write a lock with all values and digests to cite, and a patch document of each member."""
-    from shipid.simulation.families import export_family
-
-    typer.echo(f"lock -> {export_family(shipid.read_family(document, family), out)}")
+    typer.echo(f"lock -> {shipid.read_family(document, family).export(out)}")
 
 
 @app.command("verify")
 def family_verify(lock: Annotated[Path, typer.Argument(help="lock, as of `family export`")]) -> None:
     """Draw and simulate the family of a lock again, and compare base, rules, every value and what diverges."""
-    from shipid.simulation.families import verify_lock
-
-    digest, faults = verify_lock(lock)
+    digest, faults = shipid.verify_lock(lock)
     if faults:
-        typer.echo("\n".join(f"{path}: {then} in the lock, {now} now" for path, (then, now) in [*faults.items()][:10]))
-        raise ShipidError(f"{len(faults)} entries are not as they were locked", path=str(lock))
+        first = "; ".join(f"{path} {then} in the lock, {now} now" for path, (then, now) in [*faults.items()][:3])
+        raise ShipidError(f"{len(faults)} entries are not as they were locked: {first}", path=str(lock))
     typer.echo(f"as locked: digest {digest}")

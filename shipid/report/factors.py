@@ -86,9 +86,12 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
 
 def family_figure(factors: pd.DataFrame) -> PageFigure:
     """Dot strips of the factors (members, paths) of a family, a row per perturbed number with a dot per member."""
-    rows = [(path, member, factor) for path in factors for member, factor in factors[path].dropna().items()]
-    frame = pd.DataFrame(rows, columns=["model", "path", "factor"])
-    frame["group"] = frame.model.str.partition(".")[0]
+    rows = [
+        (path, member, path.partition(".")[0], factor)
+        for path in map(str, factors)
+        for member, factor in factors[path].dropna().items()
+    ]
+    frame = pd.DataFrame(rows, columns=["model", "path", "group", "factor"])
     names = [str(name) for name in pd.unique(frame.model)]
     span = " to ".join(number_text(end) for end in (frame.factor.min(), frame.factor.max()))
     return PageFigure(

@@ -179,14 +179,20 @@ def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) 
     away = np.hypot(*(values[-1] - np.median(values[-1]) for values in (north, east)))
     few, rows = even_places(count, SPREAD_LINES), even_places(len(t), MOST_LINE_POINTS)
     thin: dict[str, Any] = {"line": {"color": MUTED, "width": 1}, "opacity": 0.6, "hover": ""}
+    blue = category_colour(0)
     every = [
         np.pad(values[rows][:, few], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()  # a gap between two members
         for values in (np.broadcast_to(t[:, None], north.shape), north, east, heading)
     ]
-    turns = [make_line("members", every[0], every[3], ["member"], **thin)]
-    for share, values in zip(SPREAD_QUANTILES, np.quantile(heading[rows], SPREAD_QUANTILES, axis=1), strict=True):
-        ink = {"color": category_colour(0), "dash": "solid" if share == 0.5 else "dash"}
-        turns.append(make_line(f"{100 * share:g} %", t[rows], values, ["quantile"], "deg", line=ink))
+    levels = zip(SPREAD_QUANTILES, np.quantile(heading[rows], SPREAD_QUANTILES, axis=1), strict=True)
+    dashes = {share: "solid" if share == 0.5 else "dash" for share in SPREAD_QUANTILES}
+    turns = [
+        make_line("members", every[0], every[3], ["member"], **thin),
+        *(
+            make_line(f"{100 * p:g} %", t[rows], level, ["quantile"], "deg", line={"color": blue, "dash": dashes[p]})
+            for p, level in levels
+        ),
+    ]
     return PageFigure(
         id="spread",
         title="How far the members come apart",

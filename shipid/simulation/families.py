@@ -12,38 +12,27 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import tomlkit
-from pydantic import BaseModel, ConfigDict, Field
 
 from shipid import document as documents
 from shipid.arguments import check_choice, whole_steps
 from shipid.engine.rollout import SPEED_LIMIT, Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.files import make_folder, write_set
-from shipid.simulation.approach import Controls, NotStraight
+from shipid.simulation.approach import Controls
 from shipid.simulation.perform import rollout_inputs
 from shipid.simulation.standard import define_standard
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import Family, Variant, change_structure, draw_members, resolve_families
+from shipid.vessel.perturb import Family, FamilyDocument, Variant, change_structure, draw_members, resolve_families
 
 LOCK_TRIAL: tuple[str, tuple[float, float]] = ("zigzag", (20.0, 20.0))
 """Manoeuvre in which a lock looks for members that diverge; angles in deg."""
 RULE_KEYS = {"name", "members", "seed", "sample", "equal", "structure", "perturb"}
-
-
-class FamilyDocument(BaseModel):
-    """A document of families."""
-
-    model_config = ConfigDict(extra="forbid")
-    description: str | None = None
-    vessel: str | None = Field(default=None, description="base of the families that name none and extend none")
-    family: Annotated[list[Family], Field(min_length=1)]
-    lock: dict[str, Any] | None = Field(default=None, description="what was drawn, as `shipid family export` writes it")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +61,11 @@ class VesselFamily:
         for all factors. Values are in SI units, see `base.units`; a number that is 0 in the base has no factor.
         """
         rows = [
-            {(path, kind): numbers.get(path, np.nan) for path in one.values for kind, numbers in kinds}
+            [numbers.get(path, np.nan) for path in one.values for numbers in (one.factors, one.values)]
             for one in self.members
-            for kinds in [(("factor", one.factors), ("value", one.values))]
         ]
-        return pd.DataFrame(rows, index=pd.Index([one.name for one in self.members], name="member"))
+        columns = pd.MultiIndex.from_product([self.members[0].values, ("factor", "value")], names=["path", "kind"])
+        return pd.DataFrame(rows, pd.Index([one.name for one in self.members], name="member"), columns)
 
     def rollout(
         self,
@@ -99,36 +88,73 @@ class VesselFamily:
             {name: np.full(samples, value) if np.ndim(value) == 0 else value for name, value in numbers.items()}
             for numbers in (still | dict(start), commands, calm | dict(environment or {}))
         ]
-        parameters = np.array([one.parameters for one in self.members])
-        return rollout(self.base, *given, step=step, num_steps=num_steps, parameters=parameters, **more)
+        more |= {"parameters": np.array([one.parameters for one in self.members])}
+        return rollout(self.base, *given, step=step, num_steps=num_steps, **more)
 
     def trajectories(
         self,
         manoeuvre: str,
         angles: Sequence[float] | float = (),
         *,
-        approach: str | None = None,
+        approach: str = "helmsman",
         engine: str = "repeated",
         **more: Any,
     ) -> Trajectories:
-        """A standard manoeuvre of all members in one rollout, for `figures.spread`; arguments as of `measure_standard`.
+        """A standard manoeuvre of all members in one rollout, for `figures.spread`; arguments as of `define_standard`.
 
         All begin as the approach of the base ends, with its shaft speed, one ship length before the first order: until
         then each changes towards a speed of its own. A zigzag reverses the helm at the heading of each member.
         """
-        controls = Controls(self.base)
-        try:
-            chosen = define_standard(self.base, manoeuvre, angles, approach=approach or "steady", **more)
-            how: dict[str, Any] = {"step": chosen.step, "method": "rk4", "engine": engine}
-            every, helmsman = whole_steps(chosen.interval, chosen.step), chosen.manoeuvre.helmsman(controls)
-            num_steps = every * round(chosen.manoeuvre.length / chosen.interval)
-            commands, begun = rollout_inputs(controls, helmsman, [chosen.manoeuvre], num_steps, how)
-        except NotStraight:
-            if approach is not None:
-                raise
-            return self.trajectories(manoeuvre, angles, approach="helmsman", engine=engine, **more)
+        chosen = define_standard(self.base, manoeuvre, angles, approach=approach, **more)
+        every, helmsman = whole_steps(chosen.interval, chosen.step), chosen.manoeuvre.helmsman(Controls(self.base))
+        num_steps = every * int(chosen.manoeuvre.length / chosen.interval + 1e-9)
+        how: dict[str, Any] = {"step": chosen.step, "method": "rk4", "engine": engine}
+        commands, begun = rollout_inputs(Controls(self.base), helmsman, [chosen.manoeuvre], num_steps, how)
         how |= {"num_steps": num_steps, "every": every, "keep": tuple(begun["start"])}
         return self.rollout(commands=commands, **begun, **how)
+
+    def motion_table(self, trajectories: Trajectories) -> pd.DataFrame:
+        """Motion in the first sample as rows: member, t [s] and the channels, no numbers for a member that diverges."""
+        states = np.where(trajectories.diverged[:, :1, None], np.nan, trajectories.states[:, :, 0].swapaxes(0, 1))
+        times = trajectories.interval * np.arange(states.shape[1])
+        index = pd.MultiIndex.from_product([[one.name for one in self.members], times], names=["member", "t"])
+        return pd.DataFrame(states.reshape(len(index), -1), index, list(trajectories.names)).reset_index()
+
+    def divergence_times(self, trajectories: Trajectories) -> dict[str, float]:
+        """Name of each member that diverges in the first sample -> time [s] of its first record that is no ship's."""
+        speeds = np.abs([trajectories[name][:, :, 0] for name in ("u", "v")]).max(axis=0)
+        times = trajectories.interval * (speeds <= SPEED_LIMIT).sum(axis=0)
+        return {self.members[place].name: float(times[place]) for place in np.flatnonzero(trajectories.diverged[:, 0])}
+
+    def content(self) -> documents.Document:
+        """Digest of the base, rules without words, and path -> values of the members in their order."""
+        values = {path: [one.values[path] for one in self.members] for path in self.members[0].values}
+        rules = self.rules.model_dump(mode="json", include=RULE_KEYS, exclude_defaults=True)
+        return {"base": self.base.digest, "rules": rules, "values": values}
+
+    def lock(self) -> documents.Document:
+        """Digests of all, of base, rules and each member; values; and which members diverge in a trial, and when."""
+        content = self.content()
+        result = content | {
+            "rules": documents.digest_document(content["rules"]),
+            "members": [documents.digest_document([self.base.digest, one.values]) for one in self.members],
+        }
+        try:
+            lost = self.divergence_times(self.trajectories(*LOCK_TRIAL))
+            result |= {"trial": " ".join(map(str, LOCK_TRIAL)), "diverges_at_s": lost}
+        except ShipidError as error:  # such as a ship without helm
+            result |= {"trial": f"none: {error.message}"}
+        return {"digest": documents.digest_document(result)} | result
+
+    def export(self, folder: str | Path) -> Path:
+        """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock."""
+        make_folder(Path(folder))
+        base, lock = str(self.rules.base), Path(folder) / f"{self.rules.name}.lock.toml"
+        base = os.path.relpath(self.base.file, folder) if base.endswith(".toml") else base
+        content = {"vessel": base, "family": [self.content()["rules"]], "lock": self.lock()}
+        patches = {Path(folder) / f"{one.name}.toml": replace(one, base=base).document() for one in self.members}
+        write_set({lock: tomlkit.dumps(content)} | patches)
+        return lock
 
 
 def read_family_document(name: str | Path, relative_to: Path | None = None) -> tuple[Path, documents.Document]:
@@ -183,68 +209,19 @@ def read_family(document: str | Path, name: str | None = None) -> VesselFamily:
     return families[name or next(iter(families))]
 
 
-def motion_table(family: VesselFamily, trajectories: Trajectories) -> pd.DataFrame:
-    """Motion of each member in the first sample as rows: member, t [s], and the channels; no numbers if it diverges."""
-    states = np.where(trajectories.diverged[:, :1, None], np.nan, trajectories.states[:, :, 0].swapaxes(0, 1))
-    times = trajectories.interval * np.arange(states.shape[1])
-    index = pd.MultiIndex.from_product([[one.name for one in family.members], times], names=["member", "t"])
-    return pd.DataFrame(states.reshape(len(index), -1), index, list(trajectories.names)).reset_index()
-
-
-def divergence_times(family: VesselFamily, trajectories: Trajectories) -> dict[str, float]:
-    """Name -> time [s] of the first record in which a member that diverges is no ship, or of the last record."""
-    speeds = np.abs([trajectories[name][:, :, 0] for name in ("u", "v")]).max(axis=0)
-    fast = ~(speeds <= SPEED_LIMIT)  # or no number
-    fast[-1] = True
-    times = trajectories.interval * fast.argmax(axis=0)
-    return {family.members[place].name: float(times[place]) for place in np.flatnonzero(trajectories.diverged[:, 0])}
-
-
-def family_content(family: VesselFamily) -> documents.Document:
-    """What a family is: digest of its base, rules without words, and path -> values of the members in their order."""
-    table = {path: [one.values[path] for one in family.members] for path in family.members[0].values}
-    rules = family.rules.model_dump(mode="json", include=RULE_KEYS, exclude_defaults=True)
-    return {"base": family.base.digest, "rules": rules, "values": table}
-
-
 def compare_contents(one: Any, other: Any) -> dict[str, tuple[Any, Any]]:
     """Dotted path -> value in two documents, of each leaf that they do not share; None where one has it not."""
     first, second = (dict(documents.document_leaves(content)) for content in (one, other))
-    pairs = {path: (first.get(path), second.get(path)) for path in first | second}
-    return {path: pair for path, pair in pairs.items() if pair[0] != pair[1]}
+    paths = (path for path in first | second if first.get(path) != second.get(path))
+    return {path: (first.get(path), second.get(path)) for path in paths}
 
 
-def lock_family(family: VesselFamily) -> documents.Document:
-    """The `[lock]` of a family: its digest, those of base, rules and members, values, and what diverges in a trial."""
-    content = family_content(family)
-    members = [documents.digest_document([family.base.digest, one.values]) for one in family.members]
-    result = content | {"rules": documents.digest_document(content["rules"]), "members": members}
-    try:
-        lost = divergence_times(family, family.trajectories(*LOCK_TRIAL))
-        result |= {"trial": " ".join(map(str, LOCK_TRIAL)), "diverges_at_s": lost}
-    except ShipidError as error:  # a ship without helm, or one that does not go straight
-        result |= {"trial": f"none: {error.message}"}
-    return {"digest": documents.digest_document(result)} | result
-
-
-def export_family(family: VesselFamily, folder: Path) -> Path:
-    """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock."""
-    make_folder(folder)
-    base = str(family.rules.base)
-    base = os.path.relpath(family.base.file, folder) if base.endswith(".toml") else base
-    lock = folder / f"{family.rules.name}.lock.toml"
-    content = {"vessel": base, "family": [family_content(family)["rules"]], "lock": lock_family(family)}
-    patches = {folder / f"{one.name}.toml": replace(one, base=base).document() for one in family.members}
-    write_set({lock: tomlkit.dumps(content)} | patches)
-    return lock
-
-
-def verify_lock(file: Path) -> tuple[str, dict[str, tuple[Any, Any]]]:
+def verify_lock(file: str | Path) -> tuple[str, dict[str, tuple[Any, Any]]]:
     """Draw and simulate the family of a lock again: its digest; path -> value locked and now, where they differ.
 
     DocumentError for a file that is no lock, or whose base is not there.
     """
-    stored = read_family_document(file)[1].get("lock")
+    stored = read_family_document(Path(file))[1].get("lock")
     if stored is None:
         raise DocumentError("holds no [lock]: `shipid family export` writes one", file=file)
-    return str(stored.get("digest")), compare_contents(stored, lock_family(read_family(file)))
+    return str(stored.get("digest")), compare_contents(stored, read_family(Path(file)).lock())

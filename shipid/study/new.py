@@ -103,10 +103,9 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
 
 def draft_families(vessel: str, members: int, out: Path) -> str:
     """A document of families of a vessel as TOML, to be written to `out`; each that is drawn has so many members."""
-    every = _degraded_families("", load_vessel(vessel))
     blocks = [
         {key: members if key == "members" else value for key, value in block.items() if key != "base"}
-        for block in every
+        for block in _degraded_families("", load_vessel(vessel))
     ]
     head = _comment([f"Written by `shipid family new`. `shipid family show {out}` shows what is drawn."])
     return head + tomlkit.dumps({"vessel": _vessel_key(vessel, out), "family": blocks})

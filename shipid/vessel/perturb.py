@@ -98,12 +98,6 @@ RULES: dict[str, PerturbationRule] = {
     "set": PerturbationRule(
         dict[str, FiniteFloat], lambda _number, value, _u: value, places=_checked_values, note="path -> new value"
     ),
-    "range": PerturbationRule(
-        Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
-        lambda _number, ends, u: _number_between(ends, u),
-        drawn=lambda _: True,
-        note="[low, high] of a new value, in the unit of the number, drawn uniformly",
-    ),
     "factor": PerturbationRule(
         Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
         lambda number, ends, u: number * _number_between(ends, u),
@@ -115,6 +109,12 @@ RULES: dict[str, PerturbationRule] = {
         lambda number, ends, u: number + _number_between(ends, u),
         drawn=lambda ends: isinstance(ends, tuple),
         note="added, in the unit of the number: fixed, or a pair drawn from uniformly",
+    ),
+    "range": PerturbationRule(
+        Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
+        lambda _number, ends, u: _number_between(ends, u),
+        drawn=lambda _: True,
+        note="[low, high] of a new value, in the unit of the number, drawn uniformly",
     ),
 }
 """Key -> rule; a block with several applies them in this order. To add one, write its change and name it here."""
@@ -213,6 +213,16 @@ class Family(CheckedModel, BaseModel):
         default=None, description="numbers identified from the training runs of each batch: an [identify] block"
     )
     _inherited: int = PrivateAttr(default=0)  # how many blocks of `perturb` come from the family that it extends
+
+
+class FamilyDocument(BaseModel):
+    """A document of families."""
+
+    model_config = ConfigDict(extra="forbid")
+    description: str | None = None
+    vessel: str | None = Field(default=None, description="base of the families that name none and extend none")
+    family: Annotated[list[Family], Field(min_length=1)]
+    lock: dict[str, Any] | None = Field(default=None, description="what was drawn, as `shipid family export` writes it")
 
 
 @dataclass(frozen=True)
@@ -428,8 +438,8 @@ def _unit_draws(family: Family, keys: Iterable[str], counter: int) -> Callable[[
         from scipy.stats import qmc  # most families are drawn without it
 
         points = qmc.Sobol(len(columns) or 1, scramble=False).random_base2((count - 1).bit_length()).T
-        shifts = [uniform_draw(seed, name, "rotation", key) for key in columns]
-        columns = {key: (point + shift) % 1 for key, point, shift in zip(columns, points, shifts, strict=False)}
+        shifted = zip(columns, points, strict=False)
+        columns = {key: (point + uniform_draw(seed, name, "rotation", key)) % 1 for key, point in shifted}
     return lambda member, key: float(columns[key][member])
 
 
