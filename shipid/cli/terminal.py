@@ -12,7 +12,6 @@ import typer
 from shipid.errors import escape_unprintable
 from shipid.units import percent_text
 
-TERMINAL_WIDTH = 100  # columns that descriptions of vessels and families take
 SILENCE = 15.0  # s between lines of a long calculation
 NOTHING = "interrupted: nothing was written"
 

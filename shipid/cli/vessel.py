@@ -12,7 +12,7 @@ import shipid
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
 from shipid.cli.outputs import check_output
-from shipid.cli.terminal import CRITERIA, TERMINAL_WIDTH
+from shipid.cli.terminal import CRITERIA
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
 
@@ -45,10 +45,10 @@ def vessel_show(
     ]
     with open_answer(as_json) as answer:
         words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
-        lines = (fill(line, TERMINAL_WIDTH, break_long_words=False) for line in words if line)
+        lines = (fill(line, 100, break_long_words=False) for line in words if line)
         answer.say("\n".join(lines), name=ship.name, file=ship.file, digest=ship.digest)
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
-        answer.say(fill(f"particulars: {sentence}", TERMINAL_WIDTH), particulars=known)
+        answer.say(fill(f"particulars: {sentence}", 100), particulars=known)
         answer.records("terms", terms)
         rows = [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()]
         heads = {"path": "parameter", "value": "value", "unit": "unit"}

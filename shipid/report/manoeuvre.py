@@ -34,7 +34,7 @@ from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells
 from shipid.report.wording import counted_text, distance_text, number_text
 
 SPREAD_LINES = 40  # members of a family that are drawn: more fill the plane
-SPREAD_QUANTILES = (0.05, 0.5, 0.95)
+SPREAD_QUANTILES = {0.05: "dash", 0.5: "solid", 0.95: "dash"}
 OUTLINES = 12  # ships drawn along the track
 EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
 MEASURE_COLUMNS = {
@@ -179,18 +179,16 @@ def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) 
     away = np.hypot(*(values[-1] - np.median(values[-1]) for values in (north, east)))
     few, rows = even_places(count, SPREAD_LINES), even_places(len(t), MOST_LINE_POINTS)
     thin: dict[str, Any] = {"line": {"color": MUTED, "width": 1}, "opacity": 0.6, "hover": ""}
-    blue = category_colour(0)
     every = [
         np.pad(values[rows][:, few], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()  # a gap between two members
         for values in (np.broadcast_to(t[:, None], north.shape), north, east, heading)
     ]
-    levels = zip(SPREAD_QUANTILES, np.quantile(heading[rows], SPREAD_QUANTILES, axis=1), strict=True)
-    dashes = {share: "solid" if share == 0.5 else "dash" for share in SPREAD_QUANTILES}
+    levels = np.quantile(heading[rows], list(SPREAD_QUANTILES), axis=1)
     turns = [
         make_line("members", every[0], every[3], ["member"], **thin),
         *(
-            make_line(f"{100 * p:g} %", t[rows], level, ["quantile"], "deg", line={"color": blue, "dash": dashes[p]})
-            for p, level in levels
+            make_line(f"{100 * p:g} %", t[rows], level, ["q"], "deg", line={"color": category_colour(0), "dash": dash})
+            for (p, dash), level in zip(SPREAD_QUANTILES.items(), levels, strict=True)
         ),
     ]
     return PageFigure(
@@ -206,7 +204,7 @@ def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) 
             make_chart([make_line("members", every[2], every[1], ["member"], **thin)], "east [m]", "north [m]"),
             make_plot(turns, make_axis("time [s]", nticks=6), zero_axis("heading [deg]", nticks=6)),
         ],
-        chips=[Chip("member", "members", MUTED, width=1), Chip("quantile", "5, 50, 95 %", category_colour(0))],
+        chips=[Chip("member", "members", MUTED, width=1), Chip("q", "5, 50, 95 %", category_colour(0))],
         captions=("Tracks", "Heading"),
     )
 

@@ -19,7 +19,7 @@ import pandas as pd
 import tomlkit
 
 from shipid import document as documents
-from shipid.arguments import check_choice, whole_steps
+from shipid.arguments import check_choice, check_mapping, check_whole_number, whole_steps
 from shipid.engine.rollout import SPEED_LIMIT, Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.files import make_folder, write_set
@@ -52,7 +52,7 @@ class VesselFamily:
 
     def draw(self, seed: int) -> VesselFamily:
         """The family with the members that another seed draws."""
-        return replace(self, rules=self.rules.model_copy(update={"seed": seed}))
+        return replace(self, rules=self.rules.model_copy(update={"seed": check_whole_number("seed", seed)}))
 
     def table(self) -> pd.DataFrame:
         """A row for each member by its name; for each dotted path that the rules change the columns `factor`, `value`.
@@ -82,6 +82,7 @@ class VesselFamily:
         start, commands, environment : name -> a number, or an array as of `shipid.rollout`. States and wind that are
         absent are 0. more : further arguments of it. Result: (records, members, samples, channels).
         """
+        check_mapping("start", start, "a name to a number or an array")
         model, samples = vessel_dynamics(self.base), max(map(np.size, start.values()), default=1)
         still, calm = (dict.fromkeys(names, 0.0) for names in (model.state, model.environment))
         given = [

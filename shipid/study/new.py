@@ -107,8 +107,8 @@ def draft_families(vessel: str, members: int, out: Path) -> str:
         {key: members if key == "members" else value for key, value in block.items() if key != "base"}
         for block in _degraded_families("", load_vessel(vessel))
     ]
-    head = _comment([f"Written by `shipid family new`. `shipid family show {out}` shows what is drawn."])
-    return head + tomlkit.dumps({"vessel": _vessel_key(vessel, out), "family": blocks})
+    words = f"Written by `shipid family new`. `shipid family show {out}` shows what is drawn."
+    return _comment([words]) + tomlkit.dumps({"vessel": _vessel_key(vessel, out), "family": blocks})
 
 
 def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -> tuple[float, str]:

@@ -379,9 +379,8 @@ def draw_members(
         changed = {path: value for path, value in values.items() if original[path] != 0}
         factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
         name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
-        of, digest = family.base or base.key, base.digest
-        more = (counter, family.seed, original, family.structure)
-        result.append(Variant(name, family.name, number, of, digest, values, factors, *more))
+        source, rules = (family.base or base.key, base.digest), (family.seed, original, family.structure)
+        result.append(Variant(name, family.name, number, *source, values, factors, counter, *rules))
     return result
 
 
@@ -422,24 +421,24 @@ def _unit_draws(family: Family, keys: Iterable[str], counter: int) -> Callable[[
     order hashed from the key. Sobol: SciPy's sequence, each dimension rotated by a hash of its key (Cranley and
     Patterson 1976). A member that is drawn again is drawn independently.
     """
-    seed, name, count = family.seed, family.name, family.members
+    of, count = (family.seed, family.name), family.members
 
     def hashed_draw(member: int, key: str) -> float:
-        return uniform_draw(seed, name, member, key, counter)
+        return uniform_draw(*of, member, key, counter)
 
     if counter or family.sample == "independent":
         return hashed_draw
     columns: dict[str, Any] = dict.fromkeys(keys)
     if family.sample == "latin-hypercube":
         for key in columns:
-            parts = sorted(range(count), key=lambda part: uniform_draw(seed, name, part, key, "part"))
+            parts = sorted(range(count), key=lambda part: uniform_draw(*of, part, key, "part"))
             columns[key] = [(part + hashed_draw(member, key)) / count for member, part in enumerate(parts)]
     else:
         from scipy.stats import qmc  # most families are drawn without it
 
         points = qmc.Sobol(len(columns) or 1, scramble=False).random_base2((count - 1).bit_length()).T
         shifted = zip(columns, points, strict=False)
-        columns = {key: (point + uniform_draw(seed, name, "rotation", key)) % 1 for key, point in shifted}
+        columns = {key: (point + uniform_draw(*of, "rotation", key)) % 1 for key, point in shifted}
     return lambda member, key: float(columns[key][member])
 
 
