@@ -98,7 +98,7 @@ class VesselFamily:
         angles: Sequence[float] | float = (),
         *,
         approach: str = "helmsman",
-        engine: str = "repeated",
+        engine: str = "auto",
         **more: Any,
     ) -> Trajectories:
         """A standard manoeuvre of all members in one rollout, for `figures.spread`; arguments as of `define_standard`.

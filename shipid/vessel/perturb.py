@@ -379,8 +379,8 @@ def draw_members(
         changed = {path: value for path, value in values.items() if original[path] != 0}
         factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
         name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
-        source, rules = (family.base or base.key, base.digest), (family.seed, original, family.structure)
-        result.append(Variant(name, family.name, number, *source, values, factors, counter, *rules))
+        drawn = (values, factors, counter, family.seed, original, family.structure)
+        result.append(Variant(name, family.name, number, family.base or base.key, base.digest, *drawn))
     return result
 
 
