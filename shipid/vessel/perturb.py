@@ -308,7 +308,8 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         if base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
         changes: dict[str, Any] = {"base": base, "perturb": perturb, "identify": identify, "observer": observer}
-        if family.members > 1 and not family.equal and not any(block.drawn for block in perturb):
+        differ = family.equal or identify or observer or any(block.drawn for block in perturb)
+        if family.members > 1 and not differ:
             raise DocumentError(
                 f"the {family.members} members are equal: give a range to draw from; equal = true allows it",
                 file=file,
