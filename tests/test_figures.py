@@ -20,11 +20,11 @@ from shipid.simulation.families import VesselFamily
 from shipid.study.results import read_results
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family
-from tests.report import test_checks, test_identification, test_manoeuvre
+from tests.report import test_checks, test_identification, test_motion
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
-    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_manoeuvre.content("spiral")),
+    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
     "motion": lambda: test_checks.content("log"),
     "spread": lambda: members().trajectories("zigzag", 20),
 }
