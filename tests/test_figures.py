@@ -16,24 +16,16 @@ from shipid.answer.pages import report_content
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
 from shipid.report.figure import page_colours
-from shipid.simulation.families import VesselFamily
+from shipid.simulation.families import VesselFamily, read_family
 from shipid.study.results import read_results
-from shipid.vessel.load import load_vessel
-from shipid.vessel.perturb import Family
 from tests.report import test_checks, test_identification, test_motion
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
     **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
     "motion": lambda: test_checks.content("log"),
-    "spread": lambda: members().trajectories("zigzag", 20),
+    "spread": lambda: read_family("quick", "moderate").trajectories("zigzag", 20),
 }
-
-
-def members() -> VesselFamily:
-    block = {"parameters": ["hull.derivatives.*"], "factor": [0.4, 1.6]}
-    rules = Family(name="f", base="gunnerus-28.9", members=3, perturb=[block])
-    return VesselFamily(rules, load_vessel("gunnerus-28.9"))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +56,7 @@ def test_every_colour_of_dark_is_one_of_light() -> None:
 
 
 def test_the_factors_of_a_family_have_a_row_a_number_and_a_dot_a_member() -> None:
-    drawn = figures.factors(members())
+    drawn = figures.factors(read_family("quick", "moderate"))
     assert sum(len(trace.x) for trace in drawn.data if trace.x[0] is not None) == 3 * 32
     assert len(drawn.layout.yaxis.ticktext) == 32
 

@@ -10,7 +10,6 @@ import typer
 import shipid
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
-from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Families: vessels made worse by rules, drawn, simulated, locked.")
 FamilyDocumentName = Annotated[str, typer.Argument(help="document of families, lock or study: path, or bundled study")]
@@ -38,8 +37,7 @@ def family_show(
     as_json: Json = False,
 ) -> None:
     """Show the families of a document; of one, each number in the base and over the members."""
-    every = family is None and csv is None
-    chosen = shipid.read_families(document) if every else {"family": shipid.read_family(document, family)}
+    chosen = {"family": shipid.read_family(document, family)} if family or csv else shipid.read_families(document)
     with open_answer(as_json) as answer:
         for name, one in chosen.items():
             base, rules, table = one.base, one.rules, one.table()
@@ -113,8 +111,4 @@ def family_export(
 @app.command("verify")
 def family_verify(lock: Annotated[Path, typer.Argument(help="lock, as of `family export`")]) -> None:
     """Draw and simulate the family of a lock again, and compare base, rules, every value and what diverges."""
-    digest, faults = shipid.verify_lock(lock)
-    if faults:
-        first = "; ".join(f"{path} {then} in the lock, {now} now" for path, (then, now) in [*faults.items()][:3])
-        raise ShipidError(f"{len(faults)} entries are not as they were locked: {first}", path=str(lock))
-    typer.echo(f"as locked: digest {digest}")
+    typer.echo(f"as locked: digest {shipid.verify_lock(lock)}")

@@ -45,8 +45,8 @@ def vessel_show(
     ]
     with open_answer(as_json) as answer:
         words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
-        lines = (fill(line, 100, break_long_words=False) for line in words if line)
-        answer.say("\n".join(lines), name=ship.name, file=ship.file, digest=ship.digest)
+        text = "\n".join(fill(line, 100, break_long_words=False) for line in words if line)
+        answer.say(text, name=ship.name, file=ship.file, digest=ship.digest)
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
         answer.say(fill(f"particulars: {sentence}", 100), particulars=known)
         answer.records("terms", terms)

@@ -217,12 +217,15 @@ def compare_contents(one: Any, other: Any) -> dict[str, tuple[Any, Any]]:
     return {path: (first.get(path), second.get(path)) for path in paths}
 
 
-def verify_lock(file: str | Path) -> tuple[str, dict[str, tuple[Any, Any]]]:
-    """Draw and simulate the family of a lock again: its digest; path -> value locked and now, where they differ.
+def verify_lock(file: str | Path) -> str:
+    """Draw and simulate the family of a lock again; return the digest of the lock.
 
-    DocumentError for a file that is no lock, or whose base is not there.
+    ShipidError with the first values that are others now; DocumentError for a file that is no lock, or has no base.
     """
     stored = read_family_document(Path(file))[1].get("lock")
     if stored is None:
         raise DocumentError("holds no [lock]: `shipid family export` writes one", file=file)
-    return str(stored.get("digest")), compare_contents(stored, read_family(Path(file)).lock())
+    if changes := compare_contents(stored, read_family(Path(file)).lock()):
+        first = "; ".join(f"{path} {then} in the lock, {now} now" for path, (then, now) in [*changes.items()][:3])
+        raise ShipidError(f"{len(changes)} entries are not as they were locked: {first}", path=str(file))
+    return str(stored["digest"])

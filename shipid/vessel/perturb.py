@@ -294,30 +294,32 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         where = f"family.{list(by_name).index(family.name)}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
-        base, perturb, identify, observer = family.base, family.perturb, family.identify, family.observer
-        inherited, seen, structure = 0, family.seen, family.structure
+        parent = Family(name="empty")
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = suggest_name(family.extends, by_name)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
             parent = written_out(by_name[family.extends], (*above, family.name))
-            base, perturb, inherited = base or parent.base, [*parent.perturb, *perturb], len(parent.perturb)
-            identify = parent.identify if identify is None else identify
-            observer = parent.observer if observer is None else observer
-            seen, structure = [*parent.seen, *seen], parent.structure | structure
-        if base is None:
+        changes = {
+            "base": family.base or parent.base,
+            "extends": None,
+            "structure": parent.structure | family.structure,
+            "perturb": [*parent.perturb, *family.perturb],
+            "seen": [*parent.seen, *family.seen],
+            "identify": parent.identify if family.identify is None else family.identify,
+            "observer": parent.observer if family.observer is None else family.observer,
+        }
+        resolved = family.model_copy(update=changes)
+        resolved._inherited = len(parent.perturb)
+        if resolved.base is None:
             raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
-        changes: dict[str, Any] = {"base": base, "perturb": perturb, "identify": identify, "observer": observer}
-        differ = family.equal or identify or observer or any(block.drawn for block in perturb)
-        if family.members > 1 and not differ:
+        drawn = any(block.drawn for block in resolved.perturb)
+        if resolved.members > 1 and not (resolved.equal or resolved.identify or resolved.observer or drawn):
             raise DocumentError(
                 f"the {family.members} members are equal: give a range to draw from; equal = true allows it",
                 file=file,
                 path=f"{where}.members",
             )
-        changes |= {"seen": seen, "extends": None, "structure": structure}
-        resolved = family.model_copy(update=changes)
-        resolved._inherited = inherited
         return resolved
 
     return [written_out(family, ()) for family in families]
