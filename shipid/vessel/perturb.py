@@ -421,8 +421,8 @@ def _unit_draws(family: Family, keys: Iterable[str], counter: int) -> Callable[[
     """What gives the number in [0, 1] of a member for the key of a draw, by the sample of the family.
 
     Latin hypercube (McKay 1979): each member has one of as many equal parts of a range as there are members, in an
-    order hashed from the key. Sobol: SciPy's sequence, each dimension rotated by a hash of its key (Cranley and
-    Patterson 1976). A member that is drawn again is drawn independently.
+    order hashed from the key. Sobol: SciPy's sequence, a dimension for each key in their order, each rotated by a hash
+    of its key (Cranley and Patterson 1976). A member that is drawn again is drawn independently.
     """
     of, count = (family.seed, family.name), family.members
 
