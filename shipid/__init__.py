@@ -38,6 +38,12 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.logs.mapping import read_mapping as read_mapping
     from shipid.metrics import position_error as position_error
     from shipid.predictor import Predictor as Predictor, fit as fit
+    from shipid.simulation.families import (
+        VesselFamily as VesselFamily,
+        read_families as read_families,
+        read_family as read_family,
+        verify_lock as verify_lock,
+    )
     from shipid.simulation.measured import measure_standard as measure_standard
     from shipid.simulation.perform import perform_manoeuvres as perform_manoeuvres
     from shipid.simulation.standard import define_standard as define_standard
@@ -79,6 +85,7 @@ _PUBLIC = {
     "Truth": "shipid.simulation.truth",
     "Variant": "shipid.vessel.perturb",
     "Vessel": "shipid.vessel.load",
+    "VesselFamily": "shipid.simulation.families",
     "Windows": "shipid.data.windows",
     "check_dataset": "shipid.data.checks",
     "compare": "shipid.answer.compare",
@@ -97,6 +104,9 @@ _PUBLIC = {
     "perform_manoeuvres": "shipid.simulation.perform",
     "position_error": "shipid.metrics",
     "read_cells": "shipid.study.results",
+    "read_families": "shipid.simulation.families",
+    "verify_lock": "shipid.simulation.families",
+    "read_family": "shipid.simulation.families",
     "read_dataset": "shipid.data.dataset",
     "read_mapping": "shipid.logs.mapping",
     "read_plan": "shipid.study.plan",

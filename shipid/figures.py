@@ -1,8 +1,8 @@
 """Every figure of the reports as a plotly figure: `shipid.figures.error_map(results).show()`.
 
 Figures of a study take `Results`, the content of a report, or a table of cells as of `shipid.read_cells`; others the
-outcome of an identification, what `shipid.measure_standard` returns, or a dataset. All raise ShipidError where there is
-nothing to draw or an option does not exist.
+outcome of an identification, what `shipid.measure_standard` returns, a family, its trajectories, or a dataset. All
+raise ShipidError where there is nothing to draw or an option does not exist.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ import plotly.graph_objects as go
 from shipid.arguments import check_class, check_number
 from shipid.errors import ShipidError
 from shipid.report.content import PageContent, ReportContent
+from shipid.report.factors import family_figure
 from shipid.report.figure import PageFigure, draw_alone
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
 from shipid.report.logs import CHECK_PAGE, CheckContent
-from shipid.report.motion import MANOEUVRE_PAGE, ManoeuvreContent
+from shipid.report.motion import MANOEUVRE_PAGE, ManoeuvreContent, spread_figure
 from shipid.report.page import Section
 from shipid.report.paths import windows_of
 from shipid.report.physics_and_data import gain_lack, map_lack
@@ -29,7 +30,9 @@ from shipid.report.sections import SECTIONS
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
+    from shipid.engine.rollout import Trajectories
     from shipid.identification.outcome import Identification
+    from shipid.simulation.families import VesselFamily
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
@@ -64,6 +67,7 @@ __all__ = [
     "residuals",
     "search",
     "spiral",
+    "spread",
     "track",
     "tracks",
     "width_map",
@@ -132,9 +136,22 @@ def prediction(
     return _draw("browser", content, [run, N_D], dark=dark)
 
 
-def factors(source: Source, *, dark: bool = False) -> go.Figure:
-    """Factors of the perturbed numbers of every model, as dots on a logarithmic axis."""
+def factors(source: Source | VesselFamily, *, dark: bool = False) -> go.Figure:
+    """Factors of the perturbed numbers of every model, or member of a family, as dots on a logarithmic axis."""
+    from shipid.simulation.families import VesselFamily
+
+    if isinstance(source, VesselFamily):
+        return draw_alone(family_figure(pd.DataFrame(source.table().xs("factor", axis=1, level=1))), dark=dark)
     return _draw("factors", content_of(source), dark=dark)
+
+
+def spread(source: Trajectories, *, dark: bool = False) -> go.Figure:
+    """Tracks and headings of all members of a family, as of `VesselFamily.trajectories`; those of the first sample."""
+    from shipid.engine.rollout import Trajectories
+
+    check_class("source", source, Trajectories, "as of `family.trajectories`")
+    motion = {name: source[name][:, ~source.diverged[:, 0], 0] for name in ("north", "east", "psi")}
+    return draw_alone(spread_figure(source.interval, motion, int(source.diverged[:, 0].sum())), dark=dark)
 
 
 def tracks(source: Source, *, dark: bool = False) -> go.Figure:

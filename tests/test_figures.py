@@ -16,6 +16,7 @@ from shipid.answer.pages import report_content
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
 from shipid.report.figure import page_colours
+from shipid.simulation.families import VesselFamily, read_family
 from shipid.study.results import read_results
 from tests.report import test_checks, test_identification, test_motion
 
@@ -23,6 +24,7 @@ OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
     **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
     "motion": lambda: test_checks.content("log"),
+    "spread": lambda: read_family("quick", "moderate").trajectories("zigzag", 20),
 }
 
 
@@ -36,7 +38,9 @@ def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent
     drawn = 0
     for name in set(figures.__all__) - set(OTHERS):
         function = getattr(figures, name)
-        for argument, kind in get_type_hints(function, vars(figures) | {"Source": object}).items():
+        for argument, kind in get_type_hints(
+            function, vars(figures) | {"Source": object, "VesselFamily": VesselFamily}
+        ).items():
             for option in get_args(kind) if get_origin(kind) is Literal else ():
                 assert function(content, **{argument: option}).data, f"{name}: {argument} = {option!r}"
                 drawn += 1
@@ -49,6 +53,12 @@ def test_every_colour_of_dark_is_one_of_light() -> None:
     assert dark.keys() <= light.keys()
     assert not any("var(" in light[name] for name in dark)
     assert light["ink"] != dark["ink"]
+
+
+def test_the_factors_of_a_family_have_a_row_a_number_and_a_dot_a_member() -> None:
+    drawn = figures.factors(read_family("quick", "moderate"))
+    assert sum(len(trace.x) for trace in drawn.data if trace.x[0] is not None) == 3 * 32
+    assert len(drawn.layout.yaxis.ticktext) == 32
 
 
 @pytest.mark.parametrize("name", figures.__all__)

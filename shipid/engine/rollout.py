@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,9 +41,9 @@ class Trajectories:
     interval : time between records [s].
     """
 
-    states: Array
+    states: Array = field(repr=False)
     names: tuple[str, ...]
-    diverged: Array
+    diverged: Array = field(repr=False)
     interval: float
 
     def __getitem__(self, name: str) -> Array:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.errors import ShipidError
 from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
     INK,
@@ -32,7 +33,7 @@ from shipid.report.figure import (
 from shipid.report.page import Section, write_page
 from shipid.report.paths import outline_at
 from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells, with_cells, word_cell
-from shipid.report.wording import distance_text, number_text
+from shipid.report.wording import counted_text, distance_text, number_text
 
 LOG_SERIES = "measured"
 DEGREES = float(np.rad2deg(1.0))
@@ -50,6 +51,8 @@ REPLAY_ERRORS = {
     "r [deg/s]": "r",
     "position [m]": "position",
 }
+SPREAD_LINES = 40  # members of a family that are drawn: more fill the plane
+SPREAD_QUANTILES = {0.05: "dash", 0.5: "solid", 0.95: "dash"}
 OUTLINES = 12  # ships drawn along the track
 EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
 MEASURE_COLUMNS = {
@@ -277,6 +280,49 @@ def histories_figure(content: ManoeuvreContent) -> PageFigure:
         height=270,
         draw=lambda: [_draw_history(log["t"], values[keys], title, executed) for title, keys in panels.items()],
         chips=[Chip(key, MANOEUVRE_LINES[key][0], _line_colour(key)) for keys in panels.values() for key in keys],
+    )
+
+
+def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) -> PageFigure:
+    """Tracks of the members of a family, and their headings over time with quantiles.
+
+    interval : between records [s]. motion : north, east [m], psi [rad], each (records, members), of those that do not
+    diverge; `diverged` counts the others. ShipidError where all do.
+    """
+    north, east, heading = motion["north"], motion["east"], DEGREES * motion["psi"]
+    count, t = north.shape[1], interval * np.arange(len(north))
+    if not count:
+        raise ShipidError("there is nothing to draw: every member diverges", path="figures")
+    away = np.hypot(*(values[-1] - np.median(values[-1]) for values in (north, east)))
+    few, rows = even_places(count, SPREAD_LINES), even_places(len(t), MOST_LINE_POINTS)
+    thin: dict[str, Any] = {"line": {"color": MUTED, "width": 1}, "opacity": 0.6, "hover": ""}
+    every = [
+        np.pad(values[rows][:, few], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()  # a gap between two members
+        for values in (np.broadcast_to(t[:, None], north.shape), north, east, heading)
+    ]
+    levels = np.quantile(heading[rows], list(SPREAD_QUANTILES), axis=1)
+    turns = [
+        make_line("members", every[0], every[3], ["member"], **thin),
+        *(
+            make_line(f"{100 * p:g} %", t[rows], level, ["q"], "deg", line={"color": category_colour(0), "dash": dash})
+            for (p, dash), level in zip(SPREAD_QUANTILES.items(), levels, strict=True)
+        ),
+    ]
+    return PageFigure(
+        id="spread",
+        title="How far the members come apart",
+        takeaway=f"After {t[-1]:.4g} s half of {counted_text(count, 'member')} are within "
+        f"{distance_text(np.quantile(away, 0.5))} of the median position, nine in ten within "
+        f"{distance_text(np.quantile(away, 0.9))}; {diverged or 'none'} diverged.",
+        how="One start, the same orders. The lines are those of a few members, the quantiles those of all.",
+        alternative="Tracks and headings of the members.",
+        height=420,
+        draw=lambda: [
+            make_chart([make_line("members", every[2], every[1], ["member"], **thin)], "east [m]", "north [m]"),
+            make_plot(turns, make_axis("time [s]", nticks=6), zero_axis("heading [deg]", nticks=6)),
+        ],
+        chips=[Chip("member", "members", MUTED, width=1), Chip("q", "5, 50, 95 %", category_colour(0))],
+        captions=("Tracks", "Heading"),
     )
 
 

@@ -100,6 +100,16 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     return _recorded_study(loaded, dataset, data, out)
 
 
+def draft_families(vessel: str, members: int, out: Path) -> str:
+    """A document of families of a vessel as TOML, to be written to `out`; each that is drawn has so many members."""
+    blocks = [
+        {key: members if key == "members" else value for key, value in block.items() if key != "base"}
+        for block in _degraded_families("", load_vessel(vessel))
+    ]
+    words = f"Written by `shipid family new`. `shipid family show {out}` shows what is drawn."
+    return _comment([words]) + tomlkit.dumps({"vessel": _vessel_key(vessel, out), "family": blocks})
+
+
 def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -> tuple[float, str]:
     """Horizon [s], and why: some ship lengths at the usual speed, but a part of the median run."""
     longest = float(np.median(durations)) * SHARE_OF_RUN

@@ -24,6 +24,7 @@ from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.files import quote_argument
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
+from shipid.simulation.families import expand_families
 from shipid.simulation.manoeuvre import KINDS
 from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
 from shipid.study.declared import (
@@ -330,9 +331,9 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     """
     check_mapping("changes", changes or {}, "a dotted path to a value", DocumentError)
     file = documents.find_document(str(name), "studies")
-    document = documents.read_document(file)
+    document = expand_families(documents.read_document(file), file)  # so that changes reach them
     try:
-        document = _changed_document(document, changes or {}, "", Study.model_fields)
+        document = expand_families(_changed_document(document, changes or {}, "", Study.model_fields), file)
     except DocumentError as error:
         raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
     return build_plan(document, file, changes=changes)

@@ -256,6 +256,7 @@ class VesselPatch(BaseModel):
     base_digest: str | None = None
     name: str | None = None
     source: str | None = None
+    structure: dict[str, Any] = {}
     set: dict[str, Annotated[FiniteFloat, "value"]] = {}
     unusual: list[str] = []
     provenance: dict[str, Any] = {}
@@ -264,6 +265,7 @@ class VesselPatch(BaseModel):
 def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
     patch: VesselPatch = documents.parse_model(VesselPatch, document, file)
     base = _load_file(_find_base(patch.base, "base", file, above), (*above, file.resolve()))
+    base = base.with_values(patch.structure) if patch.structure else base
     if patch.base_digest not in (None, base.digest):
         changed = f"the base {patch.base!r} has changed since (now {base.digest!r}); make the patch anew"
         raise DocumentError(f"{patch.base_digest!r}: {changed}", file=file, path="base_digest")

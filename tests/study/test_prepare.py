@@ -118,7 +118,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(module, "window_memory", counted)
     family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
-    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
+    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0], "change_sign": True}]
     plan = tiny_plan(tmp_path, {"family": [family]})
     prepared = prepare(plan, obtain_runs(plan))
     rule = resolve_families(plan.study.family)[0]
@@ -143,7 +143,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(module, "MOST_REDRAWS", 9)
     for factor, message in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 9 redraws")):
         family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
-        family["perturb"][0]["factor"] = factor  # type: ignore[index]
+        family["perturb"][0] |= {"factor": factor, "change_sign": True}  # type: ignore[index]
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
         with pytest.raises(DivergenceError, match=message) as caught:
             prepare(plan, obtain_runs(plan))
