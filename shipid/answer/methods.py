@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 import pandas as pd
 
 from shipid.arguments import check_class
+from shipid.errors import DataError
 from shipid.evidence import CellErrors, compare_cells, world_interval
-from shipid.metrics import position_error
+from shipid.metrics import error_of_windows, position_error, summarise_errors
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
-from shipid.study.results import Results
+from shipid.study.results import Results, read_results
+from shipid.study.score import RivalPrediction, read_predictions, read_scores, write_score
 
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
 METHOD_COLUMNS = [
@@ -33,9 +36,36 @@ def compare_methods(results: Results) -> pd.DataFrame:
     are none.
     """
     check_class("results", results, Results, "as of `read_results`")
-    if sum(way.method.compensates for way in results.plan.methods) < 2:
+    rivals = any(True for _ in read_scores(results.folder))
+    if sum(way.method.compensates for way in results.plan.methods) + rivals < 2:
         return pd.DataFrame(columns=METHOD_COLUMNS)
     return method_table(method_cells(results), verdict_method(results.plan))
+
+
+def score(
+    folder: str | os.PathLike[str], predictions: str | os.PathLike[str], *, anyway: bool = False
+) -> dict[str, pd.DataFrame]:
+    """Score predictions of others on the test windows of a run, and keep them in its folder for its page.
+
+    Parameters
+    ----------
+    predictions : a Parquet file, see `shipid.study.score.read_predictions`.
+    anyway : score predictions that seem to be wrong, too; they are called doubtful.
+
+    Returns for each prediction the table of `method_table` with its differences to this prediction, which is taken as
+    it is: its training is not counted.
+
+    Raises DataError for predictions that cannot be scored, one sentence that says why.
+    """
+    results = read_results(folder)
+    rivals = read_predictions(predictions, results)
+    doubt = next((one.doubt for one in rivals if one.doubt), "")
+    if doubt and not anyway:
+        raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=predictions)
+    for one in rivals:
+        write_score(results.folder, one)
+    cells = method_cells(results)
+    return {label: method_table(cells, label) for label in dict.fromkeys(one.label for one in rivals)}
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
@@ -55,7 +85,23 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
             learns = learns_from_runs(results.plan, row["family"], row["method"])
             kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
         rows.append(kept)
-    return pd.DataFrame(rows)
+    cells = pd.DataFrame(rows)
+    return pd.concat([cells, *(_rival_cells(results, one, cells) for one in read_scores(results.folder))])
+
+
+def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) -> pd.DataFrame:
+    """A prediction of somebody else beside every cell of its amount of data and seed, or of all: it has no foundation.
+
+    It stands as it is: no other training of it is known.
+    """
+    error = position_error(one.paths, results.test.future)
+    known, world = summarise_errors(error), str(cells["world"].iloc[0])
+    mine = CellErrors(one.label, results.by_run(error_of_windows(error)), results.windows, False, world)
+    cells = cells.drop_duplicates(["foundation", "N_D", "seed"])
+    for name, value in (("N_D", one.N_D), ("seed", one.seed)):
+        cells = cells[cells[name].eq(value)] if value in set(cells[name]) else cells
+    numbers = {"H": known["mean"], "H_90": known["p90"], "end": error[-1].mean(), "seconds": np.nan, "trials": np.nan}
+    return cells.assign(method=one.label, status="ok", errors=[mine] * len(cells), **numbers)
 
 
 def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:

@@ -198,6 +198,55 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
+@app.command("windows")
+def study_windows(
+    study: Annotated[str, typer.Argument(help="bundled study, path of one, or folder of a run")],
+    out: Annotated[Path, typer.Option(help="folder for windows, past, future and physics, each .parquet")],
+    N_D: Annotated[int | None, typer.Option("--N_D", help="amount of data; default: the largest of the grid")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of the grid; default: the least")] = None,
+    with_truth: Annotated[
+        bool, typer.Option("--with-truth", help='with the future of the test; scores are then "not blind"')
+    ] = False,
+    device: Device = "cpu",
+) -> None:
+    """Write the windows of a study for a method of your own: what is known, what the physics says, what it misses."""
+    cut = shipid.windows(study, N_D=N_D, seed=seed, with_truth=with_truth, device=device)
+    for file in cut.write(check_output(out / "windows.parquet", option="--out").parent):
+        typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
+
+
+@app.command("score")
+def study_score(
+    folder: Folder,
+    predictions: Annotated[
+        Path, typer.Argument(help="table (Parquet) with run, instant, ahead, north, east; every test window once")
+    ],
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="score predictions that seem to be wrong, as doubtful")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Score predictions of others on the test windows of a run, beside its methods, also in its page."""
+    tables = shipid.score(folder, predictions, anyway=anyway)
+    with open_answer(as_json) as answer:
+        for label, table in tables.items():
+            mine, others = table[table["method"].eq(label)].iloc[0], table[table["method"].ne(label)]
+            numbers = {name: float(mine[name]) for name in ("H", "H_90", "end")}
+            answer.say("{}: H {:.4g} m, H_90 {:.4g} m, at the horizon {:.4g} m".format(label, *numbers.values()))
+            answer.say(f"H of others, and their H less that of {label}, with its 95 % interval:")
+            heads = CELL | {
+                "H": "H [m]",
+                "end": "end [m]",
+                "difference": "difference",
+                "low": "95 % from",
+                "high": "to",
+            }
+            answer.contents[label] = numbers
+            answer.records(f"{label}: others", others, heads | {"better": "better runs"})
+    with show_steps() as say:
+        shipid.write_pages(folder, say)
+
+
 @app.command("compare")
 def study_compare(
     folders: Annotated[

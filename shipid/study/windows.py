@@ -179,7 +179,9 @@ def _cut_batch(plan: Plan, dataset: Dataset, batch: Batch, with_truth: bool, dev
     runs = prepared.runs(batch)
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
     folds = prepared.folds(batch, train, "runs")
-    parts = [hide_future(one, plan.study.prediction.known, with_truth or one is train) for one in (train, prepared.test)]
+    parts = [
+        hide_future(one, plan.study.prediction.known, with_truth or one is train) for one in (train, prepared.test)
+    ]
     fold = np.full(sum(map(len, parts)), -1)
     for number, (_, validation) in enumerate(folds):
         fold[validation] = number
@@ -226,4 +228,8 @@ def _long_table(cut: Windows, ahead: Array, columns: Mapping[str, Array]) -> pd.
 
 def _last_axis(columns: Mapping[str, Any], names: Sequence[str], shape: tuple[int, ...]) -> Array:
     """Columns of a shape as one array of float64, their names along the last axis."""
-    return np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=-1) if names else np.zeros((*shape, 0))
+    return (
+        np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=-1)
+        if names
+        else np.zeros((*shape, 0))
+    )
