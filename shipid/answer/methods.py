@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.arguments import check_class
+from shipid.arguments import as_path, check_class
 from shipid.errors import DataError
 from shipid.evidence import CellErrors, compare_cells, world_interval
 from shipid.metrics import error_of_windows, position_error, summarise_errors
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
 from shipid.study.results import Results, read_results
-from shipid.study.score import RivalPrediction, read_predictions, read_scores, write_score
+from shipid.study.score import RivalPrediction, keep_predictions, kept_predictions, read_predictions
 
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
 METHOD_COLUMNS = [
@@ -36,10 +36,11 @@ def compare_methods(results: Results) -> pd.DataFrame:
     are none.
     """
     check_class("results", results, Results, "as of `read_results`")
-    rivals = any(True for _ in read_scores(results.folder))
-    if sum(way.method.compensates for way in results.plan.methods) + rivals < 2:
+    cells, learning = method_cells(results), {way.name for way in results.plan.methods if way.method.compensates}
+    rivals = {*cells["method"]} - {way.name for way in results.plan.methods}
+    if len(learning | rivals) < 2:
         return pd.DataFrame(columns=METHOD_COLUMNS)
-    return method_table(method_cells(results), verdict_method(results.plan))
+    return method_table(cells, verdict_method(results.plan))
 
 
 def score(
@@ -57,15 +58,13 @@ def score(
 
     Raises DataError for predictions that cannot be scored, one sentence that says why.
     """
-    results = read_results(folder)
-    rivals = read_predictions(predictions, results)
-    doubt = next((one.doubt for one in rivals if one.doubt), "")
-    if doubt and not anyway:
-        raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=predictions)
-    for one in rivals:
-        write_score(results.folder, one)
+    results, file = read_results(folder), as_path("predictions", predictions)
+    rivals = read_predictions(file, results)
+    if (doubt := next((one.doubt for one in rivals if one.doubt), "")) and not anyway:
+        raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=file)
+    keep_predictions(file, results.folder)
     cells = method_cells(results)
-    return {label: method_table(cells, label) for label in dict.fromkeys(one.label for one in rivals)}
+    return {one.label: method_table(cells, one.label) for one in rivals}
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
@@ -86,7 +85,7 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
             kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
         rows.append(kept)
     cells = pd.DataFrame(rows)
-    return pd.concat([cells, *(_rival_cells(results, one, cells) for one in read_scores(results.folder))])
+    return pd.concat([cells, *(_rival_cells(results, one, cells) for one in kept_predictions(results))])
 
 
 def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) -> pd.DataFrame:
@@ -94,14 +93,16 @@ def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) ->
 
     It stands as it is: no other training of it is known.
     """
-    error = position_error(one.paths, results.test.future)
-    known, world = summarise_errors(error), str(cells["world"].iloc[0])
+    error, world = position_error(one.paths, results.test.future), str(cells["world"].iloc[0])
+    known = summarise_errors(error)
     mine = CellErrors(one.label, results.by_run(error_of_windows(error)), results.windows, False, world)
     cells = cells.drop_duplicates(["foundation", "N_D", "seed"])
     for name, value in (("N_D", one.N_D), ("seed", one.seed)):
         cells = cells[cells[name].eq(value)] if value in set(cells[name]) else cells
     numbers = {"H": known["mean"], "H_90": known["p90"], "end": error[-1].mean(), "seconds": np.nan, "trials": np.nan}
-    return cells.assign(method=one.label, status="ok", errors=[mine] * len(cells), **numbers)
+    return cells.assign(
+        method=one.label, status="ok", errors=pd.Series([mine] * len(cells), cells.index, object), **numbers
+    )
 
 
 def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:

@@ -227,22 +227,12 @@ def study_score(
     as_json: Json = False,
 ) -> None:
     """Score predictions of others on the test windows of a run, beside its methods, also in its page."""
-    tables = shipid.score(folder, predictions, anyway=anyway)
     with open_answer(as_json) as answer:
-        for label, table in tables.items():
-            mine, others = table[table["method"].eq(label)].iloc[0], table[table["method"].ne(label)]
-            numbers = {name: float(mine[name]) for name in ("H", "H_90", "end")}
-            answer.say("{}: H {:.4g} m, H_90 {:.4g} m, at the horizon {:.4g} m".format(label, *numbers.values()))
-            answer.say(f"H of others, and their H less that of {label}, with its 95 % interval:")
-            heads = CELL | {
-                "H": "H [m]",
-                "end": "end [m]",
-                "difference": "difference",
-                "low": "95 % from",
-                "high": "to",
-            }
-            answer.contents[label] = numbers
-            answer.records(f"{label}: others", others, heads | {"better": "better runs"})
+        heads = CELL | {"H": "H [m]", "H_90": "H_90 [m]", "end": "end [m]", "difference": "difference"}
+        heads |= {"low": "95 % from", "high": "to", "better": "better runs"}
+        for label, table in shipid.score(folder, predictions, anyway=anyway).items():
+            answer.say(f"H, and its difference to that of {label}, with its 95 % interval over test runs:")
+            answer.records(label, table, heads)
     with show_steps() as say:
         shipid.write_pages(folder, say)
 

@@ -13,9 +13,11 @@ from shipid.export.correctors import networks_of
 from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator, Layers, Normaliser
+from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.version import __version__
 
+NO_ONNX = "an ONNX file needs the package onnx: pip install 'shipid[export]'"
 OPSET = 17  # the newest of ONNX 1.12, which all runtimes of the last years have
 
 
@@ -28,7 +30,7 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     try:
         from onnx import TensorProto, checker, helper, numpy_helper, save
     except ImportError:
-        raise ShipidError("an ONNX file needs the package onnx: pip install 'shipid[export]'") from None
+        raise ShipidError(NO_ONNX) from None
     networks, result, shape = _networks_to_write(model)
     kind = np.dtype(np.float32 if single else np.float64)
     names = list(dict.fromkeys(each for normaliser, _ in networks for each in normaliser.names))
@@ -66,6 +68,24 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": provenance})
     checker.check_model(made)
     with replace_whole(file) as temporary:
+        save(made, str(temporary))
+    return file
+
+
+def write_module(predictor: DeployedMethod, file: Path) -> Path:
+    """Write the networks of a method that its user wrote with PyTorch; ShipidError without onnx.
+
+    Inputs `past` (P + 1, S, d), the oldest first, and `now` (S, e) are as measured; the metadata name their last axes.
+    The output is `compensation` (S, T, 2) [m]. In single precision.
+    """
+    try:
+        from onnx import helper, load, save
+    except ImportError:
+        raise ShipidError(NO_ONNX) from None
+    with replace_whole(file) as temporary:
+        names = predictor.corrector.trace_onnx(temporary)  # type: ignore[attr-defined]
+        made, provenance = load(str(temporary)), json.dumps(dict(predictor.provenance), default=str)
+        helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": provenance})
         save(made, str(temporary))
     return file
 

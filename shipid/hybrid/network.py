@@ -1,34 +1,40 @@
-"""A network of PyTorch of one's own as a method: its class, what a trial suggests, and how the network is built.
+"""A network of PyTorch of one's own as a method: what a trial suggests, and how the network is built.
 
-It reads the past and the inputs at the instant, normalised, and gives the error of the path on a basis of polynomials of
-time; see `shipid.hybrid.recurrent`, whose search, training and mirror it shares.
+It reads the past and the inputs at the instant, normalised, and gives the error of the path on a basis of polynomials
+of time; see `shipid.hybrid.recurrent`, whose search, training and mirror it shares.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import torch
+from torch import Tensor
+from torch.func import functional_call
 
-from shipid.data.windows import Instants
-from shipid.errors import DataError
-from shipid.hybrid.features import select_inputs
 from shipid.hybrid.method import Array
 from shipid.hybrid.methods import METHODS, method_kind
-from shipid.hybrid.physics import Physics
-from shipid.hybrid.recurrent import Recurrent, RecurrentCorrector, RecurrentProblem, SequenceReader, past_signals
+from shipid.hybrid.recurrent import (
+    GatedNetwork,
+    Recurrent,
+    RecurrentCorrector,
+    RecurrentProblem,
+    SequenceReader,
+    Sequences,
+)
 from shipid.hybrid.search import LearningProblem, Point
-from shipid.hybrid.stored import StoredData
-from shipid.hybrid.training import Length, train_module
+from shipid.hybrid.training import Length, train_reader
 
 
 @dataclass(frozen=True)
-class TrainedModule(StoredData):
-    """The network of one fold: how it is built again, its weights by name, and its basis (T, r) [m].
+class TrainedModule(GatedNetwork):
+    """The network of one fold: its weights, and how it is built again.
 
     kind, settings : of its method, the settings as JSON. point : of its trial.
     """
@@ -36,83 +42,73 @@ class TrainedModule(StoredData):
     kind: str
     settings: str
     point: Mapping[str, float]
-    reader: SequenceReader
-    weights: Mapping[str, Array]
-    basis: Array
 
     def module(self) -> torch.nn.Module:
         """Build the network in double precision, ready to predict."""
-        built = METHODS[self.kind].model_validate_json(self.settings).network(self.point, *sizes_of(self.reader, self.basis))
-        built.load_state_dict({name: torch.as_tensor(values) for name, values in self.weights.items()})
+        method: NetworkMethod = METHODS[self.kind].model_validate_json(self.settings)
+        built = method.network(
+            self.point, len(self.reader.past.names), len(self.reader.now.names), 2 * len(self.basis.T)
+        )
+        built.load_state_dict({name: torch.as_tensor(layer) for name, layer in self.layers.items()}, strict=False)
         return built.double().eval()
 
-    def predict(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Array:
-        """Return the compensation (T, S, 2) [m]."""
-        return Compensation([self]).predict(table, instants, commands)
+    def _outputs(self, seen: Sequences) -> Array:
+        with torch.no_grad():
+            return np.asarray(self.module()(*map(torch.from_numpy, seen)).numpy())
 
 
-def sizes_of(reader: SequenceReader, basis: Array) -> tuple[int, int, int]:
-    """Sizes of what a network reads of the past and at the instant, and of its outputs."""
-    return len(reader.past.names), len(reader.now.names), 2 * basis.shape[1]
-
-
-class Compensation(torch.nn.Module):
-    """The mean of networks with what is around them: past (P + 1, S, d), now (S, e) as measured -> (S, T, 2) [m].
+class MeasuredNetworks(torch.nn.Module):
+    """Networks with what is around them: past (P + 1, S, d) and now (S, e) as measured -> compensation (S, T, 2) [m].
 
     past, now : names of the last axis of what goes in.
     """
 
     def __init__(self, networks: Sequence[TrainedModule]) -> None:
         super().__init__()
-        self.networks, self.parts = networks, torch.nn.ModuleList([one.module() for one in networks])
-        readers = [one.reader for one in networks]
-        self.past = tuple(dict.fromkeys(name for one in readers for name in one.past.names))
-        self.now = tuple(dict.fromkeys(name for one in readers for name in one.now.names))
+        self.networks, self.parts = networks, torch.nn.ModuleList([one.module() for one in networks]).float()
+        self.past = tuple(dict.fromkeys(name for one in networks for name in one.reader.past.names))
+        self.now = tuple(dict.fromkeys(name for one in networks for name in one.reader.now.names))
 
-    def forward(self, past: torch.Tensor, now: torch.Tensor) -> torch.Tensor:
+    def forward(self, past: Tensor, now: Tensor) -> Tensor:
         """Normalise, ask every network, also with port and starboard exchanged, and weigh the basis."""
-        paths = []
+        tensor, paths = partial(torch.tensor, dtype=torch.float32), []
         for module, one in zip(self.parts, self.networks, strict=True):
             sides = ((past, self.past, one.reader.past), (now, self.now, one.reader.now))
             seen = [
-                (given[..., [names.index(name) for name in norm.names]] - torch.tensor(norm.mean)) / torch.tensor(norm.std)
+                (given[..., [names.index(name) for name in norm.names]] - tensor(norm.mean)) / tensor(norm.std)
                 for given, names, norm in sides
             ]
             outputs = module(*seen).unflatten(1, (2, -1))
             if one.reader.mirrors is not None:
-                images = [side @ torch.tensor(mirror) for side, mirror in zip(seen, one.reader.mirrors, strict=True)]
-                outputs = (outputs + torch.tensor([[1.0], [-1.0]]) * module(*images).unflatten(1, (2, -1))) / 2
-            paths.append((outputs @ torch.tensor(one.basis.T)).swapaxes(1, 2))
+                images = [side @ tensor(mirror) for side, mirror in zip(seen, one.reader.mirrors, strict=True)]
+                outputs = (outputs + tensor([[1.0], [-1.0]]) * module(*images).unflatten(1, (2, -1))) / 2
+            paths.append((outputs @ tensor(one.basis.T)).swapaxes(1, 2))
         return torch.stack(paths).mean(dim=0)
-
-    def predict(self, table: Mapping[str, Array], instants: Instants, commands: tuple[str, ...]) -> Array:
-        """Return the compensation (T, S, 2) [m] of instants, with their inputs (S,) as `Inputs.table` gives them."""
-        rows = past_signals(instants, self.networks[0].reader.steps, commands)
-        past = np.stack([select_inputs(row, self.past) for row in rows])
-        with torch.no_grad():
-            made: Array = self(torch.from_numpy(past), torch.from_numpy(select_inputs(table, self.now))).numpy()
-        return made.swapaxes(0, 1)
 
 
 @dataclass(frozen=True)
 class NetworkCorrector(RecurrentCorrector):
     """The mean of the networks of the folds."""
 
-    networks: tuple[TrainedModule, ...]  # type: ignore[assignment]
-
-    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
-        """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
-        table = self.inputs.table(physics, instants)
-        return np.asarray(paths + Compensation(self.networks).predict(table, instants, self.inputs.commands))
+    networks: tuple[TrainedModule, ...]
 
     def trace_onnx(self, file: Path) -> dict[str, tuple[str, ...]]:
-        """Write the networks as ONNX, in double precision; names of the last axis of the inputs `past` and `now`."""
-        whole = Compensation(self.networks)
-        past = torch.zeros(self.networks[0].reader.steps + 1, 2, len(whole.past), dtype=torch.float64)
-        now = torch.zeros(2, len(whole.now), dtype=torch.float64)
-        axes = {"past": {1: "S"}, "now": {0: "S"}, "compensation": {0: "S"}}
-        names = {"input_names": ["past", "now"], "output_names": ["compensation"], "dynamic_axes": axes}
-        torch.onnx.export(whole.eval(), (past, now), str(file), dynamo=False, **names)
+        """Write the networks as ONNX; names of the last axis of the inputs `past` and `now`.
+
+        In single precision: runtimes have no recurrent units in double.
+        """
+        whole = MeasuredNetworks(self.networks).eval()
+        zeros = torch.zeros(self.networks[0].reader.steps + 1, 1, len(whole.past)), torch.zeros(1, len(whole.now))
+        with warnings.catch_warnings(action="ignore"):  # what PyTorch takes for constants are constants
+            torch.onnx.export(
+                whole,
+                zeros,
+                str(file),
+                dynamo=False,
+                input_names=["past", "now"],
+                output_names=["compensation"],
+                dynamic_axes={"past": {1: "S"}, "now": {0: "S"}, "compensation": {0: "S"}},
+            )
         return {"past": whole.past, "now": whole.now}
 
 
@@ -121,15 +117,25 @@ class NetworkProblem(RecurrentProblem):
 
     def learn(self, reader: SequenceReader, parts: Any, point: Point, scale: float, seed: int) -> tuple[Any, int]:
         """Return the network of the best epoch, and its number of epochs."""
-        method = self.method
-        length, basis = Length(method.epochs, method.batch, method.patience), self.basis * scale
+        method, basis = self.method, self.basis * scale
+        length, rates = (
+            Length(method.epochs, method.batch, method.patience),
+            (point["learning_rate"], method.weight_decay),
+        )
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            module = method.network(point, *sizes_of(reader, basis))
-            epochs = train_module(parts, module, point["learning_rate"], method.weight_decay, length, seed)
-        weights = {name: values.double().numpy() for name, values in module.state_dict().items()}
-        settings = method.model_dump_json()
-        return TrainedModule(method_kind(method), settings, dict(point), reader, weights, basis), epochs
+            network = TrainedModule(reader, {}, basis, method_kind(method), method.model_dump_json(), dict(point))
+            module = network.module().float()
+
+            def outputs(layers: Mapping[str, Tensor], *seen: Tensor) -> Tensor:
+                made: Tensor = functional_call(module.train(torch.is_grad_enabled()), dict(layers), seen)
+                return made
+
+            shapes = {name: tuple(layer.shape) for name, layer in module.named_parameters()}
+            weights = torch.nn.utils.parameters_to_vector(module.parameters()).detach()[None].clone()
+            generator = torch.Generator().manual_seed(seed)
+            layers, epochs = train_reader(parts, outputs, weights, shapes, rates, length, generator)
+        return replace(network, layers=layers), epochs
 
 
 class NetworkMethod(Recurrent):
@@ -146,4 +152,4 @@ class NetworkMethod(Recurrent):
 
         point : what the trial suggested.
         """
-        raise DataError(f"{type(self).__name__} must have `network(self, point, past, now, outputs)`")
+        raise NotImplementedError(f"network({point}, {past}, {now}, {outputs})")

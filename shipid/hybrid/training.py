@@ -272,57 +272,41 @@ def train_gated(
         "c_2": (outputs.shape[1],),
     }
     weights = _first_weights(shapes, units, generator)
-    layers = {name: layer.requires_grad_() for name, layer in _layers_by_name(weights, shapes).items()}
-    best = _train_reader(
-        parts, partial(_gated_outputs, layers), weights, list(layers.values()), (learning_rate, decay), length, generator
-    )
-    kept = {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
-    return kept, int(best.epochs[0])
+    return train_reader(parts, gated_outputs, weights, shapes, (learning_rate, decay), length, generator)
 
 
-def train_module(
-    parts: Sequence[Part], module: torch.nn.Module, learning_rate: float, decay: float, length: Length, seed: int
-) -> int:
-    """Train the parameters of a module (past, now) -> outputs, as `train_gated` does; returns the number of epochs."""
-    leaves = list(module.parameters())
-    weights = torch.nn.utils.parameters_to_vector(leaves).detach().clone()[None]
-    for leaf, place in zip(leaves, torch.split(weights[0], [leaf.numel() for leaf in leaves]), strict=True):
-        leaf.data = place.view_as(leaf)
-
-    def outputs(past: Tensor, now: Tensor) -> Tensor:
-        made: Tensor = module.train(torch.is_grad_enabled())(past, now)
-        return made
-
-    generator = torch.Generator().manual_seed(seed)
-    best = _train_reader(parts, outputs, weights, leaves, (learning_rate, decay), length, generator)
-    torch.nn.utils.vector_to_parameters(best.kept[0], leaves)
-    return int(best.epochs[0])
-
-
-def _train_reader(
+def train_reader(
     parts: Sequence[Part],
-    network: Callable[[Tensor, Tensor], Tensor],
+    network: Callable[[Mapping[str, Tensor], Tensor, Tensor], Tensor],
     weights: Tensor,
-    leaves: Sequence[Tensor],
+    shapes: Shapes,
     rates: tuple[float, float],
     length: Length,
     generator: torch.Generator,
-) -> BestEpochs:
-    """Train what reads past and present on the first part, stop by the second. rates : of learning, and of decay."""
+) -> tuple[dict[str, Array], int]:
+    """Train what reads past and present on the first part, stop by the second; layers by name, number of epochs.
+
+    network : (layers, past, now) -> outputs. weights : (1, P), changed in place. shapes : of the layers in them.
+    rates : of learning, and of decay. generator : of the batches.
+    """
+    layers = {name: layer.requires_grad_() for name, layer in _layers_by_name(weights, shapes).items()}
     (seen, outputs), watched = (
         ([(_single_tensor(past, "cpu"), _single_tensor(now, "cpu")) for past, now in pairs], _single_tensor(out, "cpu"))
         for pairs, out in parts
     )
-    return minimise_losses(
+    reader = partial(network, layers)
+    best = minimise_losses(
         weights,
-        leaves,
+        list(layers.values()),
         [rates[1]],
         length,
         batches=lambda: torch.split(torch.randperm(len(outputs), generator=generator), length.batch),
         rate=lambda epoch: torch.tensor([[rates[0] * (1 + cos(pi * epoch / length.epochs)) / 2]]),
-        loss=lambda rows: _mirrored_loss(network, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows]),
-        watched=lambda: _mirrored_loss(network, *watched),
+        loss=lambda rows: _mirrored_loss(reader, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows]),
+        watched=lambda: _mirrored_loss(reader, *watched),
     )
+    kept = {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
+    return kept, int(best.epochs[0])
 
 
 def _first_weights(shapes: Shapes, units: int, generator: torch.Generator) -> Tensor:
@@ -338,7 +322,7 @@ def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
     return {name: piece.view(shape) for (name, shape), piece in zip(shapes.items(), pieces, strict=True)}
 
 
-def _gated_outputs(layers: Mapping[str, Tensor], past: Tensor, now: Tensor) -> Tensor:
+def gated_outputs(layers: Mapping[str, Tensor], past: Tensor, now: Tensor) -> Tensor:
     """Outputs (S, 2 r) of a gated recurrent unit on the past (P + 1, S, d), with inputs at the instant (S, e)."""
     flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
     start = torch.zeros(1, len(now), layers["W_h"].shape[1])

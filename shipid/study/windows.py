@@ -14,19 +14,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from shipid.data.dataset import Dataset, read_dataset
+from shipid.data.dataset import read_dataset
 from shipid.data.windows import Windows, from_frame, join_windows
 from shipid.errors import ShipidError
-from shipid.files import make_folder, write_json, write_table
+from shipid.files import write_json, write_table
 from shipid.physics.signals import measurable_signals
 from shipid.study import store
 from shipid.study.foundations import predictions
 from shipid.study.plan import Batch, Plan, read_plan
-from shipid.study.prepare import obtain_runs, prepare
+from shipid.study.prepare import PreparedStudy, obtain_runs, prepare
 
 Array = np.ndarray
 TRUTH_RECORD = "test-truth.json"  # in the folder of a run whose test windows went out with their future
-TRAIN, TEST = "train", "test"
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,103 +34,64 @@ class StudyWindows:
 
     Arrays are float64, contiguous, time first, so `torch.from_numpy` takes each as it is.
 
-    windows : run, instant, columns, past and future of each. Orders of the future are those that the study knows, held
-        or planned. The future of test windows is NaN where `with_truth` is false.
-    split : `train` or `test`, (S,). fold : in which the window validates, -1 for the test, (S,).
-    folds : (training, validation) indices of each fold, which share no moment.
-    physics : foundation -> path (T, S, 2) [m] in the frame (11); zeros without physics.
-    digest : of the study.
+    run, instant [s, clock of the run], split (`train` or `test`), fold (in which the window validates, -1 for the
+    test) : the keys, (S,). folds : (training, validation) indices of each fold, which share no moment.
+    state : at the instant, (S, d). past : columns P, ..., 1 steps before, the oldest first, (P, S, e).
+    orders : from step i-1 to i of the horizon, held or known as in the study, (T, S, c).
+    wind : and other environment at the instant, (S, w).
+    names : names of the last axis of `state`, `past`, `orders` and `wind`.
+    future : true path (T, S, 2) [m] in the frame (11); NaN for the test unless it went out `with_truth`.
+    physics : foundation -> its path (T, S, 2) [m]; zeros without physics.
+    residual : foundation -> future less that path, the target of the paper, eqs. 12 and 13.
+    windows : the same as `Windows`, for methods of shipid. digest : of the study.
     """
 
-    windows: Windows
-    split: Array
-    fold: Array
+    run: Array = field(repr=False)
+    instant: Array = field(repr=False)
+    split: Array = field(repr=False)
+    fold: Array = field(repr=False)
     folds: Sequence[tuple[Array, Array]] = field(repr=False)
+    state: Array = field(repr=False)
+    past: Array = field(repr=False)
+    orders: Array = field(repr=False)
+    wind: Array = field(repr=False)
+    names: Mapping[str, tuple[str, ...]]
+    future: Array = field(repr=False)
     physics: Mapping[str, Array] = field(repr=False)
+    residual: Mapping[str, Array] = field(repr=False)
+    windows: Windows = field(repr=False)
     digest: str
     with_truth: bool
-
-    @property
-    def run(self) -> Array:
-        """Name of the run, (S,)."""
-        return self.windows.run
-
-    @property
-    def instant(self) -> Array:
-        """Instant of prediction on the clock of the run [s], (S,)."""
-        return self.windows.t
-
-    @property
-    def names(self) -> dict[str, tuple[str, ...]]:
-        """Names of the last axis of `state`, `past`, `orders` and `wind`."""
-        wind, orders = tuple(measurable_signals(self.windows.columns)), tuple(self.windows.planned)
-        others = {*wind, *orders, "t", "run", "flags"}
-        state = tuple(name for name in self.windows.columns if name not in others)
-        return {"state": state, "past": tuple(self.windows.past), "orders": orders, "wind": wind}
-
-    @property
-    def state(self) -> Array:
-        """State at the instant, (S, d)."""
-        return _last_axis(self.windows.columns, self.names["state"], (len(self.windows),))
-
-    @property
-    def past(self) -> Array:
-        """Columns P, ..., 1 steps before the instant, the oldest first, (P, S, d)."""
-        return _last_axis(self.windows.past, self.names["past"], (self.windows.num_past, len(self.windows)))
-
-    @property
-    def orders(self) -> Array:
-        """Orders from step i-1 to i of the horizon as the study knows them, (T, S, c)."""
-        return _last_axis(self.windows.planned, self.names["orders"], (self.windows.horizon, len(self.windows)))
-
-    @property
-    def wind(self) -> Array:
-        """Wind and other environment at the instant, (S, w)."""
-        return _last_axis(self.windows.columns, self.names["wind"], (len(self.windows),))
-
-    @property
-    def future(self) -> Array:
-        """True path (T, S, 2) [m] in the frame (11)."""
-        return self.windows.future
-
-    @property
-    def residual(self) -> dict[str, Array]:
-        """Foundation -> (T, S, 2) [m], true path less that of the physics: the target of the paper, eqs. 12 and 13."""
-        return {name: self.future - paths for name, paths in self.physics.items()}
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the tables `windows`, `past`, `future` and `physics`, with the keys `run` and `instant`.
 
         A row of the last three is a time `ahead` [s] of a window. In `physics` a foundation is a `model`.
         """
-        cut, steps = self.windows, _steps_ahead(self.windows)
-        now = {name: values for name, values in cut.columns.items() if name not in ("t", "run", "flags")}
-        keys = {"run": cut.run, "instant": cut.t, "split": self.split, "fold": self.fold}
+        cut = self.windows
+        keys = {"run": self.run, "instant": self.instant, "split": self.split, "fold": self.fold}
         held = {name: np.tile(cut.columns[name], (cut.horizon, 1)) for name in self.names["wind"]}
-        residual = self.residual
+        missed = {name: dict(zip("xy", np.moveaxis(one, -1, 0), strict=True)) for name, one in self.residual.items()}
         models = [
-            prediction_table(cut, paths, residual_x=residual[name][..., 0], residual_y=residual[name][..., 1]).assign(
-                model=name
-            )
+            prediction_table(cut, paths, **{f"residual_{axis}": missed[name][axis] for axis in "xy"}).assign(model=name)
             for name, paths in self.physics.items()
         ]
         frames = {
-            "windows": pd.DataFrame(keys | now),
+            "windows": pd.DataFrame(keys | {name: cut.columns[name] for name in _measured_names(cut)}),
             "past": _long_table(cut, cut.step * np.arange(-cut.num_past, 0), cut.past),
             "future": prediction_table(cut, cut.future, **cut.states, **cut.planned, **held),
             "physics": pd.concat(models, ignore_index=True),
         }
         for frame in frames.values():  # Parquet keeps it, and so do copies of a frame
             frame.attrs["shipid"] = {"study": self.digest, "with_truth": self.with_truth}
-        return frames if cut.num_past else {name: frame for name, frame in frames.items() if name != "past"}
+        return frames
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write the tables as Parquet into a folder; the files. OSError where it cannot be written."""
-        make_folder(Path(folder))
-        files = {name: Path(folder) / f"{name}.parquet" for name in self.tables()}
-        for name, frame in self.tables().items():
-            write_table(files[name], frame)
-        return list(files.values())
+        tables = {Path(folder) / f"{name}.parquet": frame for name, frame in self.tables().items()}
+        for file, frame in tables.items():
+            write_table(file, frame)
+        return list(tables)
 
 
 def windows(
@@ -155,7 +115,7 @@ def windows(
     ShipidError for a study of several parts, and for an amount or a seed that the grid does not have.
     """
     folder = Path(study) if not isinstance(study, Plan) and (Path(study) / store.STUDY).is_file() else None
-    plan = study if isinstance(study, Plan) else read_plan(study) if folder is None else store.stored_plan(folder)
+    plan = study if isinstance(study, Plan) else read_plan(Path(study)) if folder is None else store.stored_plan(folder)
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
     grid = plan.study.grid
@@ -163,38 +123,51 @@ def windows(
     for name, value, known in (("N_D", batch.N_D, grid.N_D), ("seed", batch.seed, grid.seeds)):
         if value not in known:
             raise ShipidError(f"{value} is not in the grid of the study: {', '.join(map(str, known))}", path=name)
+    stored = folder is not None and (folder / store.DATASET).is_file()
+    dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
     if with_truth and folder is not None:
         write_json(folder / TRUTH_RECORD, {"with_truth": True})
-    return _cut_batch(plan, _runs_of(plan, folder), batch, with_truth, device)
+    return _cut_batch(prepare(plan, dataset, device), plan.digest, batch, with_truth, device)
 
 
-def _runs_of(plan: Plan, folder: Path | None) -> Dataset:
-    """The runs of a study, as its folder holds them if there are any."""
-    stored = folder is not None and (folder / store.DATASET).is_file()
-    return read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
-
-
-def _cut_batch(plan: Plan, dataset: Dataset, batch: Batch, with_truth: bool, device: str) -> StudyWindows:
-    prepared = prepare(plan, dataset, device)
-    runs = prepared.runs(batch)
+def _cut_batch(prepared: PreparedStudy, digest: str, batch: Batch, with_truth: bool, device: str) -> StudyWindows:
+    runs, known = prepared.runs(batch), prepared.study.prediction.known
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
     folds = prepared.folds(batch, train, "runs")
-    parts = [
-        hide_future(one, plan.study.prediction.known, with_truth or one is train) for one in (train, prepared.test)
-    ]
-    fold = np.full(sum(map(len, parts)), -1)
+    cut = join_windows([hide_future(train, known, True), hide_future(prepared.test, known, with_truth)])
+    fold = np.full(len(cut), -1)
     for number, (_, validation) in enumerate(folds):
         fold[validation] = number
-    known = predictions(prepared, runs, device)
+    wind, orders = tuple(measurable_signals(cut.columns)), tuple(cut.planned)
+    state = tuple(name for name in _measured_names(cut) if name not in {*wind, *orders})
+    names = {"state": state, "past": tuple(cut.past), "orders": orders, "wind": wind}
+    physics = {
+        name: np.concatenate([one.paths, one.test_paths], axis=1)
+        for name, one in predictions(prepared, runs, device).items()
+    }
     return StudyWindows(
-        windows=join_windows(parts),
-        split=np.repeat([TRAIN, TEST], [len(part) for part in parts]),
+        run=cut.run,
+        instant=cut.t,
+        split=np.repeat(["train", "test"], [len(train), len(prepared.test)]),
         fold=fold,
         folds=folds,
-        physics={name: np.concatenate([one.paths, one.test_paths], axis=1) for name, one in known.items()},
-        digest=plan.digest,
+        state=_last_axis(cut.columns, state, (len(cut),)),
+        past=_last_axis(cut.past, names["past"], (cut.num_past, len(cut))),
+        orders=_last_axis(cut.planned, orders, (cut.horizon, len(cut))),
+        wind=_last_axis(cut.columns, wind, (len(cut),)),
+        names=names,
+        future=cut.future,
+        physics=physics,
+        residual={name: cut.future - paths for name, paths in physics.items()},
+        windows=cut,
+        digest=digest,
         with_truth=with_truth,
     )
+
+
+def _measured_names(cut: Windows) -> list[str]:
+    """Names of the columns that hold what is measured."""
+    return [name for name in cut.columns if name not in ("t", "run", "flags")]
 
 
 def hide_future(cut: Windows, known: bool, with_truth: bool) -> Windows:
@@ -212,11 +185,8 @@ def prediction_table(cut: Windows, paths: Array, **columns: Array) -> pd.DataFra
     """
     now, (x, y) = cut.columns, np.moveaxis(paths, -1, 0)
     north, east = from_frame(x, y, now["north"], now["east"], now["psi"])
-    return _long_table(cut, _steps_ahead(cut), {"north": north, "east": east, "x": x, "y": y, **columns})
-
-
-def _steps_ahead(cut: Windows) -> Array:
-    return cut.step * np.arange(1, cut.horizon + 1)
+    steps = cut.step * np.arange(1, cut.horizon + 1)
+    return _long_table(cut, steps, {"north": north, "east": east, "x": x, "y": y, **columns})
 
 
 def _long_table(cut: Windows, ahead: Array, columns: Mapping[str, Array]) -> pd.DataFrame:
