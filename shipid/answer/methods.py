@@ -63,8 +63,7 @@ def score(
     if (doubt := next((one.doubt for one in rivals if one.doubt), "")) and not anyway:
         raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=file)
     keep_predictions(file, results.folder)
-    cells = method_cells(results)
-    return {one.label: method_table(cells, one.label) for one in rivals}
+    return {one.label: method_table(method_cells(results), one.label) for one in rivals}
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
@@ -76,9 +75,11 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
     """
     saw, rows = results.saw_test, []
     for row in results.rows:
-        kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
-        kept |= {"condition": condition, "world": world, "end": np.nan, "errors": None}
-        kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
+        kept = {
+            **{name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")},
+            **{"condition": condition, "world": world, "end": np.nan, "errors": None},
+            **{"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw},
+        }
         if (cell := row["cell"]) in results.paths:
             kept["end"] = float(position_error(results.paths[cell][-1:], results.test.future[-1:]).mean())
             learns = learns_from_runs(results.plan, row["family"], row["method"])
@@ -122,12 +123,15 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
         every_cell = len(group.drop_duplicates(["world", "foundation", "seed"]))
         for method, mine in group.groupby("method", sort=False):
             good, errors = mine[mine["status"] == "ok"], by_method[str(method)]
-            row: dict[str, Any] = {"condition": condition, "family": family, "N_D": N_D, "method": method}
-            row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
-            row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
-            row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
-            rows.append(row)
+            rows.append(
+                {
+                    **{"condition": condition, "family": family, "N_D": N_D, "method": method},
+                    **{"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)},
+                    **{name: good[name].astype(float).mean() for name in ("H", "H_90", "end")},
+                    **{name: mine[name].astype(float).mean() for name in ("seconds", "trials")},
+                    **{"reference": reference, **_difference_row(errors, by_method.get(reference, {}))},
+                }
+            )
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)
 
 

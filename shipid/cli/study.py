@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
 MOST_DIFFERENCES = 20  # of documents, on a terminal
+DIFFERENCE = {"difference": "difference", "low": "95 % from", "high": "to"}
 CELL = {"family": "family", "method": "method", "N_D": "N_D"}
 
 
@@ -228,8 +229,7 @@ def study_score(
 ) -> None:
     """Score predictions of others on the test windows of a run, beside its methods, also in its page."""
     with open_answer(as_json) as answer:
-        heads = CELL | {"H": "H [m]", "H_90": "H_90 [m]", "end": "end [m]", "difference": "difference"}
-        heads |= {"low": "95 % from", "high": "to", "better": "better runs"}
+        heads = CELL | {"H": "H [m]", "H_90": "H_90 [m]", "end": "end [m]"} | DIFFERENCE | {"better": "better runs"}
         for label, table in shipid.score(folder, predictions, anyway=anyway).items():
             answer.say(f"H, and its difference to that of {label}, with its 95 % interval over test runs:")
             answer.records(label, table, heads)
@@ -283,7 +283,7 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
         f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
-    lengths = {"first": first, "other": "other", "difference": "difference", "low": "95 % from", "high": "to"}
+    lengths = {"first": first, "other": "other"} | DIFFERENCE
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
     banded = bool(errors[list(bands)].notna().any(axis=None))
     heads |= {"cells": "cells"} | lengths | (bands if banded else {}) | {"verdict": "verdict"}

@@ -13,11 +13,9 @@ from shipid.export.correctors import networks_of
 from shipid.export.model import ExportModel
 from shipid.files import replace_whole
 from shipid.hybrid.compensator import Compensator, Layers, Normaliser
-from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.version import __version__
 
-NO_ONNX = "an ONNX file needs the package onnx: pip install 'shipid[export]'"
 OPSET = 17  # the newest of ONNX 1.12, which all runtimes of the last years have
 
 
@@ -25,12 +23,21 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     """Write the networks; ShipidError for a method without networks, or where onnx is not installed.
 
     Inputs (S, d) are those of the method, in the order that the metadata `inputs` says. The output of a compensator is
-    `compensation` (S, T, 2) [m], of `one-step` `acceleration` (S, 3) [m/s^2, rad/s^2].
+    `compensation` (S, T, 2) [m], of `one-step` `acceleration` (S, 3) [m/s^2, rad/s^2]. A network of a user has the
+    inputs `past` (P + 1, S, d), the oldest first, and `now` (S, e), in single precision.
     """
     try:
-        from onnx import TensorProto, checker, helper, numpy_helper, save
+        from onnx import TensorProto, checker, helper, load, numpy_helper, save
     except ImportError:
-        raise ShipidError(NO_ONNX) from None
+        raise ShipidError("an ONNX file needs the package onnx: pip install 'shipid[export]'") from None
+    trace, provenance = getattr(model.predictor.corrector, "trace_onnx", None), dict(model.predictor.provenance)
+    if trace is not None:
+        with replace_whole(file) as temporary:
+            properties = {"inputs": json.dumps(trace(temporary)), "provenance": json.dumps(provenance, default=str)}
+            traced = load(str(temporary))
+            helper.set_model_props(traced, properties)
+            save(traced, str(temporary))
+        return file
     networks, result, shape = _networks_to_write(model)
     kind = np.dtype(np.float32 if single else np.float64)
     names = list(dict.fromkeys(each for normaliser, _ in networks for each in normaliser.names))
@@ -64,28 +71,9 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     opset = [helper.make_opsetid("", OPSET)]
     made = helper.make_model(graph, opset_imports=opset, producer_name="shipid", producer_version=__version__)
     made.ir_version = 8
-    provenance = json.dumps(dict(model.predictor.provenance), default=str)
-    helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": provenance})
+    helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": json.dumps(provenance, default=str)})
     checker.check_model(made)
     with replace_whole(file) as temporary:
-        save(made, str(temporary))
-    return file
-
-
-def write_module(predictor: DeployedMethod, file: Path) -> Path:
-    """Write the networks of a method that its user wrote with PyTorch; ShipidError without onnx.
-
-    Inputs `past` (P + 1, S, d), the oldest first, and `now` (S, e) are as measured; the metadata name their last axes.
-    The output is `compensation` (S, T, 2) [m]. In single precision.
-    """
-    try:
-        from onnx import helper, load, save
-    except ImportError:
-        raise ShipidError(NO_ONNX) from None
-    with replace_whole(file) as temporary:
-        names = predictor.corrector.trace_onnx(temporary)  # type: ignore[attr-defined]
-        made, provenance = load(str(temporary)), json.dumps(dict(predictor.provenance), default=str)
-        helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": provenance})
         save(made, str(temporary))
     return file
 

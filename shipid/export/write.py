@@ -17,7 +17,7 @@ from shipid.export.c_vessel import vessel_files
 from shipid.export.casadi import write_predictor_function, write_vessel_function
 from shipid.export.fmu import predictor_unit, vessel_unit, write_fmu
 from shipid.export.model import ExportModel, build_model
-from shipid.export.onnx import write_module, write_onnx
+from shipid.export.onnx import write_onnx
 from shipid.files import write_set
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.vessel.load import Vessel
@@ -60,8 +60,6 @@ def export_predictor(
     target, file, title = _check_target(to, out, name)
     if single and to != "onnx":
         raise DocumentError(f"{to} is always in double precision: leave --single out", path="--single")
-    if to == "onnx" and hasattr(predictor.corrector, "trace_onnx"):
-        return [write_module(predictor, file)]
     model = build_model(predictor)
     return [write_onnx(model, title, file, single=True)] if single else target.predictor(model, title, file)
 

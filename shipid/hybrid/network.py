@@ -45,10 +45,9 @@ class TrainedModule(GatedNetwork):
 
     def module(self) -> torch.nn.Module:
         """Build the network in double precision, ready to predict."""
-        method: NetworkMethod = METHODS[self.kind].model_validate_json(self.settings)
-        built = method.network(
-            self.point, len(self.reader.past.names), len(self.reader.now.names), 2 * len(self.basis.T)
-        )
+        method: Any = METHODS[self.kind].model_validate_json(self.settings)
+        sizes = len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[1]
+        built: torch.nn.Module = method.network(self.point, *sizes)
         built.load_state_dict({name: torch.as_tensor(layer) for name, layer in self.layers.items()}, strict=False)
         return built.double().eval()
 
@@ -117,24 +116,20 @@ class NetworkProblem(RecurrentProblem):
 
     def learn(self, reader: SequenceReader, parts: Any, point: Point, scale: float, seed: int) -> tuple[Any, int]:
         """Return the network of the best epoch, and its number of epochs."""
-        method, basis = self.method, self.basis * scale
-        length, rates = (
-            Length(method.epochs, method.batch, method.patience),
-            (point["learning_rate"], method.weight_decay),
-        )
+        method, basis, rate = self.method, self.basis * scale, point["learning_rate"]
+        network = TrainedModule(reader, {}, basis, method_kind(method), method.model_dump_json(), dict(point))
         with torch.random.fork_rng():
             torch.manual_seed(seed)
-            network = TrainedModule(reader, {}, basis, method_kind(method), method.model_dump_json(), dict(point))
             module = network.module().float()
-
-            def outputs(layers: Mapping[str, Tensor], *seen: Tensor) -> Tensor:
-                made: Tensor = functional_call(module.train(torch.is_grad_enabled()), dict(layers), seen)
-                return made
-
-            shapes = {name: tuple(layer.shape) for name, layer in module.named_parameters()}
-            weights = torch.nn.utils.parameters_to_vector(module.parameters()).detach()[None].clone()
-            generator = torch.Generator().manual_seed(seed)
-            layers, epochs = train_reader(parts, outputs, weights, shapes, rates, length, generator)
+            layers, epochs = train_reader(
+                parts,
+                lambda layers, *seen: functional_call(module.train(torch.is_grad_enabled()), dict(layers), seen),
+                torch.nn.utils.parameters_to_vector(module.parameters()).detach()[None].clone(),
+                {name: tuple(layer.shape) for name, layer in module.named_parameters()},
+                (rate, method.weight_decay),
+                Length(method.epochs, method.batch, method.patience),
+                torch.Generator().manual_seed(seed),
+            )
         return replace(network, layers=layers), epochs
 
 

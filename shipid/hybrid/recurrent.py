@@ -170,7 +170,7 @@ class RecurrentProblem(PathProblem):
         return self.learn(reader, parts, point, scale, seed)
 
     def learn(self, reader: SequenceReader, parts: Any, point: Point, scale: float, seed: int) -> tuple[Any, int]:
-        """Return a network trained on parts of the data, see `train_gated`, and its epochs; outputs are over a scale."""
+        """Return a network trained on parts of the data, see `train_gated`, and its epochs; outputs have a scale."""
         from shipid.hybrid.training import Length, train_gated  # a study is read without PyTorch
 
         method = self.method

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,10 +27,8 @@ Array = np.ndarray
 SCORES = "scores"  # folder in that of a run, of the tables that were scored
 KEYS, PLACES = ["run", "instant", "ahead"], ["north", "east"]
 CLOCK_DIGITS = 4  # after the point of a time [s]
-BELIEVED = 0.75  # times the error as given: a change of the places that leaves less undoes a mistake
-CLEARER = 0.9  # times the error under another hypothesis: one further down the list needs less
+BELIEVED = 0.75  # times the error as given, or under a likelier hypothesis: what leaves less undoes a mistake
 FORESEEN = 0.2  # times the least error that can be believed: less is knowledge of the future
-METRES_A_DEGREE = 60 * 1852.0
 
 
 class RivalPrediction(NamedTuple):
@@ -50,7 +48,7 @@ class RivalPrediction(NamedTuple):
 def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
     """Read a table of predictions: run, instant [s], ahead [s], north, east [m], each step of each test window once.
 
-    Columns `model`, `N_D`, `seed` tell several predictions apart; `psi` [rad] is checked where it is given.
+    Columns `model`, `N_D`, `seed` tell several predictions apart.
 
     Raises DataError for a file that is no table, a missing column, a value that is no number, and for steps that are
     missing, doubled or none of a test window.
@@ -62,15 +60,17 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
     for name in (*KEYS, *PLACES):
         if name not in frame:
             raise DataError(f"lacks this column; it has {', '.join(map(str, frame))}", file=file, path=name)
-    rivals, names = list[RivalPrediction](), [*PLACES, *(["psi"] if "psi" in frame else [])]
+    rivals: list[RivalPrediction] = []
     marks = [] if is_blind(file, frame, results.folder) else ["not blind"]
     frame = pd.DataFrame({"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame})
     for (model, N_D, seed), part in frame.groupby(["model", "N_D", "seed"], sort=False):
-        values = _ordered_values(part, names, results.test, file)
-        doubt = doubt_of_places(values[..., :2], results) or doubt_of_heading(values[..., 2:], results.test)
+        places = _ordered_places(part, results.test, file)
+        doubt = doubt_of_places(places, results)
         words = ", ".join([*marks, *(["doubtful"] if doubt else [])])
-        label, paths = f"{model} ({words})" if words else str(model), path_of_places(values[..., :2], results.test)
-        rivals.append(RivalPrediction(label, paths, int(N_D), int(seed), doubt))
+        label = f"{model} ({words})" if words else str(model)
+        rivals.append(
+            RivalPrediction(label, path_of_places(places, results.test), int(str(N_D)), int(str(seed)), doubt)
+        )
     return rivals
 
 
@@ -80,16 +80,14 @@ def is_blind(file: Path, frame: pd.DataFrame, folder: Path) -> bool:
     What can say so: the folder of the run; a table of windows beside the predictions; and the predictions themselves,
     to which a frame of `StudyWindows` passes it on.
     """
-    windows = file.parent / "windows.parquet"
-    frames = [frame, *([pd.read_parquet(windows, columns=["run"])] if windows.is_file() else [])]
+    frames = [frame, *(pd.read_parquet(one, columns=["run"]) for one in file.parent.glob("windows.parquet"))]
     given = any("shipid" in one.attrs and one.attrs["shipid"]["with_truth"] for one in frames)
     return not given and not (folder / TRUTH_RECORD).is_file()
 
 
-def _ordered_values(frame: pd.DataFrame, names: list[str], test: Windows, file: Path) -> Array:
-    """Columns of a table, (T, S, n) in the order of the windows; DataError for a fault of its rows."""
-    keys = prediction_table(test, test.future)[KEYS].round(CLOCK_DIGITS)
-    wanted = pd.MultiIndex.from_frame(keys)
+def _ordered_places(frame: pd.DataFrame, test: Windows, file: Path) -> Array:
+    """North and east (T, S, 2) [m] in the order of the windows; DataError for a fault of the rows."""
+    wanted: Any = pd.MultiIndex.from_frame(prediction_table(test, test.future)[KEYS].round(CLOCK_DIGITS))
     given = frame.round(dict.fromkeys(KEYS[1:], CLOCK_DIGITS)).set_index(KEYS)
     for rows, fault in (
         (given.index[given.index.duplicated()], "are there twice: give each once"),
@@ -99,10 +97,10 @@ def _ordered_values(frame: pd.DataFrame, names: list[str], test: Windows, file: 
         for run, instant, ahead in rows[:1]:
             where = f"run {run!r}, instant {instant:g} s, ahead {ahead:g} s"
             raise DataError(f"{len(rows)} of {len(wanted)} steps {fault}; the first: {where}", file=file)
-    values = given.reindex(wanted)[names].to_numpy(dtype=float)
-    if not np.isfinite(values).all():
-        raise DataError("a value is no number: give one in every row", file=file, path=" or ".join(names))
-    return values.reshape(len(test), test.horizon, len(names)).swapaxes(0, 1)
+    places = given.reindex(wanted)[PLACES].to_numpy(dtype=float)
+    if not np.isfinite(places).all():
+        raise DataError("a place is no number: give one in every row", file=file, path="north or east")
+    return places.reshape(len(test), test.horizon, 2).swapaxes(0, 1)
 
 
 def path_of_places(places: Array, test: Windows, turn: Array | float = 0.0) -> Array:
@@ -115,11 +113,6 @@ def _places_of_path(path: Array, test: Windows) -> Array:
     """Places (T, S, 2) [m], north and east, of a path (T, S, 2) [m] in the frame (11)."""
     north, east, psi = (test.columns[name] for name in (*PLACES, "psi"))
     return np.stack(from_frame(path[..., 0], path[..., 1], north, east, psi), axis=-1)
-
-
-def _ship_places(test: Windows) -> Array:
-    """North, east [m] of the ship at the instants, (S, 2)."""
-    return np.stack([test.columns[name] for name in PLACES], axis=-1)
 
 
 def _undo_delay(steps: int) -> Undoing:
@@ -135,7 +128,7 @@ def _undo_delay(steps: int) -> Undoing:
 
 def _undo_degrees(places: Array, test: Windows) -> Array:
     """Places that are latitudes and longitudes, from the first step of constant u, v, r on."""
-    scale = METRES_A_DEGREE * np.array([1.0, np.cos(np.radians(places[..., 0].mean()))])
+    scale = 60 * 1852.0 * np.array([1.0, np.cos(np.radians(places[..., 0].mean()))])
     first = _places_of_path(constant_motion(test), test)[:1]
     return path_of_places(first + (places - places[:1]) * scale, test)
 
@@ -151,11 +144,11 @@ Undoing = Callable[[Array, Windows], Array]
 HYPOTHESES: dict[str, Undoing] = {
     "wrong frame, north and east are exchanged": lambda places, test: path_of_places(places[..., ::-1], test),
     "wrong frame, north and east count from the ship": lambda places, test: path_of_places(
-        places + _ship_places(test), test
+        places + _places_of_path(0 * places, test), test
     ),
     "wrong frame, north and east are x and y in the axes of the ship": lambda places, _: places,
     "wrong frame, x and y are added to north and east without the heading": lambda places, test: (
-        places - _ship_places(test)
+        places - _places_of_path(0 * places, test)
     ),
     "wrong frame, the heading turns the path the wrong way": lambda places, test: path_of_places(
         places, test, -2 * test.columns["psi"]
@@ -185,17 +178,11 @@ def doubt_of_places(places: Array, results: Results) -> str:
     naive = _places_of_path(constant_motion(test), test)
     for words, undo in hypotheses_of(test).items() if test.horizon > 1 else ():
         gain, fair = (_error_ratio(undo(given, test), path_of_places(given, test), test) for given in (places, naive))
-        if gain < BELIEVED * min(1.0, fair) and gain < CLEARER * least:
+        if gain < BELIEVED * min(1.0, fair) and gain < BELIEVED * least:
             least, doubt = gain, f"{words}: undone, the error is {gain:.2g} times as large"
     share = float((_errors_at_steps(path_of_places(places, test), test) / believable_errors(results)).min())
     words = f"saw the future: at a step its error is {share:.2g} of the least that can be known"
     return doubt or (words if share < FORESEEN else "")
-
-
-def doubt_of_heading(psi: Array, test: Windows) -> str:
-    """Say that headings (T, S, 1), or (T, S, 0) where none is given, seem to be in degrees; else empty."""
-    given, true = (np.abs(np.sin((one - test.states["psi"][..., None]) / 2)).sum() for one in (psi, np.radians(psi)))
-    return "in degrees, psi: radians are needed" if true < BELIEVED * given else ""
 
 
 def _errors_at_steps(path: Array, test: Windows) -> Array:
@@ -218,16 +205,16 @@ def believable_errors(results: Results) -> Array:
     That of the cells, of the physics, and of a quadratic law of the state and the orders that is fitted to the test
     itself, which nobody can know.
     """
-    test, known = results.test, [*results.physics.values(), *(results.paths[cell] for cell in results.paths)]
-    names = ("u", "v", "r", *test.planned)
-    values = np.stack([np.asarray(test.columns[name], dtype=float) for name in names])
-    scaled = (values - values.mean(axis=1, keepdims=True)) / np.maximum(values.std(axis=1, keepdims=True), 1e-12)
-    rows = np.concatenate([np.ones((1, len(test))), scaled, *(scaled * row for row in scaled)]).T
-    flat = constant_motion(test).swapaxes(0, 1).reshape(len(test), -1)
-    missed = test.future.swapaxes(0, 1).reshape(len(test), -1) - flat
-    law = flat + rows @ np.linalg.lstsq(rows, missed, rcond=1e-9)[0]
-    known.append(law.reshape(len(test), test.horizon, 2).swapaxes(0, 1))
-    return np.nanmin([_errors_at_steps(path, test) for path in known], axis=0)
+    test, plain = results.test, constant_motion(results.test)
+    values = np.stack([test.columns[name] for name in ("u", "v", "r", *test.planned)]).astype(float)
+    values -= values.mean(axis=1, keepdims=True)
+    rows = np.concatenate([np.ones((1, len(test))), values, *(values * row for row in values)])
+    rows = rows.T / np.maximum(np.abs(rows).max(axis=1), 1e-12)
+    missed = (test.future - plain).swapaxes(0, 1)
+    law = rows @ np.linalg.lstsq(rows, missed.reshape(len(test), -1), rcond=1e-9)[0]
+    known = [*results.physics.values(), *map(results.paths.__getitem__, results.paths)]
+    known.append(plain + law.reshape(missed.shape).swapaxes(0, 1))
+    return np.asarray(np.nanmin([_errors_at_steps(path, test) for path in known], axis=0))
 
 
 def keep_predictions(file: Path, folder: Path) -> None:

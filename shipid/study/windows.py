@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.arguments import check_choice
 from shipid.data.dataset import read_dataset
 from shipid.data.windows import Windows, from_frame, join_windows
 from shipid.errors import ShipidError
@@ -22,7 +23,7 @@ from shipid.physics.signals import measurable_signals
 from shipid.study import store
 from shipid.study.foundations import predictions
 from shipid.study.plan import Batch, Plan, read_plan
-from shipid.study.prepare import PreparedStudy, obtain_runs, prepare
+from shipid.study.prepare import obtain_runs, prepare
 
 Array = np.ndarray
 TRUTH_RECORD = "test-truth.json"  # in the folder of a run whose test windows went out with their future
@@ -32,58 +33,72 @@ TRUTH_RECORD = "test-truth.json"  # in the folder of a run whose test windows we
 class StudyWindows:
     """S windows of a study, those of training first; T steps of the horizon, P of the past; SI units, radians.
 
-    Arrays are float64, contiguous, time first, so `torch.from_numpy` takes each as it is.
-
-    run, instant [s, clock of the run], split (`train` or `test`), fold (in which the window validates, -1 for the
-    test) : the keys, (S,). folds : (training, validation) indices of each fold, which share no moment.
-    state : at the instant, (S, d). past : columns P, ..., 1 steps before, the oldest first, (P, S, e).
-    orders : from step i-1 to i of the horizon, held or known as in the study, (T, S, c).
-    wind : and other environment at the instant, (S, w).
-    names : names of the last axis of `state`, `past`, `orders` and `wind`.
-    future : true path (T, S, 2) [m] in the frame (11); NaN for the test unless it went out `with_truth`.
-    physics : foundation -> its path (T, S, 2) [m]; zeros without physics.
-    residual : foundation -> future less that path, the target of the paper, eqs. 12 and 13.
-    windows : the same as `Windows`, for methods of shipid. digest : of the study.
+    windows : past, present and future of each. Orders over the horizon are those that the study knows, held or known.
+        The future of test windows is NaN unless they went out `with_truth`.
+    keys : a row a window: run, instant [s, clock of the run], split (`train` or `test`), fold (in which it validates,
+        -1 for the test). folds : (training, validation) indices of each fold, which share no moment.
+    physics : foundation -> its path (T, S, 2) [m] in the frame (11); zeros without physics.
     """
 
-    run: Array = field(repr=False)
-    instant: Array = field(repr=False)
-    split: Array = field(repr=False)
-    fold: Array = field(repr=False)
+    windows: Windows
+    keys: pd.DataFrame = field(repr=False)
     folds: Sequence[tuple[Array, Array]] = field(repr=False)
-    state: Array = field(repr=False)
-    past: Array = field(repr=False)
-    orders: Array = field(repr=False)
-    wind: Array = field(repr=False)
-    names: Mapping[str, tuple[str, ...]]
-    future: Array = field(repr=False)
     physics: Mapping[str, Array] = field(repr=False)
-    residual: Mapping[str, Array] = field(repr=False)
-    windows: Windows = field(repr=False)
-    digest: str
     with_truth: bool
+
+    @property
+    def residual(self) -> dict[str, Array]:
+        """Foundation -> (T, S, 2) [m], true path less its own: the target of the paper, eqs. 12 and 13."""
+        return {name: self.windows.future - paths for name, paths in self.physics.items()}
+
+    @property
+    def names(self) -> dict[str, list[str]]:
+        """Names of the last axis of `state`, `wind`, `past` and `orders` of `arrays`."""
+        cut, wind = self.windows, measurable_signals(self.windows.columns)
+        state = [name for name in cut.columns if name not in {*wind, *cut.planned, "t", "run", "flags"}]
+        return {"state": state, "wind": wind, "past": list(cut.past), "orders": list(cut.planned)}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return arrays of float64, time first, of which `torch.from_numpy` takes each as it is.
+
+        state (S, d) and wind (S, w) at the instant; past (P, S, e), the oldest first; orders (T, S, c) from step i-1 to
+        i; future (T, S, 2) [m] in the frame (11).
+        """
+        cut, names = self.windows, self.names
+        tables: dict[str, Mapping[str, Any]] = {
+            "state": cut.columns,
+            "wind": cut.columns,
+            "past": cut.past,
+            "orders": cut.planned,
+        }
+        return {"future": cut.future} | {
+            key: np.ascontiguousarray(np.stack([table[name] for name in names[key]], axis=-1), dtype=float)
+            for key, table in tables.items()
+            if names[key]
+        }
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the tables `windows`, `past`, `future` and `physics`, with the keys `run` and `instant`.
 
         A row of the last three is a time `ahead` [s] of a window. In `physics` a foundation is a `model`.
         """
-        cut = self.windows
-        keys = {"run": self.run, "instant": self.instant, "split": self.split, "fold": self.fold}
-        held = {name: np.tile(cut.columns[name], (cut.horizon, 1)) for name in self.names["wind"]}
-        missed = {name: dict(zip("xy", np.moveaxis(one, -1, 0), strict=True)) for name, one in self.residual.items()}
+        cut, names = self.windows, self.names
+        held = {name: np.tile(cut.columns[name], (cut.horizon, 1)) for name in names["wind"]}
         models = [
-            prediction_table(cut, paths, **{f"residual_{axis}": missed[name][axis] for axis in "xy"}).assign(model=name)
-            for name, paths in self.physics.items()
+            prediction_table(cut, self.physics[name], residual_x=missed[..., 0], residual_y=missed[..., 1]).assign(
+                model=name
+            )
+            for name, missed in self.residual.items()
         ]
+        now = {name: cut.columns[name] for name in (*names["state"], *names["wind"], *names["orders"])}
         frames = {
-            "windows": pd.DataFrame(keys | {name: cut.columns[name] for name in _measured_names(cut)}),
+            "windows": self.keys.assign(**now),
             "past": _long_table(cut, cut.step * np.arange(-cut.num_past, 0), cut.past),
             "future": prediction_table(cut, cut.future, **cut.states, **cut.planned, **held),
             "physics": pd.concat(models, ignore_index=True),
         }
         for frame in frames.values():  # Parquet keeps it, and so do copies of a frame
-            frame.attrs["shipid"] = {"study": self.digest, "with_truth": self.with_truth}
+            frame.attrs["shipid"] = {"with_truth": self.with_truth}
         return frames
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
@@ -120,62 +135,33 @@ def windows(
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
     grid = plan.study.grid
     batch = Batch(max(grid.N_D) if N_D is None else N_D, min(grid.seeds) if seed is None else seed)
-    for name, value, known in (("N_D", batch.N_D, grid.N_D), ("seed", batch.seed, grid.seeds)):
-        if value not in known:
-            raise ShipidError(f"{value} is not in the grid of the study: {', '.join(map(str, known))}", path=name)
+    check_choice("N_D", str(batch.N_D), map(str, grid.N_D))
+    check_choice("seed", str(batch.seed), map(str, grid.seeds))
     stored = folder is not None and (folder / store.DATASET).is_file()
     dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
     if with_truth and folder is not None:
         write_json(folder / TRUTH_RECORD, {"with_truth": True})
-    return _cut_batch(prepare(plan, dataset, device), plan.digest, batch, with_truth, device)
-
-
-def _cut_batch(prepared: PreparedStudy, digest: str, batch: Batch, with_truth: bool, device: str) -> StudyWindows:
-    runs, known = prepared.runs(batch), prepared.study.prediction.known
+    prepared = prepare(plan, dataset, device)
+    runs, known = prepared.runs(batch), plan.study.prediction.known
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
-    folds = prepared.folds(batch, train, "runs")
     cut = join_windows([hide_future(train, known, True), hide_future(prepared.test, known, with_truth)])
-    fold = np.full(len(cut), -1)
+    folds, fold = prepared.folds(batch, train, "runs"), np.full(len(cut), -1)
     for number, (_, validation) in enumerate(folds):
         fold[validation] = number
-    wind, orders = tuple(measurable_signals(cut.columns)), tuple(cut.planned)
-    state = tuple(name for name in _measured_names(cut) if name not in {*wind, *orders})
-    names = {"state": state, "past": tuple(cut.past), "orders": orders, "wind": wind}
-    physics = {
-        name: np.concatenate([one.paths, one.test_paths], axis=1)
+    keys = pd.DataFrame({"run": cut.run, "instant": cut.t, "split": np.where(fold < 0, "test", "train"), "fold": fold})
+    paths = {
+        name: np.ascontiguousarray(np.concatenate([one.paths, one.test_paths], axis=1))
         for name, one in predictions(prepared, runs, device).items()
     }
-    return StudyWindows(
-        run=cut.run,
-        instant=cut.t,
-        split=np.repeat(["train", "test"], [len(train), len(prepared.test)]),
-        fold=fold,
-        folds=folds,
-        state=_last_axis(cut.columns, state, (len(cut),)),
-        past=_last_axis(cut.past, names["past"], (cut.num_past, len(cut))),
-        orders=_last_axis(cut.planned, orders, (cut.horizon, len(cut))),
-        wind=_last_axis(cut.columns, wind, (len(cut),)),
-        names=names,
-        future=cut.future,
-        physics=physics,
-        residual={name: cut.future - paths for name, paths in physics.items()},
-        windows=cut,
-        digest=digest,
-        with_truth=with_truth,
-    )
-
-
-def _measured_names(cut: Windows) -> list[str]:
-    """Names of the columns that hold what is measured."""
-    return [name for name in cut.columns if name not in ("t", "run", "flags")]
+    return StudyWindows(cut, keys, folds, paths, with_truth)
 
 
 def hide_future(cut: Windows, known: bool, with_truth: bool) -> Windows:
     """Windows whose orders over the horizon are those at the instant unless they are `known`, without their future."""
-    held = {name: np.tile(cut.columns[name], (cut.horizon, 1)) for name in cut.planned}
-    cut = cut if known else replace(cut, planned=held)
-    hidden = {name: np.full_like(values, np.nan) for name, values in cut.states.items()}
-    return cut if with_truth else replace(cut, future=np.full_like(cut.future, np.nan), states=hidden)
+    planned = cut.planned if known else {name: np.tile(cut.columns[name], (cut.horizon, 1)) for name in cut.planned}
+    shown = 1.0 if with_truth else np.nan
+    states = {name: shown * values for name, values in cut.states.items()}
+    return replace(cut, planned=planned, future=np.ascontiguousarray(shown * cut.future), states=states)
 
 
 def prediction_table(cut: Windows, paths: Array, **columns: Array) -> pd.DataFrame:
@@ -194,12 +180,3 @@ def _long_table(cut: Windows, ahead: Array, columns: Mapping[str, Array]) -> pd.
     keys: dict[str, Any] = {"run": np.repeat(cut.run, len(ahead)), "instant": np.repeat(cut.t, len(ahead))}
     keys["ahead"] = np.tile(ahead, len(cut))
     return pd.DataFrame(keys | {name: np.asarray(values).T.ravel() for name, values in columns.items()})
-
-
-def _last_axis(columns: Mapping[str, Any], names: Sequence[str], shape: tuple[int, ...]) -> Array:
-    """Columns of a shape as one array of float64, their names along the last axis."""
-    return (
-        np.stack([np.asarray(columns[name], dtype=float) for name in names], axis=-1)
-        if names
-        else np.zeros((*shape, 0))
-    )

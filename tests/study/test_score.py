@@ -1,0 +1,133 @@
+"""Predictions of others: scored as the study scores its own, and what is wrong with them is named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import shipid
+from shipid.data.windows import Windows, from_frame
+from shipid.errors import DataError
+from shipid.study.results import Results, read_results
+from shipid.study.score import SCORES, read_predictions
+from shipid.study.windows import prediction_table, windows
+from tests.hybrid.quick import QUICK
+from tests.study.tiny import run_here, tiny_plan, without_figures
+
+Array = np.ndarray
+NOISE = {"velocity": 0.05, "position": 0.0}
+KINDS = ["alone", *(kind for kind in QUICK if kind != "forest")]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """A small study of every bundled method that needs no further package, on physics that is far from the truth."""
+    folder = tmp_path_factory.mktemp("scored")
+    blocks = [{"name": kind, "kind": kind, "families": ["*"], **QUICK.get(kind, {})} for kind in KINDS]
+    plan = tiny_plan(folder, {"method": blocks, "grid.N_D": [4], "truth.duration": 40.0, "prediction.past": 4.0})
+    run_here(plan, folder / "run")
+    return read_results(folder / "run")
+
+
+def written(file: Path, results: Results, path: Array, **columns: Any) -> Path:
+    prediction_table(results.test, path).assign(**columns).to_parquet(file)
+    return file
+
+
+def test_own_predictions_have_the_score_of_the_study_and_are_not_accused(tmp_path: Path, results: Results) -> None:
+    rows = [row for row in results.rows if row["status"] == "ok"]
+    assert {row["method"] for row in rows} == {*KINDS}
+    for row in rows:
+        file = written(tmp_path / "mine.parquet", results, results.paths[row["cell"]], N_D=4, seed=0)
+        (one,) = read_predictions(file, results)
+        assert (one.label, one.N_D, one.doubt) == ("mine", 4, ""), row["cell"]
+        error = shipid.position_error(one.paths, results.test.future)
+        assert [error.mean(), np.quantile(error, 0.9)] == pytest.approx([row["H"], row["H_90"]], rel=1e-9)
+
+
+def turned(path: Array, test: Windows, psi: Array) -> Array:
+    """Places (T, S, 2) [m] of a path that another heading turns."""
+    return np.stack(from_frame(path[..., 0], path[..., 1], test.columns["north"], test.columns["east"], psi), axis=-1)
+
+
+FAULTS: dict[str, Callable[[Array, Windows], Array]] = {
+    "wrong frame, north and east are exchanged": lambda p, w: turned(p, w, w.columns["psi"])[..., ::-1],
+    "wrong frame, north and east count": lambda p, w: turned(p, w, w.columns["psi"]) - turned(0 * p, w, np.zeros(1)),
+    "wrong frame, north and east are x and y": lambda p, _: p,
+    "wrong frame, x and y are added": lambda p, w: turned(p, w, np.zeros(1)),
+    "wrong frame, the heading": lambda p, w: turned(p, w, -w.columns["psi"]),
+    "mirrored, port": lambda p, w: turned(p * [1, -1], w, w.columns["psi"]),
+    "mirrored, ahead": lambda p, w: turned(-p, w, w.columns["psi"]),
+    "in degrees, the heading": lambda p, w: turned(p, w, np.degrees(w.columns["psi"])),
+    "in degrees, north": lambda p, w: [63.0, 10.0] + turned(p, w, w.columns["psi"]) / [111120.0, 50448.0],
+    "late by 1 step": lambda p, w: turned(np.concatenate([0 * p[:1], p[:-1]]), w, w.columns["psi"]),
+    "early by 1 step, saw": lambda p, w: turned(np.concatenate([p[1:], 2 * p[-1:] - p[-2:-1]]), w, w.columns["psi"]),
+    "the path does not start": lambda p, w: turned(p + [9.0, -4.0], w, w.columns["psi"]),
+    "saw the future": lambda p, w: turned(0.05 * p + 0.95 * w.future, w, w.columns["psi"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_fault_is_named(tmp_path: Path, results: Results, fault: str) -> None:
+    """In predictions of a cell that is drawn; one that saw the future is nearer than all that can be known."""
+    rng = np.random.default_rng(len(fault))
+    far = [cell for cell in results.paths if cell.startswith(("wrong", "none"))]
+    for cell in rng.choice(far, 3, replace=False):
+        places = FAULTS[fault](results.paths[str(cell)], results.test)
+        table = prediction_table(results.test, 0 * places).assign(
+            north=np.asarray(places)[..., 0].T.ravel(), east=np.asarray(places)[..., 1].T.ravel()
+        )
+        table.to_parquet(tmp_path / "p.parquet")
+        (one,) = read_predictions(tmp_path / "p.parquet", results)
+        assert one.doubt.startswith(fault), cell
+        with pytest.raises(DataError, match="if it is meant so, --anyway scores it as doubtful"):
+            shipid.score(results.folder, tmp_path / "p.parquet")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.drop(columns="north"), "north: lacks this column; it has run, instant"),
+        (lambda t: t.drop(index=7), "1 of .* steps are missing; the first: run"),
+        (lambda t: pd.concat([t, t[3:5]]), "2 of .* steps are there twice"),
+        (lambda t: t.assign(run="other"), "are none of the test"),
+        (lambda t: t.assign(ahead=t["ahead"] - 1.0), "ahead 0 s"),
+        (lambda t: t.assign(east=np.nan), "north or east: a place is no number"),
+    ],
+)
+def test_faults_of_rows_are_one_line(tmp_path: Path, results: Results, change: Any, words: str) -> None:
+    path = next(iter(results.paths.values()))
+    change(prediction_table(results.test, path)).to_parquet(tmp_path / "p.parquet")
+    with pytest.raises(DataError, match=words):
+        read_predictions(tmp_path / "p.parquet", results)
+    with pytest.raises(DataError, match=r"none\.parquet: cannot be read as Parquet"):
+        read_predictions(tmp_path / "none.parquet", results)
+
+
+def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blind(
+    tmp_path: Path, results: Results
+) -> None:
+    cell = next(row for row in results.rows if row["method"] == "path-drawn" and row["family"] == "wrong")
+    file = written(tmp_path / "rival.parquet", results, results.paths[cell["cell"]])
+    table = shipid.score(results.folder, file)["rival"]
+    same = table[table["method"].eq("path-drawn") & table["family"].eq("right")].iloc[0]
+    assert same["difference"] == pytest.approx(results.cells.set_index("cell").H["right+path-drawn-N0004-s0"] - cell["H"])
+    assert same["low"] < same["difference"] < same["high"] or same["runs"] < 5
+    page = shipid.compare_methods(results)
+    assert set(page[page["method"] == "rival"]["family"]) == {"right", "wrong", "none", "with physics"}
+    with without_figures():
+        assert shipid.write_pages(results.folder).is_file()
+    # the tables carry it, also beside the predictions, and the folder of the run remembers it
+    out = windows(results.plan, with_truth=True)
+    passed = written(tmp_path / "passed.parquet", results, out.physics["right"][:, out.keys["split"] == "test"])
+    out.write(tmp_path / "beside")
+    beside = written(tmp_path / "beside" / "mine.parquet", results, results.paths[cell["cell"]])
+    assert [one.label for f in (passed, beside) for one in read_predictions(f, results)] == ["passed", "mine (not blind)"]
+    windows(results.folder, with_truth=True)
+    assert [one.label for one in read_predictions(passed, results)] == ["passed (not blind)"]
+    (results.folder / SCORES / "rival.parquet").unlink()
