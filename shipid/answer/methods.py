@@ -63,7 +63,8 @@ def score(
     if (doubt := next((one.doubt for one in rivals if one.doubt), "")) and not anyway:
         raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=file)
     keep_predictions(file, results.folder)
-    return {one.label: method_table(method_cells(results), one.label) for one in rivals}
+    cells, names = method_cells(results), {way.name for way in results.plan.methods}
+    return {one.label: method_table(cells[cells["method"].isin({*names, one.label})], one.label) for one in rivals}
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:

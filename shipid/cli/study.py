@@ -231,8 +231,10 @@ def study_score(
     with open_answer(as_json) as answer:
         heads = CELL | {"H": "H [m]", "H_90": "H_90 [m]", "end": "end [m]"} | DIFFERENCE | {"better": "better runs"}
         for label, table in shipid.score(folder, predictions, anyway=anyway).items():
-            answer.say(f"H, and its difference to that of {label}, with its 95 % interval over test runs:")
-            answer.records(label, table, heads)
+            mine = table[table["method"].eq(label)].iloc[0]
+            words = f"{label}: H {mine.H:.4g} m, H_90 {mine.H_90:.4g} m, {mine.end:.4g} m at the end of the horizon"
+            answer.say(f"{words}\nothers, and their H less this one, with its 95 % interval over test runs:")
+            answer.records(label, table, heads, shown=table[table["method"].ne(label)])
     with show_steps() as say:
         shipid.write_pages(folder, say)
 
@@ -283,10 +285,14 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
         f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
-    lengths = {"first": first, "other": "other"} | DIFFERENCE
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
     banded = bool(errors[list(bands)].notna().any(axis=None))
-    heads |= {"cells": "cells"} | lengths | (bands if banded else {}) | {"verdict": "verdict"}
+    heads |= (
+        {"cells": "cells", "first": first, "other": "other"}
+        | DIFFERENCE
+        | (bands if banded else {})
+        | {"verdict": "verdict"}
+    )
     answer.records("errors", errors, heads, dict.fromkeys(bands, share_text))
     answer.say("verdict: lower or higher where the test shows it, corrected for the rows of a run; empty: it does not")
     answer.say("\n".join(compared.notes), notes=compared.notes)

@@ -33,9 +33,8 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     trace, provenance = getattr(model.predictor.corrector, "trace_onnx", None), dict(model.predictor.provenance)
     if trace is not None:
         with replace_whole(file) as temporary:
-            properties = {"inputs": json.dumps(trace(temporary)), "provenance": json.dumps(provenance, default=str)}
-            traced = load(str(temporary))
-            helper.set_model_props(traced, properties)
+            inputs, traced = json.dumps(trace(temporary)), load(str(temporary))
+            helper.set_model_props(traced, {"inputs": inputs, "provenance": json.dumps(provenance, default=str)})
             save(traced, str(temporary))
         return file
     networks, result, shape = _networks_to_write(model)

@@ -46,8 +46,9 @@ class TrainedModule(GatedNetwork):
     def module(self) -> torch.nn.Module:
         """Build the network in double precision, ready to predict."""
         method: Any = METHODS[self.kind].model_validate_json(self.settings)
-        sizes = len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[1]
-        built: torch.nn.Module = method.network(self.point, *sizes)
+        built: torch.nn.Module = method.network(
+            self.point, len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[1]
+        )
         built.load_state_dict({name: torch.as_tensor(layer) for name, layer in self.layers.items()}, strict=False)
         return built.double().eval()
 

@@ -26,7 +26,6 @@ from shipid.study.windows import TRUTH_RECORD, prediction_table
 Array = np.ndarray
 SCORES = "scores"  # folder in that of a run, of the tables that were scored
 KEYS, PLACES = ["run", "instant", "ahead"], ["north", "east"]
-CLOCK_DIGITS = 4  # after the point of a time [s]
 BELIEVED = 0.75  # times the error as given: a change of the places that leaves less undoes a mistake
 GENERAL = 0.3  # times the error under any other hypothesis: a wrong start explains more if less is left
 FORESEEN = 0.2  # times the least error that can be believed: less is knowledge of the future
@@ -35,7 +34,8 @@ FORESEEN = 0.2  # times the least error that can be believed: less is knowledge 
 class RivalPrediction(NamedTuple):
     """A prediction of somebody else on the test windows.
 
-    label : its name, and whether it is `not blind` or `doubtful`. paths : (T, S, 2) [m] in the frame (11).
+    label : its name, and whether it is `not blind` or `doubtful`; `given` where a method of the study has its name.
+    paths : (T, S, 2) [m] in the frame (11).
     N_D, seed : -1 for any. doubt : what seems to be wrong with it, in one sentence; empty where nothing does.
     """
 
@@ -56,22 +56,22 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
     """
     try:
         frame = pd.read_parquet(file)
+        frame = frame.astype({name: float for name in (*KEYS[1:], *PLACES) if name in frame})
     except (OSError, ValueError) as error:
         raise DataError(f"cannot be read as Parquet ({error})", file=file) from None
     for name in (*KEYS, *PLACES):
         if name not in frame:
             raise DataError(f"lacks this column; it has {', '.join(map(str, frame))}", file=file, path=name)
     rivals: list[RivalPrediction] = []
-    marks = [] if is_blind(file, frame, results.folder) else ["not blind"]
-    frame = pd.DataFrame({"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame})
-    for (model, N_D, seed), part in frame.groupby(["model", "N_D", "seed"], sort=False):
+    blind = is_blind(file, frame, results.folder)
+    groups = {"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame}
+    for (model, N_D, seed), part in pd.DataFrame(groups).groupby(["model", "N_D", "seed"], sort=False):
         places = _ordered_places(part, results.test, file)
-        doubt = doubt_of_places(places, results)
-        words = ", ".join([*marks, *(["doubtful"] if doubt else [])])
-        label = f"{model} ({words})" if words else str(model)
-        rivals.append(
-            RivalPrediction(label, path_of_places(places, results.test), int(str(N_D)), int(str(seed)), doubt)
-        )
+        doubt, known = doubt_of_places(places, results), {way.name for way in results.plan.methods}
+        marks = {"not blind": not blind, "doubtful": bool(doubt), "given": str(model) in known}
+        words, paths = [word for word, holds in marks.items() if holds], path_of_places(places, results.test)
+        label = f"{model} ({', '.join(words)})" if words else str(model)
+        rivals.append(RivalPrediction(label, paths, int(float(str(N_D))), int(float(str(seed))), doubt))
     return rivals
 
 
@@ -88,8 +88,8 @@ def is_blind(file: Path, frame: pd.DataFrame, folder: Path) -> bool:
 
 def _ordered_places(frame: pd.DataFrame, test: Windows, file: Path) -> Array:
     """North and east (T, S, 2) [m] in the order of the windows; DataError for a fault of the rows."""
-    wanted: Any = pd.MultiIndex.from_frame(prediction_table(test, test.future)[KEYS].round(CLOCK_DIGITS))
-    given = frame.round(dict.fromkeys(KEYS[1:], CLOCK_DIGITS)).set_index(KEYS)
+    wanted: Any = pd.MultiIndex.from_frame(prediction_table(test, test.future)[KEYS].round(4))
+    given = frame.round(dict.fromkeys(KEYS[1:], 4)).set_index(KEYS)
     for rows, fault in (
         (given.index.difference(wanted), "are none of the test: `shipid study windows` lists it"),
         (given.index[given.index.duplicated()], "are there twice: give each once"),
@@ -137,7 +137,7 @@ def _undo_degrees(places: Array, test: Windows) -> Array:
 def _undo_offset(places: Array, test: Windows) -> Array:
     """Paths moved so that the line through their first two steps starts at the ship."""
     path = path_of_places(places, test)
-    return np.asarray(path - 2 * path[:1] + path[1:2])
+    return np.asarray(path - 2 * path[:1] + path[min(1, len(path) - 1)])
 
 
 Undoing = Callable[[Array, Windows], Array]
@@ -166,11 +166,13 @@ HYPOTHESES: dict[str, Undoing] = {
 
 def hypotheses_of(test: Windows) -> dict[str, Undoing]:
     """The hypotheses for some windows: delays are of a step, and of the time between two instants."""
-    every, between = dict(HYPOTHESES), np.round(np.diff(test.t[:2]) / test.step).astype(int)
-    for steps in {1, *between.tolist()} & set(range(1, test.horizon)):
-        words = f"by {counted_text(steps, 'step')}"
-        every |= {f"late {words}": _undo_delay(steps), f"early {words}, saw the future": _undo_delay(-steps)}
-    return every
+    between = np.round(np.diff(test.t[:2]) / test.step).astype(int).tolist()
+    delays = {
+        f"{words} by {counted_text(steps, 'step')}": _undo_delay(sign * steps)
+        for steps in {1, *between} & set(range(1, test.horizon))
+        for words, sign in (("late", 1), ("saw the future, early", -1))
+    }
+    return HYPOTHESES | delays
 
 
 def doubt_of_places(places: Array, results: Results) -> str:
@@ -182,8 +184,9 @@ def doubt_of_places(places: Array, results: Results) -> str:
         if gain < BELIEVED * min(1.0, fair) and gain < least * (GENERAL if undo is _undo_offset else 1.0):
             least, doubt = gain, f"{words}: undone, the error is {gain:.2g} times as large"
     share = float((_errors_at_steps(path_of_places(places, test), test) / believable_errors(results)).min())
-    words = f"saw the future: at a step its error is {share:.2g} of the least that can be known"
-    return doubt or (words if share < FORESEEN else "")
+    return doubt or (
+        f"saw the future: at a step its error is {share:.2g} of the least that can be known" if share < FORESEEN else ""
+    )
 
 
 def _errors_at_steps(path: Array, test: Windows) -> Array:
@@ -195,8 +198,7 @@ def _error_ratio(path: Array, given: Array, test: Windows) -> float:
     """How many times as large errors are, geometric mean over steps; 1 at least where the first one is no better."""
     ratio = _errors_at_steps(path, test) / _errors_at_steps(given, test)
     ratio = ratio[np.isfinite(ratio)]
-    mean = float(np.exp(np.log(ratio).mean()))
-    return max(mean, 1.0) if ratio[0] > 1 else mean
+    return max(float(np.exp(np.log(ratio).mean())), float(ratio[0] > 1))
 
 
 @lru_cache(maxsize=1)
@@ -213,8 +215,8 @@ def believable_errors(results: Results) -> Array:
     rows = rows.T / np.maximum(np.abs(rows).max(axis=1), 1e-12)
     missed = (test.future - plain).swapaxes(0, 1)
     law = rows @ np.linalg.lstsq(rows, missed.reshape(len(test), -1), rcond=1e-9)[0]
-    known = [*results.physics.values(), *map(results.paths.__getitem__, results.paths)]
-    known.append(plain + law.reshape(missed.shape).swapaxes(0, 1))
+    fitted = plain + law.reshape(missed.shape).swapaxes(0, 1)
+    known = [*results.physics.values(), *map(results.paths.__getitem__, results.paths), fitted]
     return np.asarray(np.nanmin([_errors_at_steps(path, test) for path in known], axis=0))
 
 

@@ -64,17 +64,12 @@ class StudyWindows:
         state (S, d) and wind (S, w) at the instant; past (P, S, e), the oldest first; orders (T, S, c) from step i-1 to
         i; future (T, S, 2) [m] in the frame (11).
         """
-        cut, names = self.windows, self.names
-        tables: dict[str, Mapping[str, Any]] = {
-            "state": cut.columns,
-            "wind": cut.columns,
-            "past": cut.past,
-            "orders": cut.planned,
-        }
+        cut = self.windows
+        tables: dict[str, Mapping[str, Any]] = {"past": cut.past, "orders": cut.planned}
         return {"future": cut.future} | {
-            key: np.ascontiguousarray(np.stack([table[name] for name in names[key]], axis=-1), dtype=float)
-            for key, table in tables.items()
-            if names[key]
+            key: np.ascontiguousarray(np.stack([tables.get(key, cut.columns)[name] for name in names], axis=-1), float)
+            for key, names in self.names.items()
+            if names
         }
 
     def tables(self) -> dict[str, pd.DataFrame]:

@@ -70,9 +70,11 @@ FAULTS: dict[str, Callable[[Array, Windows], Array]] = {
     "in degrees, the heading": lambda p, w: turned(p, w, np.degrees(w.columns["psi"])),
     "in degrees, north": lambda p, w: [63.0, 10.0] + turned(p, w, w.columns["psi"]) / [111120.0, 50448.0],
     "late by 1 step": lambda p, w: turned(np.concatenate([0 * p[:1], p[:-1]]), w, w.columns["psi"]),
-    "early by 1 step, saw": lambda p, w: turned(np.concatenate([p[1:], 2 * p[-1:] - p[-2:-1]]), w, w.columns["psi"]),
-    "the path does not start": lambda p, w: turned(p + [9.0, -4.0], w, w.columns["psi"]),
-    "saw the future": lambda p, w: turned(0.03 * p + 0.97 * w.future, w, w.columns["psi"]),
+    "saw the future, early by 1 step": lambda p, w: turned(
+        np.concatenate([p[1:], 2 * p[-1:] - p[-2:-1]]), w, w.columns["psi"]
+    ),
+    "the path does not start": lambda p, w: turned(p + np.array([9.0, -4.0]), w, w.columns["psi"]),
+    "saw the future: at": lambda p, w: turned(0.03 * p + 0.97 * w.future, w, w.columns["psi"]),
 }
 
 
@@ -101,6 +103,7 @@ def test_each_fault_is_named(tmp_path: Path, results: Results, fault: str) -> No
         (lambda t: pd.concat([t, t[3:5]]), "2 of .* steps are there twice"),
         (lambda t: t.assign(run="other"), "are none of the test"),
         (lambda t: t.assign(ahead=t["ahead"] - 1.0), "ahead 0 s"),
+        (lambda t: t.assign(east="x"), "could not convert string to float"),
         (lambda t: t.assign(east=np.nan), "north or east: a place is no number"),
     ],
 )
@@ -120,7 +123,9 @@ def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blin
     file = written(tmp_path / "rival.parquet", results, results.paths[cell["cell"]])
     table = shipid.score(results.folder, file)["rival"]
     same = table[table["method"].eq("path-drawn") & table["family"].eq("none")].iloc[0]
-    assert same["difference"] == pytest.approx(results.cells.set_index("cell").H["none+path-drawn-N0004-s0"] - cell["H"])
+    assert same["difference"] == pytest.approx(
+        results.cells.set_index("cell").H["none+path-drawn-N0004-s0"] - cell["H"]
+    )
     assert same["low"] < same["difference"] < same["high"] or same["runs"] < 5
     page = shipid.compare_methods(results)
     assert set(page[page["method"] == "rival"]["family"]) == {"wrong", "none", "with physics"}
@@ -131,7 +136,10 @@ def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blin
     passed = written(tmp_path / "passed.parquet", results, out.physics["wrong-1"][:, out.keys["split"] == "test"])
     out.write(tmp_path / "beside")
     beside = written(tmp_path / "beside" / "mine.parquet", results, results.paths[cell["cell"]])
-    assert [one.label for f in (passed, beside) for one in read_predictions(f, results)] == ["passed", "mine (not blind)"]
+    assert [one.label for f in (passed, beside) for one in read_predictions(f, results)] == [
+        "passed",
+        "mine (not blind)",
+    ]
     windows(results.folder, with_truth=True)
     assert [one.label for one in read_predictions(passed, results)] == ["passed (not blind)"]
     (results.folder / SCORES / "rival.parquet").unlink()
