@@ -140,8 +140,9 @@ def _undo_offset(places: Array, test: Windows) -> Array:
     return np.asarray(path - 2 * path[:1] + path[min(1, len(path) - 1)])
 
 
+# places (T, S, 2) as given, test windows -> paths (T, S, 2) [m] in the frame (11) without a mistake
 Undoing = Callable[[Array, Windows], Array]
-"""Places (T, S, 2) as given, test windows -> paths (T, S, 2) [m] in the frame (11) without a mistake."""
+# what may be wrong -> what undoes it; `hypotheses_of` adds delays
 HYPOTHESES: dict[str, Undoing] = {
     "wrong frame, north and east are exchanged": lambda places, test: path_of_places(places[..., ::-1], test),
     "wrong frame, north and east count from the ship": lambda places, test: path_of_places(
@@ -161,7 +162,6 @@ HYPOTHESES: dict[str, Undoing] = {
     ),
     "in degrees, north and east": _undo_degrees,
 }
-"""What may be wrong -> what undoes it. `hypotheses_of` adds delays."""
 
 
 def hypotheses_of(test: Windows) -> dict[str, Undoing]:
