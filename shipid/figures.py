@@ -17,11 +17,11 @@ import plotly.graph_objects as go
 
 from shipid.arguments import check_class, check_number
 from shipid.errors import ShipidError
-from shipid.report.checks import CHECK_PAGE, CheckContent
 from shipid.report.content import PageContent, ReportContent
 from shipid.report.figure import PageFigure, draw_alone
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
-from shipid.report.manoeuvre import MANOEUVRE_PAGE, ManoeuvreContent
+from shipid.report.logs import CHECK_PAGE, CheckContent
+from shipid.report.motion import MANOEUVRE_PAGE, ManoeuvreContent
 from shipid.report.page import Section
 from shipid.report.paths import windows_of
 from shipid.report.physics_and_data import gain_lack, map_lack

@@ -80,11 +80,15 @@ def summarise_errors(error: Array) -> ErrorSummary:
     )
 
 
-OCTAVES, BINS_AN_OCTAVE = (-10, 20), 512  # of a tally: 1 mm to 1,000 km, bins 0.2 % wide or narrower
-LEAST, MOST = 2.0 ** OCTAVES[0], float(np.nextafter(2.0 ** OCTAVES[1], 0))
-BINS = BINS_AN_OCTAVE * (OCTAVES[1] - OCTAVES[0])
+FIRST_OCTAVE, LAST_OCTAVE, BINS_AN_OCTAVE = (
+    -10,
+    20,
+    512,
+)  # octaves of a tally: 1 mm to 1,000 km, bins 0.2 % wide or narrower
+LEAST, MOST = 2.0**FIRST_OCTAVE, float(np.nextafter(2.0**LAST_OCTAVE, 0))
+BINS = BINS_AN_OCTAVE * (LAST_OCTAVE - FIRST_OCTAVE)
 SHIFT = 52 - 9  # a double without its last bits is the number of its bin
-FIRST = (1023 + OCTAVES[0]) * BINS_AN_OCTAVE  # number of the bin that begins at LEAST
+FIRST = (1023 + FIRST_OCTAVE) * BINS_AN_OCTAVE  # number of the bin that begins at LEAST
 
 
 def tally_errors(error: Array) -> NDArray[np.uint32]:
@@ -103,7 +107,7 @@ def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
         bin_ = int(np.searchsorted(running, place, side="right"))
         places.append(bin_ + min((place - running[bin_] + row[bin_] + 0.5) / row[bin_], 1.0))
     octave, step = np.divmod(np.reshape(places, counts.shape[:-1]), BINS_AN_OCTAVE)
-    return np.asarray(2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE))
+    return np.asarray(2.0 ** (octave + FIRST_OCTAVE) * (1 + step / BINS_AN_OCTAVE))
 
 
 SLOW = 0.2  # m/s over ground: a slower ship has no course

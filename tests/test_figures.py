@@ -17,11 +17,11 @@ from shipid.errors import ShipidError
 from shipid.report import ReportContent
 from shipid.report.figure import page_colours
 from shipid.study.results import read_results
-from tests.report import test_checks, test_identification, test_manoeuvre
+from tests.report import test_checks, test_identification, test_motion
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
-    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_manoeuvre.content("spiral")),
+    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
     "motion": lambda: test_checks.content("log"),
 }
 

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, Estimate, break_even, error_table, runs_without_physics
 from shipid.answer.verdict import (
     length_with_interval,
     model_list,
     quoted_model,
     too_few_manoeuvres,
 )
-from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
 from shipid.report.wording import counted_text, join_few_names, metres_text

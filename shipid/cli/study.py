@@ -326,8 +326,8 @@ def _run_to_report(
     from shipid.answer.start import event_line
     from shipid.files import quote_argument
     from shipid.study import run, store
+    from shipid.study.check import search_words
     from shipid.study.plan import program_of
-    from shipid.study.progress import search_words
 
     resume = f"{program_of(plan)} study resume {quote_argument(folder)}"
     with end_on_interrupt(f"interrupted; what is finished is kept. Continue with: {resume}"):

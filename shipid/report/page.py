@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import dataclass
@@ -15,12 +16,11 @@ from typing import Any
 
 import numpy as np
 from jinja2 import Environment, StrictUndefined, Template
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from plotly.io.json import to_json_plotly
 
 from shipid.files import write_text
 from shipid.report.figure import PageFigure, Panel, page_colours
-from shipid.report.glossary import mark_short_names
 from shipid.report.tables import PageTable, cell_html
 from shipid.report.wording import number_text, set_sentence
 
@@ -161,3 +161,29 @@ def _template() -> Template:
 
 def _resource(name: str) -> str:
     return files("shipid.report").joinpath(name).read_text(encoding="utf-8")
+
+
+MEANINGS = {
+    "H_90": "90th percentile of the position error of the prediction [m]: nine errors in ten are smaller",
+    "N_D": "number of recorded runs (manoeuvres) used to train and to validate",
+    "H": "mean position error of the prediction, compensated or of no physics, over all tests [m], equation (15)",
+    "A": "mean position error of the physics alone over the test manoeuvres [m], equation (14)",
+    "(11)": "equation (11): the frame with x ahead and y to starboard at the instant of prediction",
+    "(14)": "equation (14): A, the mean distance between true and predicted places, physics alone",
+    "(15)": "equation (15): H, the mean distance between true and predicted places, with compensation",
+    "(16)": "equation (16): each derivative of the hull times a random factor",
+}
+# A and H are words, too ("A runs from"): a letter counts before = [ (, or after a small word, never at the start alone.
+LETTER = r"(?<![\w.>-])(?:A|H)(?=\s(?:=|\[m\]|of\b|over\b|against\b|falls\b|rises\b|and\s[AH]\b|runs\s(?:from|over)))"
+PATTERN = re.compile(rf"H_90|N_D(?![\w])|\((?:11|14|15|16)\)|{LETTER}")
+AFTER = re.compile(r"\b(by|its|is|has|error|below|equal|along|less) (A|H)(?![\w-])")
+
+
+def mark_short_names(text: str) -> Markup:
+    """Escape a text and mark its short names with what they mean."""
+    marked = PATTERN.sub(lambda match: _abbreviation(match[0]), str(escape(text)))
+    return Markup(AFTER.sub(lambda match: f"{match[1]} {_abbreviation(match[2])}", marked))
+
+
+def _abbreviation(name: str) -> str:
+    return f'<abbr title="{escape(MEANINGS[name])}">{name}</abbr>'

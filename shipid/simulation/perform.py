@@ -49,7 +49,7 @@ def perform_manoeuvres(
     duration : length of every log [s]; default: that of each manoeuvre.
     environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> one value for all runs, (num_manoeuvres,), or a series
         (num_instants, num_manoeuvres) at t = 0, step, 2 step, ... to the end of the longest log; default 0.
-    components : wave components for each manoeuvre, from `shipid.simulation.sea.wave_loads`; default: calm water.
+    components : wave components for each manoeuvre, from `shipid.simulation.weather.wave_loads`; default: calm water.
     outputs : of the vessel's components, such as `propeller.thrust`, that are logged too.
 
     Returns

@@ -24,10 +24,9 @@ from shipid.physics.signals import SIGNALS, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
-from shipid.study.first_look import Look, first_look
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import obtain_runs, partition, prepare
-from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
+from shipid.study.survey import Look, Survey, first_look, separation_of_sources, survey_dataset, typical_runs
 from shipid.units import GRAVITY, RPM, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel

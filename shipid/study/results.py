@@ -23,8 +23,8 @@ from shipid.metrics import error_by_axis, error_of_windows, position_error
 from shipid.predictor import check_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
-from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Plan, families_set_from, model_label, uncounted_families, verdict_method
+from shipid.study.prepare import kinds_of_runs
 
 MOST_KEPT = 1000  # predicted paths in memory, of about 1 MB each
 

@@ -118,7 +118,7 @@ class BandsBlock(Strict):
 
 
 PAIRED_ROLES = (("accurate", "inaccurate"), ("moderate", "high"))  # keys of `[claims]`: both are given, or neither
-ROLES = (*PAIRED_ROLES[0], *PAIRED_ROLES[1], "nominal")
+ROLES = (*(role for pair in PAIRED_ROLES for role in pair), "nominal")
 
 
 class Claims(Strict):

@@ -22,12 +22,14 @@ from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import total_mass
 from shipid.physics.signals import ACTUAL
 from shipid.physics.waves import TABLES
-from shipid.vessel.bindings import Binding, bind_document, parameter_units
 from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, first_contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
     TABLE,
+    Binding,
+    bind_document,
+    parameter_units,
     term_blocks,
     upstream_signals,
     vessel_model,

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.answer.error_table import Estimate
 from shipid.answer.sentences import _bounds, answer_sentences, best_model, errors_by_model
-from shipid.answer.worth import Estimate
 from shipid.report.sections import SECTIONS
 from shipid.study.results import Results
 from tests.answer.byhand import grid
