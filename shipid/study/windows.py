@@ -21,7 +21,7 @@ from shipid.errors import ShipidError
 from shipid.files import write_json, write_table
 from shipid.physics.signals import measurable_signals
 from shipid.study import store
-from shipid.study.foundations import predictions
+from shipid.study.cells import predictions
 from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import obtain_runs, prepare
 
