@@ -11,10 +11,9 @@ import torch
 
 from shipid.errors import ShipidError
 from shipid.study.cells import work_of
-from shipid.study.plan import whole_unit
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.windows import windows
-from tests.study.tiny import mixed_plan, tiny_plan
+from tests.study.tiny import mixed_plan, tiny_plan, whole_unit
 
 PAST = {"prediction.past": 3.0}
 
