@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 
 
 class ErrorSummary(TypedDict):
-    """Position error: A or H (mean), H_90 (p90) and the root mean square over all points, and at the horizon; in metres.
+    """Position error [m] over all points: A or H (mean), H_90 (p90) and the root mean square; and at the horizon.
 
-    `end` and `end_90` are mean and 90 % quantile over the windows at the last step: H_end and H_end_90, or A_end, A_end_90.
+    `end` and `end_90` are mean and 90 % quantile over the windows at the last step: H_end, H_end_90, A_end, A_end_90.
     `status` is `ok`, or `diverged` with NaN for the numbers if any point is not finite; `failed_share` is the share of
     windows with such a point.
     """
@@ -68,7 +68,7 @@ def coverage_share(held: NDArray[Any], run: NDArray[Any]) -> float:
 
 
 def summarise_errors(error: Array) -> ErrorSummary:
-    """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points, and at the horizon."""
+    """Condense errors (T, S) [m] to A (14) or H (15), H_90, the root mean square, and the error at the horizon."""
     if error.size == 0:
         raise ValueError("there is no window to summarise")
     failed = ~np.isfinite(error).all(axis=0)
@@ -141,7 +141,7 @@ def error_of_windows(error: Array) -> Array:
 
 def error_at_horizon(error: Array) -> Array:
     """Return the error (S,) [m] of each window at the last step of the horizon, of errors (T, S)."""
-    return error[-1]
+    return np.asarray(error[-1])
 
 
 def path_roughness(paths: Array) -> float:

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from shipid.arguments import check_class
 from shipid.evidence import CellErrors, compare_cells, world_interval
-from shipid.metrics import position_error
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
 from shipid.study.results import Results
 
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
+ERROR_COLUMNS = ("H_end", "H_end_90", "H", "H_90")
 METHOD_COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
-    *("H", "H_90", "end", "seconds", "trials"),
+    *ERROR_COLUMNS,
+    *("seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
 ]
@@ -41,17 +41,15 @@ def compare_methods(results: Results) -> pd.DataFrame:
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
     """A row per cell, as `method_table` takes it.
 
-    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (error at the end of the
-    horizon) [m], seconds (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors
-    (`CellErrors` or None).
+    Columns: condition, world, foundation, family, method, N_D, seed, status, H_end, H_end_90, H, H_90 [m], seconds
+    (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors (`CellErrors` or None).
     """
     saw, rows = results.saw_test, []
     for row in results.rows:
-        kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
-        kept |= {"condition": condition, "world": world, "end": np.nan, "errors": None}
+        names = ("foundation", "family", "method", "N_D", "seed", "status", *ERROR_COLUMNS)
+        kept = {name: row[name] for name in names} | {"condition": condition, "world": world, "errors": None}
         kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
         if (cell := row["cell"]) in results.paths:
-            kept["end"] = float(position_error(results.paths[cell][-1:], results.test.future[-1:]).mean())
             learns = learns_from_runs(results.plan, row["family"], row["method"])
             kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
         rows.append(kept)
@@ -61,11 +59,11 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
 def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
-    H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
-    the others, `missing` also cells that only other methods have. `difference` is H less that of `reference` over the
-    `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`); `better` counts test
-    runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over worlds, with Student's
-    interval.
+    H_end, H_end_90, H, H_90 [m], seconds [s] and trials are means over the cells of a method that have a result;
+    `failed` counts the others, `missing` also cells that only other methods have. `difference` is H less that of
+    `reference` over the `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`);
+    `better` counts test runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over
+    worlds, with Student's interval.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -77,7 +75,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             good, errors = mine[mine["status"] == "ok"], by_method[str(method)]
             row: dict[str, Any] = {"condition": condition, "family": family, "N_D": N_D, "method": method}
             row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
-            row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
+            row |= {name: good[name].astype(float).mean() for name in ERROR_COLUMNS}
             row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
             row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
             rows.append(row)

@@ -211,7 +211,7 @@ def study_compare(
     out: Annotated[Path | None, typer.Option(help="file for a row per comparison: .csv or .parquet")] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare runs with the first one: what their documents differ in, and H of equal cells with paired intervals.
+    """Compare runs with the first one: what their documents differ in, and errors of equal cells, paired.
 
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.
@@ -241,13 +241,15 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     words = "the documents are equal" if documents.empty else f"and {more} more: --json shows all" if more > 0 else ""
     answer.say(words, folders=compared.names)
     answer.say(
-        f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
+        f"error at the horizon [m] and H [m], its mean over the horizon, of {first} and of the other run, and the "
+        f"difference of H, the other less {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
-    lengths = {"first": first, "other": "other", "difference": "difference", "low": "95 % from", "high": "to"}
+    ends = {"first_end": f"at horizon, {first}", "other_end": "other"}
+    lengths = {"first": f"H, {first}", "other": "other", "difference": "difference", "low": "95 % from", "high": "to"}
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
     banded = bool(errors[list(bands)].notna().any(axis=None))
-    heads |= {"cells": "cells"} | lengths | (bands if banded else {}) | {"verdict": "verdict"}
+    heads |= {"cells": "cells"} | ends | lengths | (bands if banded else {}) | {"verdict": "verdict"}
     answer.records("errors", errors, heads, dict.fromkeys(bands, share_text))
     answer.say("verdict: lower or higher where the test shows it, corrected for the rows of a run; empty: it does not")
     answer.say("\n".join(compared.notes), notes=compared.notes)
@@ -262,8 +264,12 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     heads = {"id": "finding", "verdicts": f"in {len(worlds)} worlds", "number": "number", "mean": "mean over worlds"}
     answer.records("findings", compare_findings(worlds), heads | {"low": "95 % from", "high": "to"})
     level = level_text(worlds[0].plan.study.bands.level)
-    answer.say(f"mean, least and greatest over the worlds of H [m], and of bands of {level}: share of whole test paths")
-    for name, what in (("H", "H [m]"), ("coverage", "in band"), ("width", "radius of band [m]")):
+    answer.say(
+        "mean, least and greatest over the worlds of the error at the horizon [m], of H [m], its mean over the "
+        f"horizon, and of bands of {level}: share of whole test paths"
+    )
+    shown = {"H_end": "at the horizon [m]", "H_end_90": "nine in ten below [m]", "H": "H [m]", "coverage": "in band"}
+    for name, what in (*shown.items(), ("width", "radius of band [m]")):
         numbers = {name: what, f"{name}_low": "least", f"{name}_high": "greatest", "worlds": "worlds"}
         answer.records("errors", errors, CELL | numbers, shown=errors.dropna(subset=name))
     return errors

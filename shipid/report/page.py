@@ -20,13 +20,14 @@ from markupsafe import Markup, escape
 from plotly.io.json import to_json_plotly
 
 from shipid.files import write_text
+from shipid.report.content import AnswerSentence
 from shipid.report.figure import PageFigure, Panel, page_colours
 from shipid.report.tables import PageTable, cell_html
 from shipid.report.wording import number_text, set_sentence
 
 Item = PageFigure | PageTable
 OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
-FIRST_SENTENCES = 3  # sentences of the answer that a reader sees; the others unfold
+FIRST_SENTENCES, FIRST_WORDS = 3, 60  # of the answer that a reader sees at most; the others unfold
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,13 @@ def _has_part(content: object, name: str) -> bool:
     return value is not None and not (isinstance(value, Sized) and len(value) == 0)
 
 
+def split_answer(answer: Sequence[AnswerSentence]) -> tuple[Sequence[AnswerSentence], Sequence[AnswerSentence]]:
+    """The headline, of a few sentences and words but one sentence at least, and the rest of an answer."""
+    words = np.cumsum([len(sentence.text.split()) for sentence in answer[:FIRST_SENTENCES]])
+    first = max(1, int((words <= FIRST_WORDS).sum()))
+    return answer[:first], answer[first:]
+
+
 def render_page(
     kind: str, sections: Mapping[str, Section], content: Any, windows: Mapping[str, Any] | None = None
 ) -> str:
@@ -81,12 +89,13 @@ def render_page(
     parts = draw_sections(sections, content)
     items = [item for part in parts for item in part.items]
     figures = [item for item in items if isinstance(item, PageFigure)]
+    headline, details = split_answer(content.answer)
     return _template().render(
         content=content,
         kicker=kind,
-        answer=content.answer[:FIRST_SENTENCES],
-        details=content.answer[FIRST_SENTENCES:],
-        warned=any(sentence.text.startswith("Careful: ") for sentence in content.answer[FIRST_SENTENCES:]),
+        answer=headline,
+        details=details,
+        warned=any(sentence.text.startswith("Careful: ") for sentence in details),
         sections=parts,
         titles={name: name.capitalize() for name in OF_EVERY_PAGE} | {item.id: item.title for item in items},
         numbers={figure.id: i for i, figure in enumerate(figures, start=1)},
