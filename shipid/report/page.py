@@ -27,6 +27,7 @@ from shipid.report.wording import number_text, set_sentence
 
 Item = PageFigure | PageTable
 OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
+HEAD = "head"  # id of the section that stands beside the headline, without a heading
 FIRST_SENTENCES, FIRST_WORDS = 3, 60  # of the answer that a reader sees at most; the others unfold
 
 
@@ -96,7 +97,8 @@ def render_page(
         answer=headline,
         details=details,
         warned=any(sentence.text.startswith("Careful: ") for sentence in details),
-        sections=parts,
+        head=[item for part in parts if part.id == HEAD for item in part.items],
+        sections=[part for part in parts if part.id != HEAD],
         titles={name: name.capitalize() for name in OF_EVERY_PAGE} | {item.id: item.title for item in items},
         numbers={figure.id: i for i, figure in enumerate(figures, start=1)},
         views={figure.id: _draw_views(figure) for figure in figures if not figure.browser},

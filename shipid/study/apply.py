@@ -114,7 +114,7 @@ def predict_log(
 def table_of_stretch(
     predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, band: BandSettings | None = None
 ) -> pd.DataFrame:
-    """The table of `predict_log` for one stretch, and `error` [m]; empty where no row has the past and plan it needs."""
+    """The table of `predict_log` for one stretch, and `error` [m]; empty where no row has the past and plan needed."""
     some = _usable_rows(predictor, rows["t"].to_numpy())
     if some.start >= some.stop:
         return pd.DataFrame()
