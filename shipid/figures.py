@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
-    ErrorStatistic = Literal[
-        "at the horizon", "at the horizon, 90th percentile", "mean", "90th percentile", "root mean square"
-    ]
     Source = Results | ReportContent | pd.DataFrame
 
+ErrorStatistic = Literal[
+    "at the horizon", "at the horizon, 90th percentile", "mean", "90th percentile", "root mean square"
+]
 PAGES: dict[type[PageContent], dict[str, Section]] = {
     ReportContent: SECTIONS,
     CheckContent: CHECK_PAGE,

@@ -185,8 +185,8 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     traces: list[Trace] = [
         {**_cell_bars(good), **box, **hover},
         {**_cell_bars(good[good.worse]), **hatched, "hoverinfo": "skip"},
-        {**_cell_bars(good), **numbers, "hoverinfo": "skip"},
         {**make_line("no result", [], bad.y, [], mode="markers", marker=cross, hover=list(bad.words)), "x": failed},
+        {**_cell_bars(good), **numbers, "hoverinfo": "skip"},
     ]
     low, top = float((rows.y - rows.low).min()), float((rows.y + rows.high).max())
     room = 0.02 * (top - low)
@@ -322,6 +322,7 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
     learned = errors_over_seeds(content).merge(overview_models(content)[["model"]])
     means = pd.concat([errors_alone(content), learned], ignore_index=True)
     statistics = [word for word, (column, *_) in ERROR_STATISTICS.items() if learned[column].notna().any()]
+    statistics = statistics or list(ERROR_STATISTICS)
     looks, span, (order, drawn) = model_styles(content), accuracy_range(content), _models_with_line(content)
     accuracy = content.cells.groupby("model").A.first()
     words = {name: f"{name}, A {metres_text(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
