@@ -177,8 +177,8 @@ def _resource(name: str) -> str:
 MEANINGS = {
     "H_90": "90th percentile of the position error of the prediction [m]: nine errors in ten are smaller",
     "N_D": "number of recorded runs (manoeuvres) used to train and to validate",
-    "H": "mean position error of the prediction, compensated or of no physics, over all tests [m], equation (15)",
-    "A": "mean position error of the physics alone over the test manoeuvres [m], equation (14)",
+    "H": "mean position error over the horizon, compensated or of no physics, over all tests [m], equation (15)",
+    "A": "mean position error over the horizon of the physics alone, over all tests [m], equation (14)",
     "(11)": "equation (11): the frame with x ahead and y to starboard at the instant of prediction",
     "(14)": "equation (14): A, the mean distance between true and predicted places, physics alone",
     "(15)": "equation (15): H, the mean distance between true and predicted places, with compensation",
