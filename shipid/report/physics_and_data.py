@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.ndimage import gaussian_filter1d
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, ReportContent, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MUTED,
@@ -55,7 +54,6 @@ HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
 NAME_HEIGHT = 13  # of a row [px]
 INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
-FEWEST_LINED = 12  # models with physics from which lines of equal H are drawn: fewer give a few crooked pieces
 ROUND_DIGITS = (1, 2, 3, 5, 7)  # of the ticks of A
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r, title of the axis
     "at the horizon": ("H_end", "end", "error at the horizon, mean [m]"),
@@ -85,8 +83,6 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         return None
     rows, cells = shown
     hatched = f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
-    lines = [_isolines(shown)] if rows.A.notna().sum() >= FEWEST_LINED else []
-    lined = " Lines of equal error follow H [m], averaged over neighbouring models; none passes a cell without result."
     return PageFigure(
         id="map",
         title="Physics and data: the map",
@@ -94,15 +90,13 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour and number are H, the "
         "mean error over the horizon, mean over seeds. At N_D = 0 is the physics alone, whose H is A."
         + (hatched if cells.worse.any() else "")
-        + (lined if lines else "")
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
         alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
         "The numbers are in the table of cells.",
         height=HEIGHT,
-        draw=lambda: [draw_map(shown, lines)],
-        chips=[Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [],
+        draw=lambda: [draw_map(shown)],
         scale=ColourScale("mean error over the horizon, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
     )
 
@@ -166,8 +160,8 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
     return "<br>".join([*lines, *[lost] * (len(good) < len(cells))])
 
 
-def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
-    """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
+def draw_map(shown: CellMap) -> Panel:
+    """Draw cells at A and N_D, hatched or crossed where they are of no use."""
     rows, cells = shown
     counts = np.unique(cells.N_D)
     good, bad = cells[cells.H.notna()], cells[cells.H.isna()]
@@ -196,9 +190,8 @@ def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
     edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
     rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
     rules = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}] * bool(rows.A.isna().any())
-    above = {f"{side}axis2": {"overlaying": side, "matches": side, "visible": False} for side in "xy" if lines}
-    more = {"annotations": _names_of_rows(rows, top - low), "margin": MAP_MARGIN, "shapes": rules, **above}
-    return make_plot([*traces, *lines], x, y, barmode="overlay", uniformtext={"mode": "hide", "minsize": 9}, **more)
+    more = {"annotations": _names_of_rows(rows, top - low), "margin": MAP_MARGIN, "shapes": rules}
+    return make_plot(traces, x, y, barmode="overlay", uniformtext={"mode": "hide", "minsize": 9}, **more)
 
 
 def _cell_bars(cells: pd.DataFrame) -> Trace:
@@ -229,36 +222,6 @@ def _ticks_of_map(rows: pd.DataFrame, low: float) -> dict[str, list[Any]]:
     ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
     values = [tick for tick in ticks if max(low**2, largest / 40) <= tick <= largest]
     return {"tickvals": list(np.sqrt(values)), "ticktext": [f"{value:g}" for value in values]}
-
-
-def _isolines(shown: CellMap) -> Trace:
-    """Lines of equal H through the models with physics."""
-    learned = shown.cells[shown.cells.N_D > 0]
-    physics, sizes = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], np.unique(learned.N_D)
-    H = learned.pivot(index="model", columns="N_D", values="H").reindex(index=physics.model, columns=sizes)
-    lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
-    return {
-        "type": "contour",
-        "x": sizes.astype(str).tolist(),
-        "y": physics.y.tolist(),
-        "z": smooth_rows(H.to_numpy()),
-        "ncontours": 5,
-        "contours": lines,
-        "line": {"color": INK, "width": 1.5, "smoothing": 0},
-        "meta": ["iso"],
-        "hoverinfo": "skip",
-        "showscale": False,
-        "xaxis": "x2",
-        "yaxis": "y2",
-    }  # Plotly draws bars over lines
-
-
-def smooth_rows(values: Floats) -> Floats:
-    """Positive values (m, n), each the geometric mean of its column under a bell of two rows; others are left out."""
-    finite = np.isfinite(values) & (values > 0)
-    logs = np.log(values, where=finite, out=np.zeros(values.shape))
-    total, weight = (gaussian_filter1d(part, 2.0, axis=0, mode="constant") for part in (logs, finite.astype(float)))
-    return np.where(finite, np.exp(total / np.where(finite, weight, 1.0)), np.nan)
 
 
 def _not_on_map(content: ReportContent) -> str:

@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.report import physics_and_data
 from shipid.report.figure import PageFigure
-from shipid.report.physics_and_data import gain_figure, gain_lack, map_figure, map_lack, smooth_rows
+from shipid.report.physics_and_data import gain_figure, gain_lack, map_figure, map_lack
 from tests.report.views import first_panel, views
 
 
@@ -68,7 +67,7 @@ def test_what_is_no_better_than_data_driven_is_hatched(simulation):
     )
 
 
-def test_a_failed_cell_is_a_cross_and_no_line_passes_it(failing):
+def test_a_failed_cell_is_a_cross(failing):
     figure = flat(failing)
     bars, _, crosses = figure.data[:3]
     assert list(crosses.x) == ["10"]
@@ -77,24 +76,6 @@ def test_a_failed_cell_is_a_cross_and_no_line_passes_it(failing):
     (words,) = (w for w in bars.customdata if "high-2" in w and "N_D = 30" in w)
     assert "1 of 2 seeds gave no result" in words
     assert "high-2 at N_D = 10 (diverged)" in map_figure(failing).how
-
-
-def test_lines_of_equal_error_need_many_models_and_pass_no_failed_cell(failing, monkeypatch):
-    assert all(trace.type != "contour" for trace in flat(failing).data)
-    monkeypatch.setattr(physics_and_data, "FEWEST_LINED", 6)
-    (lines,) = [trace for trace in flat(failing).data if trace.type == "contour"]
-    assert np.isnan(lines.z[5, 0])
-    assert np.isfinite(lines.z[5, 1:]).all()
-
-
-def test_smoothing_keeps_a_level_and_gaps():
-    values = np.full((20, 8), 3.0)
-    values[4, 2] = np.nan
-    smooth = smooth_rows(values)
-    assert np.isnan(smooth[4, 2])
-    np.testing.assert_allclose(smooth[np.isfinite(smooth)], 3.0)
-    rough = np.exp(np.random.default_rng(0).normal(size=(30, 3)))
-    assert np.log(smooth_rows(rough)).std() < 0.6 * np.log(rough).std()
 
 
 def test_every_row_with_an_A_has_its_name_and_no_name_covers_another(simulation):
