@@ -12,6 +12,8 @@ import pytest
 
 from shipid.answer.error_table import Estimate
 from shipid.answer.sentences import _bounds, answer_sentences, best_model, errors_by_model
+from shipid.report.content import AnswerSentence
+from shipid.report.page import split_answer
 from shipid.report.sections import SECTIONS
 from shipid.study.results import Results
 from tests.answer.byhand import grid
@@ -43,6 +45,22 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     assert f"Without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
     assert "With 60 runs every compared model beats constant u, v, r (H 10.0 m)." in advice
     assert "With 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
+
+
+@pytest.mark.parametrize("runs", [1, 8])
+def test_the_headline_is_short_and_begins_with_the_error_at_the_horizon(made: Any, runs: int) -> None:
+    """Errors grow: H is 2.5 m, the error 8 s ahead 4 m. No sentence has two intervals."""
+    alone = {f"m{k}": 2.0**k for k in range(5)}
+    cells = grid({name: (A / 2, 2.5) for name, A in alone.items()} | {"none": (3.0, 2.9)})
+    curves = {(name, 30, 0): [1.0, 2.0, 3.0, 4.0] for name in alone}
+    answer = answer_sentences(made(cells, alone=alone, claims=None, curves=curves, runs=runs))
+    assert re.match(r"8 s ahead, m\d \(best in validation\) with 30 runs errs by 4\.00 m", answer[0][0])
+    headline, details = split_answer([AnswerSentence(sentence) for sentence, _ in answer])
+    assert 1 <= len(headline) <= 3
+    assert sum(len(one.text.split()) for one in headline) <= 60
+    assert len(headline) + len(details) == len(answer)
+    for text in (one for sentence, _ in answer for one in re.split(r"(?<=[.?]) (?=[A-Z])", sentence)):
+        assert text.count("[") <= 1, text
 
 
 def test_validation_chooses_and_never_the_test(made: Any) -> None:
