@@ -33,6 +33,10 @@ class ErrorSummary(TypedDict):
     failed_share: float
 
 
+PREDICTION_ERRORS = {"H_end": "end", "H_end_90": "end_90", "H": "mean", "H_90": "p90"}
+"""Columns of a prediction's errors [m] in tables, the error at the horizon first -> their key in `ErrorSummary`."""
+
+
 def vector_lengths(vectors: Array) -> Array:
     """Return the length (...) of vectors (..., 2), as `numpy.hypot` to 4 units in the last place, ten times as fast.
 

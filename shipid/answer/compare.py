@@ -142,15 +142,17 @@ def _compare_with_first(first: Results, other: Results, called: Mapping[str, str
         means_there, other_cells = _cell_errors(other, part, "other", away)
         sides = {"first": mine_cells, "other": other_cells}
         difference = compare_cells(sides["other"], sides["first"])
-        row: dict[str, Any] = {
-            key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")
-        }
-        row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
-        row |= means | means_there
-        row |= {"difference": difference.mean, "low": difference.low, "high": difference.high}
         same = all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True))
-        row |= {"verdict": IDENTICAL if same else ""}
-        rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides})
+        rows.append(
+            {
+                **{key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")},
+                **{"N_D": int(part["N_D"].iloc[0]), "cells": len(part)},
+                **(means | means_there),
+                **{"difference": difference.mean, "low": difference.low, "high": difference.high},
+                "verdict": IDENTICAL if same else "",
+                **{f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides},
+            }
+        )
         differences.append(difference)
     for verdict, side in (("lower", "below"), ("higher", "above")):
         shown = which_significant(np.array([getattr(difference, side) for difference in differences]))

@@ -14,7 +14,7 @@ from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, shorten_line
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
-from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
+from shipid.metrics import PREDICTION_ERRORS, coverage_share, position_error, summarise_errors, vector_lengths
 from shipid.observer import Estimates
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, StudyMethod
@@ -210,7 +210,7 @@ def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
 
 def _failed_columns(status: str, sentence: str) -> dict[str, Any]:
     """The columns of a row without a result."""
-    blank = dict.fromkeys(("H_end", "H_end_90", "H", "H_90", "rms", "coverage", "width"), np.nan)
+    blank = dict.fromkeys((*PREDICTION_ERRORS, "rms", "coverage", "width"), np.nan)
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
@@ -234,8 +234,8 @@ def _test_errors(
         return _failed_columns(
             "diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"
         ), None
-    error = summarise_errors(position_error(paths, test.future))
-    outcome = {"H_end": error["end"], "H_end_90": error["end_90"], "H": error["mean"], "H_90": error["p90"]}
+    error: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
+    outcome = {column: error[name] for column, name in PREDICTION_ERRORS.items()}
     outcome |= {"rms": error["rms"], "coverage": np.nan, "width": np.nan}
     level = study.bands.level
     if predictor.bands is not None and predictor.bands.promises(level):
