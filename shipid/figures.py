@@ -27,6 +27,7 @@ from shipid.report.page import Section
 from shipid.report.paths import windows_of
 from shipid.report.physics_and_data import gain_lack, map_lack
 from shipid.report.sections import SECTIONS
+from shipid.report.selection import PHYSICS_ERRORS
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
 
     Source = Results | ReportContent | pd.DataFrame
 
+ErrorStatistic = Literal[
+    "at the horizon", "at the horizon, 90th percentile", "mean", "90th percentile", "root mean square"
+]
 PAGES: dict[type[PageContent], dict[str, Section]] = {
     ReportContent: SECTIONS,
     CheckContent: CHECK_PAGE,
@@ -45,7 +49,7 @@ PAGES: dict[type[PageContent], dict[str, Section]] = {
     ManoeuvreContent: MANOEUVRE_PAGE,
 }
 ABSENT_COLUMNS: dict[str, Any] = {"family": "given", "seed": 0, "status": "ok"} | dict.fromkeys(
-    ("A", "A_90", "A_rms", "H_90", "rms"), np.nan
+    (*PHYSICS_ERRORS, "H_end", "H_end_90", "H_90", "rms"), np.nan
 )
 """Columns of a table of cells that a user leaves out -> their value; errors in m."""
 
@@ -75,19 +79,22 @@ __all__ = [
 
 
 def error_map(source: Source, *, dark: bool = False) -> go.Figure:
-    """H over the accuracy A of the physics and the amount of data N_D; needs several N_D and two physics models."""
+    """H, the mean over the horizon, over the accuracy A of the physics and N_D; needs several N_D and two models."""
     content = content_of(source)
     return _draw("map", content, dark=dark, lack=map_lack(content))
 
 
 def gain(
     source: Source,
-    statistic: Literal["mean", "90th percentile", "root mean square"] = "mean",
-    scale: Literal["linear", "logarithmic"] = "linear",
+    statistic: ErrorStatistic | None = None,
+    scale: Literal["logarithmic", "linear"] = "logarithmic",
     *,
     dark: bool = False,
 ) -> go.Figure:
-    """H over N_D, a line per model; from the physics alone (N_D = 0) where there is a single N_D."""
+    """Error over N_D, a line per model from its physics alone (N_D = 0) on.
+
+    statistic : default: at the horizon, or the mean over it, H, of a table that has no column H_end.
+    """
     content = content_of(source)
     return _draw("gain", content, [statistic, scale], dark=dark, lack=gain_lack(content))
 
@@ -252,7 +259,7 @@ def content_of(source: Source) -> ReportContent:
         cells = source.assign(**{name: value for name, value in ABSENT_COLUMNS.items() if name not in source})
         models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
         models = models.assign(status="ok", description="")
-        naive = dict.fromkeys(("mean", "p90", "rms"), np.nan)
+        naive = dict.fromkeys(("end", "end_90", "mean", "p90", "rms"), np.nan)
         return ReportContent(title="", name="", cells=cells, models=models, naive=naive)
     from shipid.answer.pages import report_content
     from shipid.study.results import Results

@@ -38,13 +38,13 @@ def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent
     drawn = 0
     for name in set(figures.__all__) - set(OTHERS):
         function = getattr(figures, name)
-        for argument, kind in get_type_hints(
-            function, vars(figures) | {"Source": object, "VesselFamily": VesselFamily}
-        ).items():
-            for option in get_args(kind) if get_origin(kind) is Literal else ():
+        kinds = get_type_hints(function, vars(figures) | {"Source": object, "VesselFamily": VesselFamily})
+        for argument, kind in kinds.items():
+            literals = [one for one in (kind, *get_args(kind)) if get_origin(one) is Literal]
+            for option in (option for one in literals for option in get_args(one)):
                 assert function(content, **{argument: option}).data, f"{name}: {argument} = {option!r}"
                 drawn += 1
-    assert drawn == 10
+    assert drawn == 13
 
 
 def test_every_colour_of_dark_is_one_of_light() -> None:
@@ -84,10 +84,10 @@ def test_a_table_of_cells_is_enough() -> None:
     )
     cells = cells.assign(A_90=9.0, A_rms=9.0, H_90=9.0, rms=9.0)
     made = figures.gain(cells)
-    lines = {trace.name: np.array(trace.y, dtype=float) for trace in made.data if len(trace.x) == 2}
-    np.testing.assert_array_equal(lines["a"], [2.0, 1.0])
-    np.testing.assert_array_equal(lines["b"], [3.0, np.nan])
-    assert len(figures.error_map(cells).data[0].x) == 3
+    lines = {trace.name: np.array(trace.y, dtype=float) for trace in made.data if len(trace.x) == 3}
+    np.testing.assert_array_equal(lines["a"], [4.0, 2.0, 1.0])
+    np.testing.assert_array_equal(lines["b"], [5.0, 3.0, np.nan])
+    assert len(figures.error_map(cells).data[0].x) == 3 + 2
     with pytest.raises(ShipidError, match="there is nothing to draw: it needs rows of cells"):
         figures.gain(cells[:0])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal
@@ -20,13 +20,13 @@ from shipid.evidence import (
     resampled_means,
     training_noise,
 )
-from shipid.metrics import position_error
+from shipid.metrics import error_at_horizon, position_error
 from shipid.report.wording import metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.results import Results
 
 Array = NDArray[np.float64]
-Metric = Literal["H", "H_90"]
+Metric = Literal["H", "H_90", "H_end"]
 PHYSICS_ONLY = -1  # place of the physics alone in a term
 SMALLEST_ERROR = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
 ErrorTerm = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or PHYSICS_ONLY
@@ -104,12 +104,12 @@ class ErrorTable:
 def error_table(
     results: Results, models: Sequence[str], metric: Metric = "H", amounts: Sequence[int] | None = None
 ) -> ErrorTable:
-    """Errors of models and `none` that have a result in every cell; H_90 is taken in each manoeuvre.
+    """Errors of models and `none` that have a result in every cell, over the horizon (H, H_90) or at its end (H_end).
 
     amounts : values of N_D that count, rising; all by default.
     """
     cells = results.judged_cells
-    of_path = results.path_errors if metric == "H" else partial(_upper_errors, results)
+    of_path = partial(ERRORS_BY_RUN[metric], results)
     good = [cell for cell in cells["cell"] if cell in results.paths]
     errors = results.errors if metric == "H" else {cell: of_path(results.paths[cell]) for cell in good}
     amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
@@ -133,6 +133,18 @@ def _upper_errors(results: Results, path: Array) -> Array:
     """(R,) 90th percentile [m] of the errors of a path (T, S, 2) [m] in each test manoeuvre."""
     error, run = position_error(path, results.test.future), results.test.run
     return np.array([np.quantile(error[:, run == name], 0.9) for name in np.unique(run)])
+
+
+def _errors_at_horizon(results: Results, path: Array) -> Array:
+    """(R,) mean error [m] of a path (T, S, 2) [m] at the end of the horizon in each test manoeuvre."""
+    return results.by_run(error_at_horizon(position_error(path, results.test.future)))
+
+
+ERRORS_BY_RUN: dict[Metric, Callable[[Results, Array], Array]] = {
+    "H": Results.path_errors,
+    "H_90": _upper_errors,
+    "H_end": _errors_at_horizon,
+}
 
 
 @dataclass(frozen=True)

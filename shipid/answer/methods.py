@@ -12,7 +12,7 @@ import pandas as pd
 from shipid.arguments import as_path, check_class
 from shipid.errors import DataError
 from shipid.evidence import CellErrors, compare_cells, world_interval
-from shipid.metrics import error_of_windows, position_error, summarise_errors
+from shipid.metrics import PREDICTION_ERRORS, error_of_windows, position_error, summarise_errors
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
 from shipid.study.results import Results, read_results
@@ -21,7 +21,8 @@ from shipid.study.score import RivalPrediction, keep_predictions, kept_predictio
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
 METHOD_COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
-    *("H", "H_90", "end", "seconds", "trials"),
+    *PREDICTION_ERRORS,
+    *("seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
 ]
@@ -70,19 +71,18 @@ def score(
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
     """A row per cell, as `method_table` takes it.
 
-    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (error at the end of the
-    horizon) [m], seconds (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors
-    (`CellErrors` or None).
+    Columns: condition, world, foundation, family, method, N_D, seed, status, H_end, H_end_90, H, H_90 [m], seconds
+    (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors (`CellErrors` or None).
     """
     saw, rows = results.saw_test, []
     for row in results.rows:
+        names = ("foundation", "family", "method", "N_D", "seed", "status", *PREDICTION_ERRORS)
         kept = {
-            **{name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")},
-            **{"condition": condition, "world": world, "end": np.nan, "errors": None},
+            **{name: row[name] for name in names},
+            **{"condition": condition, "world": world, "errors": None},
             **{"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw},
         }
         if (cell := row["cell"]) in results.paths:
-            kept["end"] = float(position_error(results.paths[cell][-1:], results.test.future[-1:]).mean())
             learns = learns_from_runs(results.plan, row["family"], row["method"])
             kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
         rows.append(kept)
@@ -96,12 +96,13 @@ def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) ->
     It stands as it is: no other training of it is known.
     """
     error, world = position_error(one.paths, results.test.future), str(cells["world"].iloc[0])
-    known = summarise_errors(error)
+    known: Mapping[str, Any] = summarise_errors(error)
     mine = CellErrors(one.label, results.by_run(error_of_windows(error)), results.windows, False, world)
     cells = cells.drop_duplicates(["foundation", "N_D", "seed"])
     for name, value in (("N_D", one.N_D), ("seed", one.seed)):
         cells = cells[cells[name].eq(value)] if value in set(cells[name]) else cells
-    numbers = {"H": known["mean"], "H_90": known["p90"], "end": error[-1].mean(), "seconds": np.nan, "trials": np.nan}
+    numbers = {column: known[name] for column, name in PREDICTION_ERRORS.items()}
+    numbers |= dict.fromkeys(("seconds", "trials"), np.nan)
     return cells.assign(
         method=one.label, status="ok", errors=pd.Series([mine] * len(cells), cells.index, object), **numbers
     )
@@ -110,11 +111,11 @@ def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) ->
 def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
-    H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
-    the others, `missing` also cells that only other methods have. `difference` is H less that of `reference` over the
-    `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`); `better` counts test
-    runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over worlds, with Student's
-    interval.
+    H_end, H_end_90, H, H_90 [m], seconds [s] and trials are means over the cells of a method that have a result;
+    `failed` counts the others, `missing` also cells that only other methods have. `difference` is H less that of
+    `reference` over the `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`);
+    `better` counts test runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over
+    worlds, with Student's interval.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -128,7 +129,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
                 {
                     **{"condition": condition, "family": family, "N_D": N_D, "method": method},
                     **{"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)},
-                    **{name: good[name].astype(float).mean() for name in ("H", "H_90", "end")},
+                    **{name: good[name].astype(float).mean() for name in PREDICTION_ERRORS},
                     **{name: mine[name].astype(float).mean() for name in ("seconds", "trials")},
                     **{"reference": reference, **_difference_row(errors, by_method.get(reference, {}))},
                 }

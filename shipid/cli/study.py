@@ -229,12 +229,13 @@ def study_score(
 ) -> None:
     """Score predictions of others on the test windows of a run, beside its methods, also in its page."""
     with open_answer(as_json) as answer:
-        heads = CELL | {"H": "H [m]", "H_90": "H_90 [m]", "end": "end [m]"} | DIFFERENCE | {"better": "better runs"}
+        heads = CELL | {"H_end": "at horizon [m]", "H_end_90": "nine in ten below [m]", "H": "H [m]"} | DIFFERENCE
         for label, table in shipid.score(folder, predictions, anyway=anyway).items():
             mine = table[table["method"].eq(label)].iloc[0]
-            words = f"{label}: H {mine.H:.4g} m, H_90 {mine.H_90:.4g} m, {mine.end:.4g} m at the end of the horizon"
+            end, end_90, H = (f"{mine[name]:.4g} m" for name in ("H_end", "H_end_90", "H"))
+            words = f"{label}: at the horizon {end}, nine in ten below {end_90}, H {H}"
             answer.say(f"{words}\nothers, and their H less this one, with its 95 % interval over test runs:")
-            answer.records(label, table, heads, shown=table[table["method"].ne(label)])
+            answer.records(label, table, heads | {"better": "better runs"}, shown=table[table["method"].ne(label)])
     with show_steps() as say:
         shipid.write_pages(folder, say)
 
@@ -252,7 +253,7 @@ def study_compare(
     out: Annotated[Path | None, typer.Option(help="file for a row per comparison: .csv or .parquet")] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare runs with the first one: what their documents differ in, and H of equal cells with paired intervals.
+    """Compare runs with the first one: what their documents differ in, and errors of equal cells, paired.
 
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.
@@ -282,13 +283,15 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     words = "the documents are equal" if documents.empty else f"and {more} more: --json shows all" if more > 0 else ""
     answer.say(words, folders=compared.names)
     answer.say(
-        f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
+        f"error at the horizon [m] and H [m], its mean over the horizon, of {first} and of the other run, and the "
+        f"difference of H, the other less {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
     banded = bool(errors[list(bands)].notna().any(axis=None))
     heads |= (
-        {"cells": "cells", "first": first, "other": "other"}
+        {"cells": "cells", "first_end": f"at horizon, {first}", "other_end": "other"}
+        | {"first": f"H, {first}", "other": "other"}
         | DIFFERENCE
         | (bands if banded else {})
         | {"verdict": "verdict"}
@@ -307,8 +310,12 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     heads = {"id": "finding", "verdicts": f"in {len(worlds)} worlds", "number": "number", "mean": "mean over worlds"}
     answer.records("findings", compare_findings(worlds), heads | {"low": "95 % from", "high": "to"})
     level = level_text(worlds[0].plan.study.bands.level)
-    answer.say(f"mean, least and greatest over the worlds of H [m], and of bands of {level}: share of whole test paths")
-    for name, what in (("H", "H [m]"), ("coverage", "in band"), ("width", "radius of band [m]")):
+    answer.say(
+        "mean, least and greatest over the worlds of the error at the horizon [m], of H [m], its mean over the "
+        f"horizon, and of bands of {level}: share of whole test paths"
+    )
+    shown = {"H_end": "at the horizon [m]", "H_end_90": "nine in ten below [m]", "H": "H [m]", "coverage": "in band"}
+    for name, what in (*shown.items(), ("width", "radius of band [m]")):
         numbers = {name: what, f"{name}_low": "least", f"{name}_high": "greatest", "worlds": "worlds"}
         answer.records("errors", errors, CELL | numbers, shown=errors.dropna(subset=name))
     return errors

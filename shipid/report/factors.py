@@ -30,6 +30,8 @@ STRIP_HEIGHT = 30  # height of a model [px]
 MODEL_COLUMNS = {
     "model": "model",
     "family": "family",
+    "at the horizon [m]": "A_end",
+    "nine in ten below [m]": "A_end_90",
     "A [m]": "A",
     "A_90 [m]": "A_90",
     "rms [m]": "A_rms",
@@ -46,6 +48,8 @@ CELLS = {
     "N_D [1]": "N_D",
     "data [min]": "minutes",
     "seed": "seed",
+    "at the horizon [m]": "H_end",
+    "nine in ten below [m]": "H_end_90",
     "H [m]": "H",
     "H_90 [m]": "H_90",
     "rms [m]": "rms",

@@ -14,7 +14,7 @@ from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, shorten_line
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
-from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
+from shipid.metrics import PREDICTION_ERRORS, coverage_share, position_error, summarise_errors, vector_lengths
 from shipid.observer import Estimates
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, StudyMethod
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from shipid.identification.solve import Solution
 
 
-NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms"), np.nan)  # of no physics
+NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms", "A_end", "A_end_90"), np.nan)  # of no physics
 Errors = dict[tuple[str, str], tuple[Array, float]]
 
 
@@ -202,14 +202,15 @@ def evaluate_cell(
 
 
 def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
-    """A, A_90, A_rms [m] of the paths (T, S, 2) of the physics alone on the test windows."""
+    """A, A_90, A_rms, A_end, A_end_90 [m] of the paths (T, S, 2) of the physics alone on the test windows."""
     known: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
-    return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"]}
+    ends = {"A_end": known["end"], "A_end_90": known["end_90"]}
+    return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"], **ends}
 
 
 def _failed_columns(status: str, sentence: str) -> dict[str, Any]:
     """The columns of a row without a result."""
-    blank = dict.fromkeys(("H", "H_90", "rms", "coverage", "width"), np.nan)
+    blank = dict.fromkeys((*PREDICTION_ERRORS, "rms", "coverage", "width"), np.nan)
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
@@ -233,8 +234,9 @@ def _test_errors(
         return _failed_columns(
             "diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"
         ), None
-    error = summarise_errors(position_error(paths, test.future))
-    outcome = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"], "coverage": np.nan, "width": np.nan}
+    error: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
+    outcome = {column: error[name] for column, name in PREDICTION_ERRORS.items()}
+    outcome |= {"rms": error["rms"], "coverage": np.nan, "width": np.nan}
     level = study.bands.level
     if predictor.bands is not None and predictor.bands.promises(level):
         region = predictor.band(paths, instants, level)

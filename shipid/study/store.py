@@ -54,7 +54,8 @@ PREFIXES = {
     "past": "past ",
     "states": "states ",
 }  # of the arrays of `TEST`
-UNITS = {**dict.fromkeys(("A", "A_90", "A_rms", "H", "H_90", "rms", "width"), "m"), "coverage": "1", "seconds": "s"}
+LENGTHS = ("A_end", "A_end_90", "A", "A_90", "A_rms", "H_end", "H_end_90", "H", "H_90", "rms", "width")
+UNITS = {**dict.fromkeys(LENGTHS, "m"), "coverage": "1", "seconds": "s"}
 METRICS = tuple(UNITS)
 SHARDS = "shards"
 

@@ -44,6 +44,14 @@ def test_percentiles_are_taken_within_manoeuvres(made: Any) -> None:
     assert table.mean("good", 0) == pytest.approx(np.quantile([0.0, 0.0, 0.0, 10.0], 0.9))
 
 
+def test_the_error_at_the_horizon_is_that_of_the_last_step(made: Any) -> None:
+    results = made(grid(H), curves={("good", 10, 0): [0.0, 0.0, 0.0, 10.0]}, runs=8)
+    table = error_table(results, ["good"], "H_end")
+    assert table.mean("good", 0) == pytest.approx(10.0)
+    assert table.mean("good", 0) == pytest.approx(results.cells.set_index("cell").loc["good+drawn-10-0", "H_end"])
+    assert error_table(results, ["good"]).mean("good", 0) == pytest.approx(2.5)
+
+
 def test_an_interval_of_an_error_is_that_of_its_difference_to_0_without_what_is_below_0(made: Any) -> None:
     results = made(grid(H), runs=8)
     table = error_table(results, ["good", "bad"])

@@ -124,7 +124,7 @@ def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blin
     assert same["difference"] == pytest.approx(same["H"] - cell["H"])
     assert (shipid.compare_methods(results)["method"] == "rival").sum() == 3
     with without_figures():
-        assert f"rival: H {cell['H']:.4g} m" in output_of("study", "score", results.folder, file)
+        assert f"rival: at the horizon {cell['H_end']:.4g} m" in output_of("study", "score", results.folder, file)
     # the tables carry it, also beside the predictions, and the folder of the run remembers it
     out = windows(results.plan, with_truth=True)
     passed = written(tmp_path / "passed.parquet", results, out.physics["wrong-1"][:, out.keys["split"] == "test"])
