@@ -6,8 +6,9 @@ CasADi runs it sample by sample, or PyTorch in batches. The results of all engin
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from shipid.physics.signals import ACTUAL, is_command, signal_row
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 
+log = logging.getLogger(__name__)
 MOST_STEPS = 10**12
 SPEED_LIMIT = 100.0  # m/s: beyond any ship; a faster sample has diverged
 PATHS_KEPT = 4_000_000  # numbers of north and east that are kept at a time where an engine cannot measure on its way
@@ -39,9 +41,9 @@ class Trajectories:
     interval : time between records [s].
     """
 
-    states: Array
+    states: Array = field(repr=False)
     names: tuple[str, ...]
-    diverged: Array
+    diverged: Array = field(repr=False)
     interval: float
 
     def __getitem__(self, name: str) -> Array:
@@ -80,7 +82,7 @@ def rollout(
     memory : hidden state -> (S,); default: each actuator has reached its first order.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
     components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
-        from `shipid.simulation.sea`; default: none, calm water.
+        from `shipid.simulation.weather`; default: none, calm water.
     helmsman : control law that gives the orders; `commands` are then its inputs; see `shipid.physics.helm`.
     keep : channels to record, default all states and memories.
     engine : of `ENGINES`, or `auto`: by size and by what there is; `repeated` is `auto` where so many calls follow that
@@ -99,6 +101,7 @@ def rollout(
     model, batch = prepare_batch(vessel, *given, num_steps, parameters, memory, tau_extra, helmsman)
     _check_channel_names("environment", environment, model.environment, vessel)
     _check_channel_names("commands", commands, model.commands, vessel)
+    _warn_of_units(model.commands, batch.commands)
     names = channel_names(model)
     kept = names if keep is None else as_names("keep", keep)
     job = RolloutJob(step, num_steps, method, every, channel_places(kept, names, vessel), device)
@@ -128,6 +131,14 @@ def _check_channel_names(what: str, given: object, names: Sequence[str], vessel:
     unknown = next((name for name in odd if signal_row(name) is None or (commands and is_command(name))), None)
     if unknown is not None:
         raise ShipidError(f"{what}: {vessel.name} has no {unknown!r}: {suggest_name(unknown, names)}")
+
+
+def _warn_of_units(names: Sequence[str], commands: Array) -> None:
+    """Warn of a command (T, channel, S) beyond what is plausible: it was probably meant in another unit than SI."""
+    for name, values in zip(names, np.abs(commands).max(axis=(0, 2), initial=0.0), strict=True):
+        row = signal_row(name)
+        if row is not None and row.plausible is not None and values > row.plausible:
+            log.warning("command %s reaches %.4g %s: was %s meant?", name, values, row.unit, row.read_in)
 
 
 @dataclass(frozen=True)

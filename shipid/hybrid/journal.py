@@ -15,6 +15,7 @@ from typing import Any
 
 import optuna
 from optuna.distributions import BaseDistribution, FloatDistribution
+from optuna.exceptions import DuplicatedStudyError
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState, create_trial
@@ -144,4 +145,7 @@ def merge_journals(files: Iterable[Path], target: Path) -> None:
         for file in files:
             storage = Journal(file).storage
             for name in optuna.get_all_study_names(storage):
-                optuna.copy_study(from_study_name=name, from_storage=storage, to_storage=into)
+                try:
+                    optuna.copy_study(from_study_name=name, from_storage=storage, to_storage=into)
+                except DuplicatedStudyError:
+                    raise ResultError(f"another journal holds {name}, too; {REMEDY}", file=file) from None

@@ -127,7 +127,7 @@ def import_log(
                 update={"origin": PlaneOrigin.model_construct(latitude=first[0], longitude=first[1])}
             )
     parts, alone = [part for _, part in each], mapping.source.runs is not None or len(each) > 1
-    rows = parts[0].rows
+    rows, repairs = parts[0].rows, _add_records([part.records for part in parts])
     metadata = {
         "vessel": mapping.vessel,
         "source": {**mapping.source.model_dump(exclude_defaults=True), "log": source.name, "sha256": digest},
@@ -136,7 +136,7 @@ def import_log(
         "clock": "run" if alone else "shared",
         "units": units_of_columns(rows.columns),
         "flags": list(FLAGS),
-        "repairs": _add_records([part.records for part in parts]),
+        "repairs": repairs,
     }
     if parts[0].origin is not None:
         metadata["origin"] = dict(zip(("latitude", "longitude"), parts[0].origin, strict=True))
@@ -147,7 +147,8 @@ def import_log(
         )
     elif mapping.source.runs is None:
         segments = mapping.segment or (_whole_segment(rows, mapping, source),)
-        frame = _cut_into_runs(rows, segments, to_si(mapping.clock.unit, "t"), source)
+        frame, outside = _cut_into_runs(rows, segments, to_si(mapping.clock.unit, "t"), source)
+        repairs += outside
     else:
         frame = pd.concat([_name_run(part.rows, run) for run, part in each], ignore_index=True)
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
@@ -451,11 +452,13 @@ def _whole_segment(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
     return Segment(run=file.stem, start=rows["t"].iloc[0] / unit, end=rows["t"].iloc[-1] / unit)
 
 
-def _cut_into_runs(rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path) -> pd.DataFrame:
-    """Put the runs one after another; rows that belong to two runs are repeated."""
+def _cut_into_runs(
+    rows: pd.DataFrame, segments: Iterable[Segment], unit: float, file: Path
+) -> tuple[pd.DataFrame, Records]:
+    """Put the runs one after another, and count the rows in none; rows that belong to two runs are repeated."""
     t = rows["t"].to_numpy()
     slack, step = clock_slack(t), float(np.median(np.diff(t)))
-    runs = []
+    runs, outside = [], np.ones(len(t), dtype=bool)
     for index, segment in enumerate(segments):
         start, end = segment.start * unit, segment.end * unit
         inside = (t >= start - slack) & (t <= end + slack)
@@ -465,7 +468,10 @@ def _cut_into_runs(rows: pd.DataFrame, segments: Iterable[Segment], unit: float,
             raise DataError(message, file=file, path=f"segment.{index}")
         part = rows if inside.all() else rows.loc[inside].reset_index(drop=True)
         runs.append(_name_run(part, segment.run))
-    return runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
+        outside &= ~inside
+    record = {"kind": "left out", "column": "", "count": int(outside.sum()), "note": f"of {len(t)} rows: in no segment"}
+    frame = runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
+    return frame, [record] if outside.any() else []
 
 
 def _split_runs(log: ImportedLog, name: str) -> Iterator[pd.DataFrame]:

@@ -29,6 +29,21 @@ def zeros(names: tuple[str, ...], num_samples: int = 1) -> dict[str, np.ndarray]
     return {name: np.zeros(num_samples) for name in names}
 
 
+@pytest.mark.parametrize(("value", "said"), [(20.0, "rudder.delta reaches 20 rad: was deg meant?"), (0.35, "")])
+def test_an_order_in_another_unit_is_said(value: float, said: str, caplog: pytest.LogCaptureFixture) -> None:
+    ship = load_vessel("mariner")
+    names = vessel_dynamics(ship)
+    rollout(
+        ship,
+        {**zeros(names.state), "u": np.array([7.0])},
+        {**zeros(names.commands), "rudder.delta": np.array([value])},
+        step=0.5,
+        num_steps=2,
+    )
+    assert said in caplog.text
+    assert bool(said) == bool(caplog.text)
+
+
 def test_turning_the_chart_turns_the_path(vessel: Vessel, draw_inputs: Draw) -> None:
     """Frame invariance: heading, start, wind and current turned by an angle give the same path, turned."""
     angle, given = 1.234, draw_inputs(vessel, 4)

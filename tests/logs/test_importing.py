@@ -88,10 +88,12 @@ def test_a_heading_that_counts_from_0_again_is_refused_without_wrap(plain_mappin
     np.testing.assert_allclose(imported(straight, plain, tmp_path).frame["psi"], straight["psi"], atol=1e-9)
 
 
-def test_segments_may_overlap(plain_mapping: Write, tmp_path: Path) -> None:
+def test_segments_may_overlap_and_rows_in_none_are_counted(plain_mapping: Write, tmp_path: Path) -> None:
     more = '\n[[segment]]\nrun = "a"\nstart = 10\nend = 20\n[[segment]]\nrun = "b"\nstart = 15\nend = 30\n'
-    frame = imported(turning(T), plain_mapping(more), tmp_path).frame
-    assert frame.groupby("run")["t"].agg(["min", "max", "size"]).to_numpy().tolist() == [[10, 20, 21], [15, 30, 31]]
+    dataset = imported(turning(T), plain_mapping(more), tmp_path)
+    sizes = dataset.frame.groupby("run")["t"].agg(["min", "max", "size"])
+    assert sizes.to_numpy().tolist() == [[10, 20, 21], [15, 30, 31]]
+    assert counts(dataset) == {"left out": len(T) - 41}
 
 
 @pytest.mark.parametrize("clock", [*CLOCKS, *DATES])
