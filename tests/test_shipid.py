@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -64,7 +65,7 @@ def test_a_study_is_prepared_and_reported_without_pytorch() -> None:
 
 
 def blocks(page: str) -> list[str]:
-    """Blocks of Python of a page of the documentation."""
+    """Blocks of Python of a page of the documentation, or of `../README.md`."""
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
@@ -99,15 +100,6 @@ def test_a_study_from_the_documentation_runs(tmp_path: Path, monkeypatch: pytest
     assert set(space["results"].cells["N_D"]) == {4}
     assert Path("results/mine/report.html").is_file()
     assert Path("gain.html").is_file()
-
-
-def test_cells_of_the_documentation_are_read(tiny_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    space: dict[str, Any] = {}
-    text = blocks("python.md")[2]
-    assert QUICK in text
-    exec(text.replace(QUICK, repr(str(tiny_run))), space)
-    assert len(space["cells"]) == 8
 
 
 def script(*words: object, folder: Path) -> str:
@@ -185,9 +177,30 @@ def test_the_page_of_manoeuvres_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert space["path"]["psi"][-1].item() == pytest.approx(0.5, abs=0.01)
 
 
+def test_the_chain_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As printed; only the study is the smallest there is."""
+    monkeypatch.chdir(tmp_path)
+    [chain] = blocks("../README.md")
+    for printed, small in (
+        ('"quick"', repr(str(TINY))),
+        ('"high"', '"wrong"'),
+        ('"high-1"', '"wrong-1"'),
+        ("[10, 30]", "[4, 6]"),
+    ):
+        assert printed in chain
+        chain = chain.replace(printed, small)
+    space: dict[str, Any] = {"__name__": "__main__"}
+    with without_workers():
+        exec(chain, space)
+    assert space["residual"].shape[::2] == (5, 2)
+    assert np.isfinite(space["results"].cells["H"]).all()
+    assert Path("map.html").is_file()
+    assert Path("spread.html").is_file()
+
+
 def test_frames_of_the_documentation_are_drawn() -> None:
     space: dict[str, Any] = {}
-    exec(blocks("python.md")[3], space)
+    exec(blocks("python.md")[2], space)
     assert space["figure"].layout.yaxis.type == "log"
 
 

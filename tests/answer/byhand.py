@@ -47,7 +47,9 @@ def by_hand(
     document["family"] = (
         [{"name": name, "base": "gunnerus-28.9"} for name in alone]
         if family is None
-        else [{"name": name, "base": "gunnerus-28.9", "members": count} for name, count in family.items()]
+        else [
+            {"name": name, "base": "gunnerus-28.9", "members": count, "equal": True} for name, count in family.items()
+        ]
     )
     document["grid"] = {"N_D": sorted({N for _, N, _ in cells}), "seeds": sorted({seed for *_, seed in cells})}
     if claims is not None:
