@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import find_compiler, refuse_compiling
 from shipid.errors import DataError, DocumentError, suggest_name
@@ -32,11 +32,9 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
-SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "psi": math.radians(1.0)} | {
-    **dict.fromkeys(("phi", "theta"), math.radians(1.0)),
-    **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
-}
-"""Typical error [SI] of a state that is not fitted: the scale of its correction in the solver."""
+MISSED = 0.02  # of speed, length and 1 rad: what a fitted model misses; 0.1 m/s and 0.2 deg/s at 5 m/s and 29 m
+MEASURED_MOTION = ("u", "v", "r")  # signals that are fitted where the settings name none
+NORMAL_MEDIAN = 0.6745  # of the absolute values of a standard normal variable
 # Steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling.
 COMPILE_FROM = 4e4
 CURRENT = ("V_c", "beta_c")  # channels that the nuisance of that name estimates
@@ -51,6 +49,7 @@ class Problem:
     values (nq,) and prior widths (nq,). start_width : of the initial states in standard deviations of the signals;
     None:
     they are not free. base : (R, P) parameters with the overrides of each run. deviations : (ny,) of the signals.
+    sizes : of `typical_errors`.
     """
 
     vessel: Vessel
@@ -65,6 +64,7 @@ class Problem:
     widths: Array
     start_width: float | None
     deviations: Array
+    sizes: Mapping[str, float]
 
     @cached_property
     def model(self) -> Variation:
@@ -73,9 +73,9 @@ class Problem:
 
     @cached_property
     def node_scale(self) -> Array:
-        """(nn,) scale of each initial state: the signal's standard deviation where it is fitted, else `SIZES`."""
+        """(nn,) scale of each initial state: the signal's standard deviation where it is fitted, else `sizes`."""
         deviation_of = dict(zip(self.layout.signals, self.deviations, strict=True))
-        return np.array([deviation_of.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
+        return np.array([deviation_of.get(name, self.sizes.get(name, 1.0)) for name in self.model.node])
 
     @cached_property
     def whole(self) -> Predictions:
@@ -100,6 +100,9 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
         raise DataError("no run to fit: name at least one", path="runs")
     if len(set(runs)) < len(runs):
         raise DataError("a run is named twice: name each once", path="runs")
+    sizes = typical_errors(vessel, dataset, runs)
+    weights = settings.weights or {name: sizes[name] for name in MEASURED_MOTION}
+    settings = settings.model_copy(update={"weights": weights})
     widths = settings.widths
     if "current" in widths and "current" not in vessel.document:
         vessel = vessel.with_values({"current.kind": "uniform"})
@@ -133,7 +136,30 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
         widths=np.array([scalars[name][1] for name in names]),
         start_width=widths.get("initial_state"),
         deviations=np.array(list(settings.signals.values())),
+        sizes=sizes,
     )
+
+
+def typical_errors(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, float]:
+    """State -> typical error [SI] of its prediction, from its own noise in the runs and the ship's speed U.
+
+    It is the root of noise^2 + (`MISSED` x)^2, x being U for u, v, w, U / L for p, q, r, L for a position and 1 for an
+    angle. The noise is white: second differences of the rows have 6 times its variance.
+    """
+    rows = dataset.select(runs)
+    speed = float(np.sqrt((rows.frame[["u", "v"]] ** 2).sum(axis=1).mean())) or 1.0
+    length = vessel.length or speed / (float(np.sqrt((rows.frame["r"] ** 2).mean())) or 1.0)
+    scale = dict.fromkeys(("u", "v", "w"), speed) | dict.fromkeys(("p", "q", "r"), speed / length)
+    scale |= dict.fromkeys(("north", "east", "down"), length) | dict.fromkeys(("psi", "phi", "theta"), 1.0)
+    stretches = [stretch for _, stretch in stretches_of_runs(rows)]
+
+    def noise(name: str) -> float:
+        if name not in rows.frame:
+            return 0.0
+        second = np.concatenate([np.diff(stretch[name].to_numpy(), 2) for stretch in stretches])
+        return float(np.median(np.abs(second))) / NORMAL_MEDIAN / 6**0.5 if len(second) else 0.0
+
+    return {name: math.hypot(noise(name), MISSED * size) for name, size in scale.items()}
 
 
 def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None:

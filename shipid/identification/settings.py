@@ -82,7 +82,9 @@ class Identify(CheckedModel, BaseModel):
         description="held: a command counts from its row to the next; between: an order to an actuator changes in the "
         "middle between two rows, any other command evenly",
     )
-    weights: Annotated[dict[str, Positive], Field(min_length=1)] = {"u": 0.1, "v": 0.1, "r": math.radians(0.2)}
+    weights: dict[str, Positive] = Field(
+        default={}, description="standard deviations; default: u, v, r by the noise of the log and the ship's speed"
+    )
     loss: Literal["squared", "huber"] = "squared"
     threshold: Positive = Field(default=2.0, description="standard deviations beyond which huber counts linearly")
     nuisance: dict[str, Positive] | list[str] = Field(default=[], description="per-run unknowns, with prior widths")
