@@ -13,7 +13,7 @@ import pandas as pd
 
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
-from shipid.identification.free_run import ALL, simulate_free_runs
+from shipid.identification.free_run import ALL, simulate_free_runs, with_current
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
 from shipid.simulation.approach import Controls, balanced_shaft
@@ -57,9 +57,10 @@ class DrawnLog:
         """The fit with these settings besides."""
         return identify(self.guess, self.log, self.fitted, self.settings.model_copy(update=more))
 
-    def error(self, vessel: Vessel) -> float:
-        """Root mean square error of the position [m] of free runs of runs held out."""
-        errors = simulate_free_runs({"it": vessel}, self.log, self.held_out, self.settings, self.ahead).errors
+    def error(self, vessel: Vessel, current: tuple[float, float] = (0.0, 0.0)) -> float:
+        """Root mean square error of the position [m] of free runs of runs held out, in a current [m/s]."""
+        sea, settings = with_current(vessel, self.settings, self.held_out, current)
+        errors = simulate_free_runs({"it": sea}, self.log, self.held_out, settings, self.ahead).errors
         return float(errors.loc[errors["run"] == ALL, "position"].iloc[0])
 
 
@@ -85,8 +86,7 @@ def scaled_vessel(vessel: Vessel, scale: float) -> Vessel:
 def _orders(vessel: Vessel, speed: float, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Command -> (ROWS, runs): shafts about those of the speed, and helm to both sides, held for a while."""
     controls, shape = Controls(vessel), (-(-ROWS // HELD), RUNS + TESTS)
-    shaft = balanced_shaft(controls, speed)
-    assert shaft is not None
+    shaft = balanced_shaft(controls, speed) or 0.0
 
     def held(low: float, high: float) -> np.ndarray:
         return np.repeat(rng.uniform(low, high, shape), HELD, axis=0)[:ROWS]
@@ -110,9 +110,9 @@ def drawn_log(seed: int, speeds: tuple[float, float] = (0.1, 12.0)) -> DrawnLog:
     while True:
         length, froude = float(np.exp(rng.uniform(0, np.log(300)))), float(rng.uniform(0.03, 0.25))
         speed = froude * float(np.sqrt(9.81 * length))
-        if speeds[0] <= speed <= speeds[1]:
+        truth = scaled_vessel(base, length / base.length)
+        if speeds[0] <= speed <= speeds[1] and balanced_shaft(Controls(truth), speed):
             break
-    truth = scaled_vessel(base, length / base.length)
     coefficients = [path for path, x in truth.parameters.items() if FREE.fullmatch(path) and x]
     truth = truth.with_values({path: truth.parameters[path] * rng.uniform(0.9, 1.1) for path in coefficients})
     wrong = {path: truth.parameters[path] * float(np.exp(rng.normal(0, 0.35))) for path in coefficients}
