@@ -649,7 +649,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
     held = {
         gone: (factor, factor)
         for gone, factor in zip(solution.paths, solution.factors, strict=True)
-        if gone in solution.dropped
+        if gone in solution.dropped and gone in solution.values
     }
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:

@@ -195,7 +195,8 @@ def fit_statistics(fit: LinearFit) -> Statistics:
     """Covariances, 95 % intervals and identifiability of a fit, linear at the estimate.
 
     A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values, and excludes no
-    effect (0) with and without the priors; collinearity explains a wider one. The profile likelihood (`shipid.identification.profile`) shows whether that is finite.
+    effect (0) with and without the priors; collinearity explains a wider one. The profile likelihood
+    (`shipid.identification.profile`) shows whether that is finite.
     """
     free = _free_places(fit)
     if not len(free):

@@ -60,7 +60,8 @@ def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
 
     Source: Schwarz, Annals of Statistics 6 (1978) 461.
     """
-    if len(solution.runs) < LEAST_RUNS or "current" in solution.settings.widths or _is_set(solution):
+    fixed = bool((solution.held | solution.at_bound).all())
+    if len(solution.runs) < LEAST_RUNS or "current" in solution.settings.widths or _is_set(solution) or fixed:
         return []
     slopes = _current_slopes(solution, dataset)
     if slopes is None:
@@ -114,7 +115,7 @@ def _current_slopes(solution: Solution, dataset: Dataset) -> Array | None:
 
 
 def _gauss_newton_step(solution: Solution, added: Array) -> tuple[Array, Array]:
-    """One step of Gauss-Newton in further unknowns (m, k) beside the factors: (k,), and the residuals (m,) it leaves."""
+    """One step of Gauss-Newton in further unknowns (m, k) beside the factors: (k,), and the residuals (m,) left."""
     free = ~(solution.held | solution.at_bound)
     J = np.hstack([solution.jacobian[:, free], added])
     prior = np.append(solution.prior_widths[free], np.full(added.shape[1], np.inf))
