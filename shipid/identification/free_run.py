@@ -64,7 +64,7 @@ def check_length(settings: Identify, length: float) -> None:
 def with_current(
     vessel: Vessel, settings: Identify, runs: Sequence[str], current: tuple[float, float]
 ) -> tuple[Vessel, Identify]:
-    """Vessel and settings for free runs in one steady current, to north and to east [m/s]; what is set for a run stays."""
+    """Vessel and settings for free runs in one current, to north and to east [m/s]; what is set for a run stays."""
     values = (math.hypot(*current), math.atan2(*current[::-1]))
     known = {f"{run}.{ENVIRONMENT}.{name}": x for run in runs for name, x in zip(CURRENT, values, strict=True)}
     sea = vessel if "current" in vessel.document else vessel.with_values({"current.kind": "uniform"})

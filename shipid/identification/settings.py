@@ -93,7 +93,7 @@ class Identify(CheckedModel, BaseModel):
     nuisance: dict[str, Positive] | list[str] = Field(default=[], description="per-run unknowns, with prior widths")
     current: Literal["chosen", "none", "one", "by run"] = Field(
         default="chosen",
-        description="current of the runs: none, one of all, another one by run; chosen: the one that the residuals show",
+        description="current of the runs: none, one of all, one by run; chosen: what the residuals show",
     )
     runs: dict[str, Any] = Field(default={}, description='"<run>.<path>" -> value for that run alone')
     start: Literal["growing", "inverse", "base"] = Field(

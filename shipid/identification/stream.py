@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from shipid.identification.residuals import CURRENT, build_problem, predict_resi
 from shipid.identification.settings import ENVIRONMENT, run_overrides
 from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.units import percent_text, significant_digits
-
-if TYPE_CHECKING:
-    from shipid.identification.solve import Solution
 
 Array = NDArray[np.float64]
 CurrentKind = Literal["none", "one", "by run"]
@@ -52,10 +49,10 @@ class Stream:
         )
 
 
-def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
+def estimate_currents(solution: Any, dataset: Dataset) -> list[Stream]:
     """No current, one of all runs and one by run, each after one step of Gauss-Newton with the factors.
 
-    Empty where currents are known or cannot be computed. Residuals count as those of a first-order process with the
+    solution : of `identify`, without currents. Empty where currents are known or cannot be computed. Residuals count as those of a first-order process with the
     correlation that they have left with currents by run.
 
     Source: Schwarz, Annals of Statistics 6 (1978) 461.
@@ -86,13 +83,13 @@ def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
     return result
 
 
-def _is_set(solution: Solution) -> bool:
+def _is_set(solution: Any) -> bool:
     """Whether the settings have the current of a run; no log has one."""
     given = run_overrides(solution.settings, solution.runs)
     return any(key.endswith(f".{ENVIRONMENT}.{name}") for key in given for name in CURRENT)
 
 
-def _current_slopes(solution: Solution, dataset: Dataset) -> Array | None:
+def _current_slopes(solution: Any, dataset: Dataset) -> Array | None:
     """(m, 2) d residual / d current of its run, to north and to east [s/m]; None where a prediction diverges."""
     point = solution.point
     before = build_problem(solution.vessel, dataset, solution.runs, solution.settings).model.node
@@ -114,7 +111,7 @@ def _current_slopes(solution: Solution, dataset: Dataset) -> Array | None:
     return np.asarray(with_changes.marginal(solution.settings.linear_from, solution.within)[1][:, -2:])
 
 
-def _gauss_newton_step(solution: Solution, added: Array) -> tuple[Array, Array]:
+def _gauss_newton_step(solution: Any, added: Array) -> tuple[Array, Array]:
     """One step of Gauss-Newton in further unknowns (m, k) beside the factors: (k,), and the residuals (m,) left."""
     free = ~(solution.held | solution.at_bound)
     J = np.hstack([solution.jacobian[:, free], added])
