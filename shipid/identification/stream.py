@@ -52,8 +52,8 @@ class Stream:
 def estimate_currents(solution: Any, dataset: Dataset) -> list[Stream]:
     """No current, one of all runs and one by run, each after one step of Gauss-Newton with the factors.
 
-    solution : of `identify`, without currents. Empty where currents are known or cannot be computed. Residuals count as those of a first-order process with the
-    correlation that they have left with currents by run.
+    solution : of `identify`, without currents. Empty where currents are known or cannot be computed. Residuals count as
+    those of a first-order process with the correlation that they have left with currents by run.
 
     Source: Schwarz, Annals of Statistics 6 (1978) 461.
     """
