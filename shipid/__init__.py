@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     # isort: off
     from shipid import figures as figures
     from shipid.answer.compare import Comparison as Comparison, compare as compare
-    from shipid.answer.methods import compare_methods as compare_methods
+    from shipid.answer.methods import compare_methods as compare_methods, score as score
     from shipid.answer.pages import write_pages as write_pages
     from shipid.answer.start import events as events, run as run
     from shipid.data.checks import check_dataset as check_dataset
@@ -38,6 +38,12 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.logs.mapping import read_mapping as read_mapping
     from shipid.metrics import position_error as position_error
     from shipid.predictor import Predictor as Predictor, fit as fit
+    from shipid.simulation.families import (
+        VesselFamily as VesselFamily,
+        read_families as read_families,
+        read_family as read_family,
+        verify_lock as verify_lock,
+    )
     from shipid.simulation.measured import measure_standard as measure_standard
     from shipid.simulation.perform import perform_manoeuvres as perform_manoeuvres
     from shipid.simulation.standard import define_standard as define_standard
@@ -46,6 +52,7 @@ if TYPE_CHECKING:  # for editors and type checkers; at run time a name is import
     from shipid.study.results import Results as Results, read_cells as read_cells, read_results as read_results
     from shipid.study.run import run_study as run_study
     from shipid.study.screen import screen as screen
+    from shipid.study.windows import prediction_table as prediction_table, windows as windows
     from shipid.vessel.load import Vessel as Vessel, load_vessel as load_vessel
     from shipid.vessel.perturb import (
         Family as Family,
@@ -79,6 +86,7 @@ _PUBLIC = {
     "Truth": "shipid.simulation.truth",
     "Variant": "shipid.vessel.perturb",
     "Vessel": "shipid.vessel.load",
+    "VesselFamily": "shipid.simulation.families",
     "Windows": "shipid.data.windows",
     "check_dataset": "shipid.data.checks",
     "compare": "shipid.answer.compare",
@@ -96,7 +104,11 @@ _PUBLIC = {
     "draw_members": "shipid.vessel.perturb",
     "perform_manoeuvres": "shipid.simulation.perform",
     "position_error": "shipid.metrics",
+    "prediction_table": "shipid.study.windows",
     "read_cells": "shipid.study.results",
+    "read_families": "shipid.simulation.families",
+    "verify_lock": "shipid.simulation.families",
+    "read_family": "shipid.simulation.families",
     "read_dataset": "shipid.data.dataset",
     "read_mapping": "shipid.logs.mapping",
     "read_plan": "shipid.study.plan",
@@ -105,9 +117,11 @@ _PUBLIC = {
     "run": "shipid.answer.start",
     "run_identification": "shipid.identification.outcome",
     "run_study": "shipid.study.run",
+    "score": "shipid.answer.methods",
     "screen": "shipid.study.screen",
     "simulate_truth": "shipid.simulation.truth",
     "define_standard": "shipid.simulation.standard",
+    "windows": "shipid.study.windows",
     "write_dataset": "shipid.data.dataset",
     "write_pages": "shipid.answer.pages",
 }

@@ -1,8 +1,8 @@
 """Every figure of the reports as a plotly figure: `shipid.figures.error_map(results).show()`.
 
 Figures of a study take `Results`, the content of a report, or a table of cells as of `shipid.read_cells`; others the
-outcome of an identification, what `shipid.measure_standard` returns, or a dataset. All raise ShipidError where there is
-nothing to draw or an option does not exist.
+outcome of an identification, what `shipid.measure_standard` returns, a family, its trajectories, or a dataset. All
+raise ShipidError where there is nothing to draw or an option does not exist.
 """
 
 from __future__ import annotations
@@ -17,24 +17,31 @@ import plotly.graph_objects as go
 
 from shipid.arguments import check_class, check_number
 from shipid.errors import ShipidError
-from shipid.report.checks import CHECK_PAGE, CheckContent
 from shipid.report.content import PageContent, ReportContent
+from shipid.report.factors import family_figure
 from shipid.report.figure import PageFigure, draw_alone
 from shipid.report.identification import IDENTIFICATION_PAGE, IdentificationContent
-from shipid.report.manoeuvre import MANOEUVRE_PAGE, ManoeuvreContent
+from shipid.report.logs import CHECK_PAGE, CheckContent
+from shipid.report.motion import MANOEUVRE_PAGE, ManoeuvreContent, spread_figure
 from shipid.report.page import Section
 from shipid.report.paths import windows_of
 from shipid.report.physics_and_data import gain_lack, map_lack
 from shipid.report.sections import SECTIONS
+from shipid.report.selection import PHYSICS_ERRORS
 
 if TYPE_CHECKING:
     from shipid.data.dataset import Dataset
+    from shipid.engine.rollout import Trajectories
     from shipid.identification.outcome import Identification
+    from shipid.simulation.families import VesselFamily
     from shipid.simulation.measured import MeasuredManoeuvre
     from shipid.study.results import Results
 
     Source = Results | ReportContent | pd.DataFrame
 
+ErrorStatistic = Literal[
+    "at the horizon", "at the horizon, 90th percentile", "mean", "90th percentile", "root mean square"
+]
 PAGES: dict[type[PageContent], dict[str, Section]] = {
     ReportContent: SECTIONS,
     CheckContent: CHECK_PAGE,
@@ -42,7 +49,7 @@ PAGES: dict[type[PageContent], dict[str, Section]] = {
     ManoeuvreContent: MANOEUVRE_PAGE,
 }
 ABSENT_COLUMNS: dict[str, Any] = {"family": "given", "seed": 0, "status": "ok"} | dict.fromkeys(
-    ("A", "A_90", "A_rms", "H_90", "rms"), np.nan
+    (*PHYSICS_ERRORS, "H_end", "H_end_90", "H_90", "rms"), np.nan
 )
 """Columns of a table of cells that a user leaves out -> their value; errors in m."""
 
@@ -64,6 +71,7 @@ __all__ = [
     "residuals",
     "search",
     "spiral",
+    "spread",
     "track",
     "tracks",
     "width_map",
@@ -71,19 +79,22 @@ __all__ = [
 
 
 def error_map(source: Source, *, dark: bool = False) -> go.Figure:
-    """H over the accuracy A of the physics and the amount of data N_D; needs several N_D and two physics models."""
+    """H, the mean over the horizon, over the accuracy A of the physics and N_D; needs several N_D and two models."""
     content = content_of(source)
     return _draw("map", content, dark=dark, lack=map_lack(content))
 
 
 def gain(
     source: Source,
-    statistic: Literal["mean", "90th percentile", "root mean square"] = "mean",
-    scale: Literal["linear", "logarithmic"] = "linear",
+    statistic: ErrorStatistic | None = None,
+    scale: Literal["logarithmic", "linear"] = "logarithmic",
     *,
     dark: bool = False,
 ) -> go.Figure:
-    """H over N_D, a line per model; from the physics alone (N_D = 0) where there is a single N_D."""
+    """Error over N_D, a line per model from its physics alone (N_D = 0) on.
+
+    statistic : default: at the horizon, or the mean over it, H, of a table that has no column H_end.
+    """
     content = content_of(source)
     return _draw("gain", content, [statistic, scale], dark=dark, lack=gain_lack(content))
 
@@ -132,9 +143,22 @@ def prediction(
     return _draw("browser", content, [run, N_D], dark=dark)
 
 
-def factors(source: Source, *, dark: bool = False) -> go.Figure:
-    """Factors of the perturbed numbers of every model, as dots on a logarithmic axis."""
+def factors(source: Source | VesselFamily, *, dark: bool = False) -> go.Figure:
+    """Factors of the perturbed numbers of every model, or member of a family, as dots on a logarithmic axis."""
+    from shipid.simulation.families import VesselFamily
+
+    if isinstance(source, VesselFamily):
+        return draw_alone(family_figure(pd.DataFrame(source.table().xs("factor", axis=1, level=1))), dark=dark)
     return _draw("factors", content_of(source), dark=dark)
+
+
+def spread(source: Trajectories, *, dark: bool = False) -> go.Figure:
+    """Tracks and headings of all members of a family, as of `VesselFamily.trajectories`; those of the first sample."""
+    from shipid.engine.rollout import Trajectories
+
+    check_class("source", source, Trajectories, "as of `family.trajectories`")
+    motion = {name: source[name][:, ~source.diverged[:, 0], 0] for name in ("north", "east", "psi")}
+    return draw_alone(spread_figure(source.interval, motion, int(source.diverged[:, 0].sum())), dark=dark)
 
 
 def tracks(source: Source, *, dark: bool = False) -> go.Figure:
@@ -235,7 +259,7 @@ def content_of(source: Source) -> ReportContent:
         cells = source.assign(**{name: value for name, value in ABSENT_COLUMNS.items() if name not in source})
         models = cells.drop_duplicates("model")[["model", "family", "A", "A_90", "A_rms"]]
         models = models.assign(status="ok", description="")
-        naive = dict.fromkeys(("mean", "p90", "rms"), np.nan)
+        naive = dict.fromkeys(("end", "end_90", "mean", "p90", "rms"), np.nan)
         return ReportContent(title="", name="", cells=cells, models=models, naive=naive)
     from shipid.answer.pages import report_content
     from shipid.study.results import Results

@@ -15,7 +15,7 @@ import time
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -142,8 +142,8 @@ def write_new(text: str, file: Path) -> Path:
     return file
 
 
-def write_set(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Path]:
-    """Write text files of one folder that belong together, whole; `former` are files of an earlier set that go.
+def write_set(texts: Mapping[Path, str]) -> list[Path]:
+    """Write text files of one folder that belong together, whole.
 
     A process that is killed leaves the old set, the new one or a set with files missing, never files of both.
     """
@@ -152,7 +152,7 @@ def write_set(texts: Mapping[Path, str], former: Iterable[Path] = ()) -> list[Pa
             temporary = replaced.enter_context(replace_whole(file))
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
             sync_to_disk(temporary)
-        for file in (*(file for file in former if file not in texts), *texts):
+        for file in texts:
             Path(os.path.realpath(file)).unlink(missing_ok=True)
         sync_to_disk(next(iter(texts)).parent)
     return list(texts)

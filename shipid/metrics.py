@@ -17,8 +17,9 @@ Array = NDArray[np.float64]
 
 
 class ErrorSummary(TypedDict):
-    """Position error over all predicted points: A or H (mean), H_90 (p90) and the root mean square, all in metres.
+    """Position error [m] over all points: A or H (mean), H_90 (p90) and the root mean square; and at the horizon.
 
+    `end` and `end_90` are mean and 90 % quantile over the windows at the last step: H_end, H_end_90, A_end, A_end_90.
     `status` is `ok`, or `diverged` with NaN for the numbers if any point is not finite; `failed_share` is the share of
     windows with such a point.
     """
@@ -26,8 +27,14 @@ class ErrorSummary(TypedDict):
     mean: float
     p90: float
     rms: float
+    end: float
+    end_90: float
     status: str
     failed_share: float
+
+
+PREDICTION_ERRORS = {"H_end": "end", "H_end_90": "end_90", "H": "mean", "H_90": "p90"}
+"""Columns of a prediction's errors [m] in tables, the error at the horizon first -> their key in `ErrorSummary`."""
 
 
 def vector_lengths(vectors: Array) -> Array:
@@ -65,26 +72,35 @@ def coverage_share(held: NDArray[Any], run: NDArray[Any]) -> float:
 
 
 def summarise_errors(error: Array) -> ErrorSummary:
-    """Condense errors (T, S) [m] to A (14) or H (15), H_90 and the root mean square over all points of all windows."""
+    """Condense errors (T, S) [m] to A (14) or H (15), H_90, the root mean square, and the error at the horizon."""
     if error.size == 0:
         raise ValueError("there is no window to summarise")
     failed = ~np.isfinite(error).all(axis=0)
     if failed.any():
-        return ErrorSummary(mean=np.nan, p90=np.nan, rms=np.nan, status="diverged", failed_share=float(failed.mean()))
+        share, absent = float(failed.mean()), np.nan
+        return ErrorSummary(
+            mean=absent, p90=absent, rms=absent, end=absent, end_90=absent, status="diverged", failed_share=share
+        )
     return ErrorSummary(
         mean=float(error.mean()),
         p90=float(np.quantile(error, 0.9)),
         rms=float(np.sqrt(np.square(error).mean())),
+        end=float(error_at_horizon(error).mean()),
+        end_90=float(np.quantile(error_at_horizon(error), 0.9)),
         status="ok",
         failed_share=0.0,
     )
 
 
-OCTAVES, BINS_AN_OCTAVE = (-10, 20), 512  # of a tally: 1 mm to 1,000 km, bins 0.2 % wide or narrower
-LEAST, MOST = 2.0 ** OCTAVES[0], float(np.nextafter(2.0 ** OCTAVES[1], 0))
-BINS = BINS_AN_OCTAVE * (OCTAVES[1] - OCTAVES[0])
+FIRST_OCTAVE, LAST_OCTAVE, BINS_AN_OCTAVE = (
+    -10,
+    20,
+    512,
+)  # octaves of a tally: 1 mm to 1,000 km, bins 0.2 % wide or narrower
+LEAST, MOST = 2.0**FIRST_OCTAVE, float(np.nextafter(2.0**LAST_OCTAVE, 0))
+BINS = BINS_AN_OCTAVE * (LAST_OCTAVE - FIRST_OCTAVE)
 SHIFT = 52 - 9  # a double without its last bits is the number of its bin
-FIRST = (1023 + OCTAVES[0]) * BINS_AN_OCTAVE  # number of the bin that begins at LEAST
+FIRST = (1023 + FIRST_OCTAVE) * BINS_AN_OCTAVE  # number of the bin that begins at LEAST
 
 
 def tally_errors(error: Array) -> NDArray[np.uint32]:
@@ -103,7 +119,7 @@ def tally_quantile(counts: NDArray[np.uint32], share: float) -> Array:
         bin_ = int(np.searchsorted(running, place, side="right"))
         places.append(bin_ + min((place - running[bin_] + row[bin_] + 0.5) / row[bin_], 1.0))
     octave, step = np.divmod(np.reshape(places, counts.shape[:-1]), BINS_AN_OCTAVE)
-    return np.asarray(2.0 ** (octave + OCTAVES[0]) * (1 + step / BINS_AN_OCTAVE))
+    return np.asarray(2.0 ** (octave + FIRST_OCTAVE) * (1 + step / BINS_AN_OCTAVE))
 
 
 SLOW = 0.2  # m/s over ground: a slower ship has no course
@@ -125,6 +141,11 @@ def course_over_horizon(predicted: Array, true: Array, step: float) -> Array:
 def error_of_windows(error: Array) -> Array:
     """Return the mean error (S,) [m] over the horizon of each window, so over the instants of prediction (Fig. 13)."""
     return np.asarray(error.mean(axis=0))
+
+
+def error_at_horizon(error: Array) -> Array:
+    """Return the error (S,) [m] of each window at the last step of the horizon, of errors (T, S)."""
+    return np.asarray(error[-1])
 
 
 def path_roughness(paths: Array) -> float:

@@ -17,10 +17,10 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.errors import ShipidError
 from shipid.simulation.approach import Controls
-from shipid.simulation.gusts import Gusts, gust_series
 from shipid.simulation.manoeuvre import ApproachedManoeuvre, Excitation, TurningCircle, Zigzag
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.standard import shaft_speed
+from shipid.simulation.weather import Gusts, gust_series
 from shipid.vessel.load import Vessel, check_document
 
 DRIVES = ("screw", "twin screw", "azimuth", "screw and tunnel")

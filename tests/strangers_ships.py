@@ -16,7 +16,6 @@ import pandas as pd
 import pymap3d
 from numpy.typing import NDArray
 
-from shipid.simulation.gusts import Gusts, gust_series
 from shipid.simulation.manoeuvre import (
     CrashStop,
     Excitation,
@@ -28,6 +27,7 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform_manoeuvres
+from shipid.simulation.weather import Gusts, gust_series
 from shipid.units import RPM
 from shipid.vessel.load import Vessel
 from tests.strangers import TURN, _hull, _plain, _thrusters, _wetted, _wind

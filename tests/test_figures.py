@@ -16,13 +16,15 @@ from shipid.answer.pages import report_content
 from shipid.errors import ShipidError
 from shipid.report import ReportContent
 from shipid.report.figure import page_colours
+from shipid.simulation.families import VesselFamily, read_family
 from shipid.study.results import read_results
-from tests.report import test_checks, test_identification, test_manoeuvre
+from tests.report import test_checks, test_identification, test_motion
 
 OTHERS = {
     **dict.fromkeys(("estimates", "correlations", "free_runs", "residuals", "profiles"), test_identification.content),
-    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_manoeuvre.content("spiral")),
+    **dict.fromkeys(("track", "histories", "spiral"), lambda: test_motion.content("spiral")),
     "motion": lambda: test_checks.content("log"),
+    "spread": lambda: read_family("quick", "moderate").trajectories("zigzag", 20),
 }
 
 
@@ -36,11 +38,13 @@ def test_every_option_of_a_signature_is_one_of_the_figure(content: ReportContent
     drawn = 0
     for name in set(figures.__all__) - set(OTHERS):
         function = getattr(figures, name)
-        for argument, kind in get_type_hints(function, vars(figures) | {"Source": object}).items():
-            for option in get_args(kind) if get_origin(kind) is Literal else ():
+        kinds = get_type_hints(function, vars(figures) | {"Source": object, "VesselFamily": VesselFamily})
+        for argument, kind in kinds.items():
+            literals = [one for one in (kind, *get_args(kind)) if get_origin(one) is Literal]
+            for option in (option for one in literals for option in get_args(one)):
                 assert function(content, **{argument: option}).data, f"{name}: {argument} = {option!r}"
                 drawn += 1
-    assert drawn == 10
+    assert drawn == 13
 
 
 def test_every_colour_of_dark_is_one_of_light() -> None:
@@ -49,6 +53,12 @@ def test_every_colour_of_dark_is_one_of_light() -> None:
     assert dark.keys() <= light.keys()
     assert not any("var(" in light[name] for name in dark)
     assert light["ink"] != dark["ink"]
+
+
+def test_the_factors_of_a_family_have_a_row_a_number_and_a_dot_a_member() -> None:
+    drawn = figures.factors(read_family("quick", "moderate"))
+    assert sum(len(trace.x) for trace in drawn.data if trace.x[0] is not None) == 3 * 32
+    assert len(drawn.layout.yaxis.ticktext) == 32
 
 
 @pytest.mark.parametrize("name", figures.__all__)
@@ -74,10 +84,10 @@ def test_a_table_of_cells_is_enough() -> None:
     )
     cells = cells.assign(A_90=9.0, A_rms=9.0, H_90=9.0, rms=9.0)
     made = figures.gain(cells)
-    lines = {trace.name: np.array(trace.y, dtype=float) for trace in made.data if len(trace.x) == 2}
-    np.testing.assert_array_equal(lines["a"], [2.0, 1.0])
-    np.testing.assert_array_equal(lines["b"], [3.0, np.nan])
-    assert len(figures.error_map(cells).data[0].x) == 3
+    lines = {trace.name: np.array(trace.y, dtype=float) for trace in made.data if len(trace.x) == 3}
+    np.testing.assert_array_equal(lines["a"], [4.0, 2.0, 1.0])
+    np.testing.assert_array_equal(lines["b"], [5.0, 3.0, np.nan])
+    assert len(figures.error_map(cells).data[0].x) == 3 + 2
     with pytest.raises(ShipidError, match="there is nothing to draw: it needs rows of cells"):
         figures.gain(cells[:0])
 

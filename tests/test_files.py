@@ -72,14 +72,13 @@ def test_who_may_read_and_write_a_file_may_do_so_with_the_one_that_replaces_it(
     assert file.stat().st_mode & 0o777 == mode
 
 
-@pytest.mark.parametrize("moment", range(18))
+@pytest.mark.parametrize("moment", range(17))
 def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     moment: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Killed at any call that changes the folder."""
     old, new = ({tmp_path / name: f"{age} {name}" for name in ("a.c", "a.h")} for age in ("old", "new"))
-    former = {tmp_path / "a-band.c": "old a-band.c"}
-    files.write_set(old | former)
+    files.write_set(old)
     calls = iter(range(100))
 
     def killed(call: Callable[..., Any]) -> Callable[..., Any]:
@@ -93,7 +92,7 @@ def test_of_files_that_belong_together_none_is_old_beside_a_new_one(
     for place, name in ((Path, "write_text"), (Path, "unlink"), (os, "replace"), (files, "sync_to_disk")):
         monkeypatch.setattr(place, name, killed(getattr(place, name)))
     try:
-        files.write_set(new, former)
+        files.write_set(new)
         done = True
     except KeyboardInterrupt:
         done = False

@@ -16,16 +16,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipid import document as documents
-from shipid.engine.lowering import lower_function
+from shipid.engine.torch import lower_function
 from shipid.physics import GIVEN, MOTION, TERMS
 from shipid.physics.grammar import Grammar
 from shipid.physics.signals import SIGNALS, rows_of_role
-from shipid.simulation.sea import wave_loads
-from shipid.vessel.bindings import bind_document
+from shipid.simulation.weather import wave_loads
 from shipid.vessel.load import Vessel, check_document, load_vessel
 from shipid.vessel.perturb import uniform_draw
 from shipid.vessel.schema import (
     SHARED,
+    bind_document,
     function_parameters,
     function_signals,
     structural_keys,

@@ -36,6 +36,8 @@ def test_summary_by_hand():
         "mean": pytest.approx(5.0),
         "p90": pytest.approx(9.0),
         "rms": pytest.approx(35.0**0.5),  # (0 + 1 + ... + 100) / 11 = 385 / 11
+        "end": pytest.approx(5.0),
+        "end_90": pytest.approx(9.0),
         "status": "ok",
         "failed_share": 0.0,
     }

@@ -17,7 +17,6 @@ ELSEWHERE = {
     "report/__init__.py": "report/test_page.py",
     "study/apply.py": "study/test_whole.py",
     "study/cells.py": "study/test_run.py",
-    "study/sessions.py": "study/test_run.py",
     # the parts of one graph: what is written from them equals Python, for every method
     **{
         f"export/{part}.py": "export/test_c.py"
@@ -26,7 +25,6 @@ ELSEWHERE = {
     "export/fmu_c.py": "export/test_fmu.py",
     "hybrid/deployed.py": "test_predictor.py",
     "identification/contents.py": "identification/test_command.py",
-    "report/motion.py": "cli/test_replay.py",
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import MISSING, fields, replace
 from datetime import date
 from pathlib import Path
@@ -255,6 +256,7 @@ def test_errors_along_the_test_runs_are_the_studys(tmp_path: Path, tiny_run: Pat
     from shipid.study.store import read_rows
 
     frame, _ = predict_log(tiny_run, CELL, tiny_run / DATASET, None, tmp_path / "paths.csv")
+    assert re.match(r"5 s ahead predictions err by \d\.\d+ m on average, nine in ten below", frame.attrs["errors"])
     log = read_dataset(tiny_run / DATASET).frame
     true = log[["run", "t", "north", "east"]].rename(columns={"t": "at"})
     whole = frame["run"].isin(list(read_test(tiny_run)[0].spans)) & (frame["t"] <= 15.0)  # the future is all logged

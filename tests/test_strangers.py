@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset
-from shipid.study.first_look import first_look
+from shipid.study.survey import first_look
 from shipid.vessel.template import Particulars, first_guess
 from tests.benchmarks.strangers import true_dataset
 from tests.strangers import Stranger, stranger

@@ -26,7 +26,7 @@ from shipid.document import Document
 from shipid.errors import DocumentError, ResultError, ShipidError, suggest_name
 from shipid.evidence import CellErrors, compare_cells, which_significant, world_interval
 from shipid.files import quote_argument
-from shipid.metrics import error_of_windows, position_error
+from shipid.metrics import error_of_windows, position_error, summarise_errors
 from shipid.report.wording import counted_text
 from shipid.study.declared import NO_METHOD, NO_MODEL
 from shipid.study.plan import Plan, digest_without_seed, drawn_conditions, fitted_families, learns_from_runs
@@ -52,8 +52,9 @@ class Comparison:
     """Several runs beside the first of them.
 
     names : of the folders. documents : a row per value that differs: path, and a column of text per name.
-    errors : a row per other folder, family, method and N_D (0: the physics alone): `cells` that match, `first` and
-        `other` [m], mean H over them, `difference` other less first [m] with its 95 % interval `low`, `high`, `verdict`
+    errors : a row per other folder, family, method and N_D (0: the physics alone): `cells` that match, and means over
+        them, as H `first` and `other` [m], at the horizon `first_end`, `other_end`, and 90 % quantiles `first_end_90`,
+        `other_end_90`; `difference` of H, other less first [m], with its 95 % interval `low`, `high`, `verdict`
         ("lower", "higher", "identical" to the digit, or empty; corrected for the number of rows), `coverage_first`,
         `coverage_other`.
     notes : sentences on what could not be matched, and what the intervals rest on.
@@ -137,17 +138,21 @@ def _compare_with_first(first: Results, other: Results, called: Mapping[str, str
     here, away = _common_windows(first, other)
     rows, differences = [], []
     for _, part in both.groupby(["family", "method", "N_D"], sort=False):
-        sides = {"first": _cell_errors(first, part, "first", here), "other": _cell_errors(other, part, "other", away)}
+        means, mine_cells = _cell_errors(first, part, "first", here)
+        means_there, other_cells = _cell_errors(other, part, "other", away)
+        sides = {"first": mine_cells, "other": other_cells}
         difference = compare_cells(sides["other"], sides["first"])
-        row: dict[str, Any] = {
-            key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")
-        }
-        row |= {"N_D": int(part["N_D"].iloc[0]), "cells": len(part)}
-        row |= {side: np.mean([cell.mean for cell in cells]) for side, cells in sides.items()}
-        row |= {"difference": difference.mean, "low": difference.low, "high": difference.high}
         same = all(np.array_equal(a.errors, b.errors) for a, b in zip(*sides.values(), strict=True))
-        row |= {"verdict": IDENTICAL if same else ""}
-        rows.append(row | {f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides})
+        rows.append(
+            {
+                **{key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")},
+                **{"N_D": int(part["N_D"].iloc[0]), "cells": len(part)},
+                **(means | means_there),
+                **{"difference": difference.mean, "low": difference.low, "high": difference.high},
+                "verdict": IDENTICAL if same else "",
+                **{f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides},
+            }
+        )
         differences.append(difference)
     for verdict, side in (("lower", "below"), ("higher", "above")):
         shown = which_significant(np.array([getattr(difference, side) for difference in differences]))
@@ -198,17 +203,24 @@ def _common_windows(first: Results, other: Results) -> tuple[NDArray[np.int64], 
     return here, there
 
 
-def _cell_errors(results: Results, part: pd.DataFrame, side: str, windows: NDArray[np.int64]) -> list[CellErrors]:
-    """Errors by test manoeuvre of the cells of a group, on some windows."""
-    test, cells = results.test, []
+def _cell_errors(
+    results: Results, part: pd.DataFrame, side: str, windows: NDArray[np.int64]
+) -> tuple[dict[str, float], list[CellErrors]]:
+    """Mean errors [m] of the cells of a group on some windows, named by the side, and their errors by manoeuvre."""
+    test, cells, known = results.test, [], []
     _, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
     rows = results.cells.set_index("cell")[["family", "method"]]
     for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
         path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
-        error = error_of_windows(position_error(path[:, windows], test.future[:, windows]))
+        errors = position_error(path[:, windows], test.future[:, windows])
+        known.append(summarise_errors(errors))
+        error = error_of_windows(errors)
         learns = bool(cell) and learns_from_runs(results.plan, *rows.loc[cell])
         cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
-    return cells
+    means = {side: float(np.mean([cell.mean for cell in cells]))}
+    means |= {f"{side}_end": float(np.mean([one["end"] for one in known]))}
+    means |= {f"{side}_end_90": float(np.mean([one["end_90"] for one in known]))}
+    return means, cells
 
 
 def whole_document(plan: Plan, called: Mapping[str, str] | None = None) -> Document:
@@ -291,17 +303,20 @@ def compare_findings(worlds: Sequence[Results]) -> pd.DataFrame:
 
 
 def compare_errors(worlds: Sequence[Results]) -> pd.DataFrame:
-    """H [m], coverage [1] and width [m] of bands per family, method and N_D (0: A in place of H), over worlds.
+    """H_end, H_end_90, H [m], coverage [1] and width [m] of bands per family, method and N_D, over worlds.
 
-    Columns: family, method, N_D; H, H_low, H_high: mean, least and greatest over worlds of the means over members and
-    seeds; so for coverage and width; worlds (that have a result).
+    At N_D = 0 errors are those of the physics alone. Columns: family, method, N_D; H, H_low, H_high: mean, least and
+    greatest over worlds of the means over members and seeds; so for the others; worlds (that have a result).
     """
-    parts, keys, numbers = [], ["family", "method", "N_D"], ["H", "coverage", "width"]
+    parts, keys, alike = [], ["family", "method", "N_D"], {"H_end": "A_end", "H_end_90": "A_end_90", "H": "A"}
+    numbers = [*alike, "coverage", "width"]
     for results in worlds:
-        good = results.cells[results.cells["status"] == "ok"].reindex(columns=[*keys, "foundation", "A", *numbers])
+        good = results.cells[results.cells["status"] == "ok"]
+        good = good.reindex(columns=[*keys, "foundation", *alike.values(), *numbers])
         known = ~good["family"].isin([NO_MODEL, *fitted_families(results.plan)])
         alone = good[known].drop_duplicates("foundation")
-        alone = alone.assign(N_D=0, H=alone["A"], method=NO_METHOD, coverage=np.nan, width=np.nan)
+        alone = alone.assign(N_D=0, method=NO_METHOD, coverage=np.nan, width=np.nan)
+        alone = alone.assign(**{error: alone[name] for error, name in alike.items()})
         every = pd.concat([alone, good]).astype(dict.fromkeys(numbers, float))
         parts.append(every.groupby(keys, sort=False)[numbers].mean().reset_index())
     ends = {"": "mean", "_low": "min", "_high": "max"}

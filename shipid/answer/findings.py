@@ -7,7 +7,7 @@ each test manoeuvre, and is judged as errors are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -147,12 +147,10 @@ FULL_SCALE_RULES: dict[str, ClaimRule] = {
 }
 
 
-def full_scale_findings(results: Results) -> list[ClaimVerdict]:
-    """R1-R4 on the test manoeuvres of a study."""
-    claims = results.plan.study.claims
-    assert claims is not None
-    names = {one.family: one.name for one in results.plan.foundations if one.family in claims.roles.values()}
-    good, bad = names[str(claims.accurate)], names[str(claims.inaccurate)]
+def full_scale_findings(results: Results, families: Iterable[str | None]) -> list[ClaimVerdict]:
+    """R1-R4 on the test manoeuvres of a study. families : the accurate and the inaccurate one."""
+    names = {one.family: one.name for one in results.plan.foundations}
+    good, bad = (names[str(family)] for family in families)
     table = error_table(results, (good, bad))
     if not ({good, bad, NO_MODEL} <= set(table.H) and {good, bad} <= set(table.A)):
         reason = "a cell that it needs has no result, or its physics, identified again in every cell, has no single A"
@@ -311,6 +309,6 @@ def judge_findings(results: Results) -> list[ClaimVerdict]:
         return leave_undecided(rules, unfair)
     roles = (claims.moderate, claims.high) if simulated else (claims.accurate, claims.inaccurate)
     physics = [one.name for role in roles for one in results.plan.foundations if one.family == role]
-    verdicts = full_scale_findings(results) if rivals else []
-    verdicts += simulation_findings(results) if simulated else []
+    verdicts = full_scale_findings(results, (claims.accurate, claims.inaccurate)) if rivals else []
+    verdicts += simulation_findings(results, (claims.moderate, claims.high)) if simulated else []
     return verdicts + band_findings(results, physics, not simulated)

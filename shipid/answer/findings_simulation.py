@@ -7,7 +7,7 @@ in every cell. "Shown" is a paired difference over test manoeuvres whose 95 % in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,7 +67,7 @@ class ErrorGrid:
     table: ErrorTable
     moderate: tuple[str, ...]
     high: tuple[str, ...]
-    by_90: ErrorTable | None = None
+    by_90: ErrorTable
     results: Results | None = None
 
     @property
@@ -76,10 +76,12 @@ class ErrorGrid:
         return (*self.moderate, *self.high)
 
 
-def simulation_findings(results: Results) -> list[ClaimVerdict]:
-    """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence."""
-    claims, cells = results.plan.study.claims, results.judged_cells
-    assert claims is not None
+def simulation_findings(results: Results, families: Iterable[str | None]) -> list[ClaimVerdict]:
+    """Verdicts on S1-S7; all undecided, with the reason, where the study is no evidence.
+
+    families : the moderate and the high one.
+    """
+    cells = results.judged_cells
     pure = cells["status"][cells["model"] == NO_MODEL]
     lacks = {
         results.missing: not results.complete,
@@ -88,10 +90,7 @@ def simulation_findings(results: Results) -> list[ClaimVerdict]:
     }
     if reason := next((words for words, lacking in lacks.items() if lacking), ""):
         return leave_undecided(SIMULATION_RULES, reason)
-    names = [
-        [one.name for one in results.plan.foundations if one.family == family]
-        for family in (claims.moderate, claims.high)
-    ]
+    names = [[one.name for one in results.plan.foundations if one.family == family] for family in families]
     every = [*names[0], *names[1]]
     known = [error_table(results, every, metric) for metric in ("H", "H_90")]
     by_mean, by_90 = (replace(one, A={name: A for name, A in one.A.items() if name in one.H}) for one in known)
@@ -242,7 +241,6 @@ def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
 
 
 def _judge_metric(grid: ErrorGrid) -> Judgement:
-    assert grid.by_90 is not None
     grids = (grid, replace(grid, table=grid.by_90))
     both = [np.concatenate([one.table.H[m] @ one.table.weights for m in grid.table.H]).ravel() for one in grids]
     alike = rank_correlation(*both)

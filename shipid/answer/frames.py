@@ -11,7 +11,7 @@ import pandas as pd
 
 from shipid.files import read_json
 from shipid.hybrid.bands import Region
-from shipid.metrics import course_over_horizon, error_of_windows, position_error
+from shipid.metrics import course_over_horizon, error_at_horizon, error_of_windows, position_error
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
 from shipid.report.content import TRIAL_COLUMNS, PathKey, model_text
@@ -111,7 +111,7 @@ def kinds_frame(results: Results) -> pd.DataFrame:
         runs = ", ".join(dict.fromkeys(map(str, test.run[mask])))
         for keys, distances in errors.items():
             parts = [error[:, mask] for error in distances]
-            ends = np.mean([part[-1].mean() for part in parts])
+            ends = np.mean([error_at_horizon(part).mean() for part in parts])
             rows.append((kind, runs, *keys, np.mean([part.mean() for part in parts]), ends))
     return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.arguments import check_class
+from shipid.arguments import as_path, check_class
+from shipid.errors import DataError
 from shipid.evidence import CellErrors, compare_cells, world_interval
-from shipid.metrics import position_error
+from shipid.metrics import PREDICTION_ERRORS, error_of_windows, position_error, summarise_errors
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
-from shipid.study.results import Results
+from shipid.study.results import Results, read_results
+from shipid.study.score import RivalPrediction, keep_predictions, kept_predictions, read_predictions
 
 WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
 METHOD_COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
-    *("H", "H_90", "end", "seconds", "trials"),
+    *PREDICTION_ERRORS,
+    *("seconds", "trials"),
     *("reference", "pairs", "difference", "low", "high", "runs", "better"),
     *("worlds", "least", "greatest", "world_low", "world_high"),
 ]
@@ -33,39 +37,85 @@ def compare_methods(results: Results) -> pd.DataFrame:
     are none.
     """
     check_class("results", results, Results, "as of `read_results`")
-    if sum(way.method.compensates for way in results.plan.methods) < 2:
+    cells, learning = method_cells(results), {way.name for way in results.plan.methods if way.method.compensates}
+    rivals = {*cells["method"]} - {way.name for way in results.plan.methods}
+    if len(learning | rivals) < 2:
         return pd.DataFrame(columns=METHOD_COLUMNS)
-    return method_table(method_cells(results), verdict_method(results.plan))
+    return method_table(cells, verdict_method(results.plan))
+
+
+def score(
+    folder: str | os.PathLike[str], predictions: str | os.PathLike[str], *, anyway: bool = False
+) -> dict[str, pd.DataFrame]:
+    """Score predictions of others on the test windows of a run, and keep them in its folder for its page.
+
+    Parameters
+    ----------
+    predictions : a Parquet file, see `shipid.study.score.read_predictions`.
+    anyway : score predictions that seem to be wrong, too; they are called doubtful.
+
+    Returns for each prediction the table of `method_table` with its differences to this prediction, which is taken as
+    it is: its training is not counted.
+
+    Raises DataError for predictions that cannot be scored, one sentence that says why.
+    """
+    results, file = read_results(folder), as_path("predictions", predictions)
+    rivals = read_predictions(file, results)
+    if (doubt := next((one.doubt for one in rivals if one.doubt), "")) and not anyway:
+        raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=file)
+    keep_predictions(file, results.folder)
+    cells, names = method_cells(results), {way.name for way in results.plan.methods}
+    return {one.label: method_table(cells[cells["method"].isin({*names, one.label})], one.label) for one in rivals}
 
 
 def method_cells(results: Results, condition: str = "", world: str = "") -> pd.DataFrame:
     """A row per cell, as `method_table` takes it.
 
-    Columns: condition, world, foundation, family, method, N_D, seed, status, H, H_90, end (error at the end of the
-    horizon) [m], seconds (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors
-    (`CellErrors` or None).
+    Columns: condition, world, foundation, family, method, N_D, seed, status, H_end, H_end_90, H, H_90 [m], seconds
+    (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors (`CellErrors` or None).
     """
     saw, rows = results.saw_test, []
     for row in results.rows:
-        kept = {name: row[name] for name in ("foundation", "family", "method", "N_D", "seed", "status", "H", "H_90")}
-        kept |= {"condition": condition, "world": world, "end": np.nan, "errors": None}
-        kept |= {"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw}
+        names = ("foundation", "family", "method", "N_D", "seed", "status", *PREDICTION_ERRORS)
+        kept = {
+            **{name: row[name] for name in names},
+            **{"condition": condition, "world": world, "errors": None},
+            **{"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw},
+        }
         if (cell := row["cell"]) in results.paths:
-            kept["end"] = float(position_error(results.paths[cell][-1:], results.test.future[-1:]).mean())
             learns = learns_from_runs(results.plan, row["family"], row["method"])
             kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
         rows.append(kept)
-    return pd.DataFrame(rows)
+    cells = pd.DataFrame(rows)
+    return pd.concat([cells, *(_rival_cells(results, one, cells) for one in kept_predictions(results))])
+
+
+def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) -> pd.DataFrame:
+    """A prediction of somebody else beside every cell of its amount of data and seed, or of all: it has no foundation.
+
+    It stands as it is: no other training of it is known.
+    """
+    error, world = position_error(one.paths, results.test.future), str(cells["world"].iloc[0])
+    known: Mapping[str, Any] = summarise_errors(error)
+    mine = CellErrors(one.label, results.by_run(error_of_windows(error)), results.windows, False, world)
+    cells = cells.drop_duplicates(["foundation", "N_D", "seed"])
+    for name, value in (("N_D", one.N_D), ("seed", one.seed)):
+        cells = cells[cells[name].eq(value)] if value in set(cells[name]) else cells
+    numbers = {column: known[name] for column, name in PREDICTION_ERRORS.items()}
+    numbers |= dict.fromkeys(("seconds", "trials"), np.nan)
+    return cells.assign(
+        method=one.label, status="ok", errors=pd.Series([mine] * len(cells), cells.index, object), **numbers
+    )
 
 
 def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
-    H, H_90, end [m], seconds [s] and trials are means over the cells of a method that have a result; `failed` counts
-    the others, `missing` also cells that only other methods have. `difference` is H less that of `reference` over the
-    `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`); `better` counts test
-    runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over worlds, with Student's
-    interval.
+    H_end, H_end_90, H, H_90 [m], seconds [s] and trials are means over the cells of a method that have a result;
+    `failed` counts the others, `missing` also cells that only other methods have. `difference` is H less that of
+    `reference` over the `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`);
+    `better` counts test runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over
+    worlds, with Student's interval.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -75,12 +125,15 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
         every_cell = len(group.drop_duplicates(["world", "foundation", "seed"]))
         for method, mine in group.groupby("method", sort=False):
             good, errors = mine[mine["status"] == "ok"], by_method[str(method)]
-            row: dict[str, Any] = {"condition": condition, "family": family, "N_D": N_D, "method": method}
-            row |= {"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)}
-            row |= {name: good[name].astype(float).mean() for name in ("H", "H_90", "end")}
-            row |= {name: mine[name].astype(float).mean() for name in ("seconds", "trials")}
-            row |= {"reference": reference, **_difference_row(errors, by_method.get(reference, {}))}
-            rows.append(row)
+            rows.append(
+                {
+                    **{"condition": condition, "family": family, "N_D": N_D, "method": method},
+                    **{"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)},
+                    **{name: good[name].astype(float).mean() for name in PREDICTION_ERRORS},
+                    **{name: mine[name].astype(float).mean() for name in ("seconds", "trials")},
+                    **{"reference": reference, **_difference_row(errors, by_method.get(reference, {}))},
+                }
+            )
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
@@ -42,14 +43,15 @@ def report_content(results: Results) -> ReportContent:
         *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
         *bands.answer_on_bands(results, tables["coverage"]),
     )
-    best, naive = sentences.best_model(results), summarise_errors(results.naive)
+    best = sentences.best_model(results)
+    naive: Mapping[str, Any] = summarise_errors(results.naive)
     return ReportContent(
         title=plan.study.question,
         name=plan.name,
         answer=[AnswerSentence(text, figure) for text, figure in words],
         findings=judge_findings(results),
         cells=results.cells,
-        naive={"mean": naive["mean"], "p90": naive["p90"], "rms": naive["rms"]},
+        naive={name: naive[name] for name in ("end", "end_90", "mean", "p90", "rms")},
         models=_drawable_models(results),
         factors=frames.factors_frame(results),
         trials=frames.trials_frame(results),

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 
-from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, Estimate, break_even, error_table, runs_without_physics
 from shipid.answer.verdict import (
     length_with_interval,
     model_list,
     quoted_model,
     too_few_manoeuvres,
 )
-from shipid.answer.worth import Estimate, break_even, runs_without_physics
 from shipid.evidence import Differences, paired_difference, which_significant
 from shipid.metrics import error_of_windows
 from shipid.report.wording import counted_text, join_few_names, metres_text
@@ -31,7 +31,7 @@ BEST = "best in validation"
 
 
 def errors_by_model(results: Results) -> pd.DataFrame:
-    """Mean over seeds of A, H, H_90 [m] and validation loss [m^2] per foundation and N_D.
+    """Mean over seeds of A, H_end, H_end_90, H [m] and validation loss [m^2] per foundation and N_D.
 
     The method is the one that the study judges by. Failed cells are left out.
     """
@@ -39,7 +39,7 @@ def errors_by_model(results: Results) -> pd.DataFrame:
     ended = [[trial["value"] for trial in trials if trial["state"] == "complete"] for trials in cells["trials"]]
     loss = [min((value for value in values if value is not None), default=np.nan) for values in ended]
     grouped = cells.assign(loss=loss)[cells["status"] == "ok"].groupby(["model", "family", "N_D"], sort=False)
-    return grouped[["A", "H", "H_90", "loss"]].mean().reset_index()
+    return grouped[["A", "H_end", "H_end_90", "H", "loss"]].mean().reset_index()
 
 
 def best_model(results: Results) -> str | None:
@@ -60,12 +60,14 @@ def best_model(results: Results) -> str | None:
 class AnswerCase:
     """Inputs of the sentences of one study, without families that are set aside.
 
-    rows : as of `errors_by_model`. table : errors by test manoeuvre. best : as of `best_model`.
+    rows : as of `errors_by_model`. table : errors by test manoeuvre. at_horizon : those at the end of the horizon.
+    best : as of `best_model`.
     """
 
     results: Results
     rows: pd.DataFrame
     table: ErrorTable
+    at_horizon: ErrorTable
     best: str | None
 
     @property
@@ -83,13 +85,17 @@ class AnswerCase:
         names = top["model"][~top["family"].isin(fitted_families(self.results.plan))]
         return [name for name in map(str, names) if name in self.table.H and name in self.table.A]
 
-    def H(self, model: str, amount: int) -> str:
-        """H of a model with its interval, in words."""
-        error = float(self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)]["H"].iloc[0])
-        known = model in self.table.H
-        return length_with_interval(
-            error, *(self.table.interval(model, self.ends[amount]) if known else (np.nan, np.nan))
-        )
+    @property
+    def ahead(self) -> str:
+        """The horizon in words."""
+        return f"{self.results.test.horizon * self.results.test.step:g} s"
+
+    def error(self, model: str, amount: int, metric: Literal["H", "H_end"] = "H") -> str:
+        """H of a model, or its error at the horizon, with its interval, in words."""
+        table = self.table if metric == "H" else self.at_horizon
+        error = float(self.rows[(self.rows["model"] == model) & (self.rows["N_D"] == amount)][metric].iloc[0])
+        known = model in table.H
+        return length_with_interval(error, *(table.interval(model, self.ends[amount]) if known else (np.nan, np.nan)))
 
     def sides(self, models: Sequence[str], differences: Differences) -> list[list[str]]:
         """Models shown to be better (above 0), to be worse, and the others; by sign alone with too few manoeuvres."""
@@ -103,7 +109,8 @@ class AnswerCase:
 def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tuple[str, str]]:
     """A few sentences built from the results, each with the anchor of the figure that carries it.
 
-    methods : sentences that compare the methods; of a study of several that learn they come first.
+    The error at the horizon comes first. methods : sentences that compare the methods; of a study of several that learn
+    they come next.
     """
     rows, plan = errors_by_model(results), results.plan
     rows = rows[~rows["family"].isin(results.aside)]
@@ -115,17 +122,19 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
         cells = results.cells[results.cells["status"] == "ok"]
         cells = cells[cells["N_D"] == cells["N_D"].max()]
         words = "No result joins physics and data, so there is no conclusion."
-        words += f" {_mean_errors(results, cells.groupby('model')['H'].mean())}" if len(cells) else ""
+        words += f" {_mean_errors(results, cells.groupby('model')['H_end'].mean())}" if len(cells) else ""
         return [*caveats, (words, "cells"), *seen]
-    table = error_table(results, list(rows["model"].unique()), amounts=sorted(set(rows["N_D"])))
-    case, learning = AnswerCase(results, rows, table, best_model(results)), learning_methods(plan)
+    names, amounts = list(rows["model"].unique()), sorted(set(rows["N_D"]))
+    table, at_horizon = (error_table(results, names, metric, amounts) for metric in ("H", "H_end"))
+    case, learning = AnswerCase(results, rows, table, at_horizon, best_model(results)), learning_methods(plan)
     chart = "map" if len(case.ends) > 1 and top["model"].nunique() > 1 else "gain"
     several = f"Of {len(learning)} methods that learn from data the other sentences speak of {verdict_method(plan)!r}."
     parts: list[tuple[str, Iterable[str]]] = [
+        ("gain", _headline(case)),
         ("methods", methods if len(learning) > 1 else ()),
         (chart, _physics_that_pays(case)),
         (chart, _runs_that_physics_saves(case)),
-        ("gain", _headline(case)),
+        ("gain", _mean_over_horizon(case)),
         ("cells", [several] if len(learning) > 1 else ()),
         ("gain", _reservations(case)),
         ("cells", _how_to_read(case)),
@@ -159,33 +168,30 @@ def _mean_errors(results: Results, errors: pd.Series[float]) -> str:
     """Some errors [m] by name, the least of them first, as a sentence."""
     known = errors.sort_values(kind="stable").items()
     words = [f"{quoted_model(str(name))} {metres_text(value)}" for name, value in known]
-    return f"Mean errors {_horizon_in_words(results)} ahead: {join_few_names(words)}."
-
-
-def _horizon_in_words(results: Results) -> str:
-    return f"{results.test.horizon * results.test.step:g} s"
+    return f"Mean errors {results.test.horizon * results.test.step:g} s ahead: {join_few_names(words)}."
 
 
 def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
-    """How good physics must be to pay, at the smallest and at the largest amount of data."""
+    """How good physics must be to pay, at the smallest and at the largest amount of data; then which models do."""
     if NO_MODEL not in case.table.H:
         yield "It is unknown whether physics harms, since not every cell without physics has a result."
         return
-    parts = {amount: _limit_and_sides(case, amount, place) for amount, place in case.ends.items()}
-    each = ". With ".join(f"{counted_text(amount, 'run')} {part}" for amount, part in parts.items())
-    if len(parts) == 2 and len(set(parts.values())) == 1:
-        (least, part), (most, _) = parts.items()
-        each = f"{least} or {counted_text(most, 'run')} {part}"
-    yield f"How good must the physics be, {_horizon_in_words(case.results)} ahead? With {each}."
+    limits, counts = {}, {}
+    for amount, place in case.ends.items():
+        models = [str(name) for name in case.with_physics(amount)["model"] if name in case.table.H]
+        sides = case.sides(models, case.table.lead(NO_MODEL, models, place))
+        counts[amount] = _count_of_better(models, *sides)
+        if limit := _limit_of_accuracy(case, place, *sides[:2]):
+            limits[amount] = limit
+    for words in (limits, counts):
+        alike = len(words) == len(case.ends) == 2 and len(set(words.values())) == 1
+        ends = " or ".join(map(str, words))
+        for amount, part in [*words.items()][: 1 if alike else None]:
+            yield f"With {ends if alike else amount} {plural_word(max(words) if alike else amount, 'run')} {part}."
 
 
-def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
-    """Up to which error A physics pays, and which models do better than none.
-
-    No such A where the models that are shown to do otherwise contradict it.
-    """
-    models = [str(name) for name in case.with_physics(amount)["model"] if name in case.table.H]
-    better, worse, unknown = case.sides(models, case.table.lead(NO_MODEL, models, place))
+def _count_of_better(models: Sequence[str], better: list[str], worse: list[str], unknown: list[str]) -> str:
+    """How many physics models do better than none, and which do worse or cannot be told."""
     count = f"{len(better) or 'none'} of {len(models)}"
     if len(better) == len(models) > 1:
         count = "both" if len(models) == 2 else f"all {len(models)}"
@@ -193,16 +199,20 @@ def _limit_and_sides(case: AnswerCase, amount: int, place: int) -> str:
     words = [f"{count} physics models {verb} better than no physics"]
     words += [f"{model_list(worse)} {plural_word(len(worse), 'does', 'do')} worse"] if worse else []
     words += [f"for {model_list(unknown)} the test cannot tell"] if unknown else []
+    return "; ".join(words)
+
+
+def _limit_of_accuracy(case: AnswerCase, place: int, better: list[str], worse: list[str]) -> str:
+    """Up to which error A physics pays; empty where the models that are shown to do otherwise contradict it."""
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or not (better or worse) or (limit.above and worse) or (limit.below and better):
-        return "; ".join(words)
-    bounds = _bounds(limit, _two_digits)
-    pays = f"physics pays if its error A is below about {_two_digits(limit.value)} m{bounds}"
+        return ""
+    bounds, A = _bounds(limit, _two_digits), "its error over the horizon, A,"
     if limit.above:
-        pays = f"physics pays even with an error A of {metres_text(limit.limits[1])}, the worst tried{bounds}"
-    elif limit.below:
-        pays = f"physics does not pay even with an error A of {metres_text(limit.limits[0])}, the best tried{bounds}"
-    return f"{pays}: {'; '.join(words)}"
+        return f"physics pays even if {A} is {metres_text(limit.limits[1])}, the worst tried{bounds}"
+    if limit.below:
+        return f"physics does not pay even if {A} is {metres_text(limit.limits[0])}, the best tried{bounds}"
+    return f"physics pays if {A} is below about {_two_digits(limit.value)} m{bounds}"
 
 
 def _two_digits(value: float) -> str:
@@ -226,30 +236,40 @@ def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
         return
     estimate = runs_without_physics(case.table, best, 0)
     bounds, runs = _bounds(estimate, "{:.0f}".format), counted_text(fewest, "run")
-    text = f"without physics the same error takes about {estimate.value:.0f} runs{bounds}, interpolated between amounts"
+    text = f"Without physics the same error takes about {estimate.value:.0f} runs{bounds}, interpolated between amounts"
     if estimate.above:
-        text = f"without physics {counted_text(largest, 'run')} are not enough for that{bounds}: they give "
-        text += case.H(NO_MODEL, largest)
+        text = f"Without physics {counted_text(largest, 'run')} are not enough for that{bounds}. They give "
+        text += case.error(NO_MODEL, largest)
     elif estimate.below:
         do = plural_word(fewest, "does", "do")
-        text = f"without physics the same {runs} {do} as well{bounds}, {case.H(NO_MODEL, fewest)}"
-    yield f"How many runs? With {runs}, {best} ({BEST}) has {case.H(best, fewest)} mean error; {text}."
+        text = f"Without physics the same {runs} {do} as well{bounds}. H is then {case.error(NO_MODEL, fewest)}"
+    yield f"How many runs? With {runs}, H of {best} ({BEST}) is {case.error(best, fewest)}. {text}."
 
 
 def _headline(case: AnswerCase) -> Iterator[str]:
-    """Error of the best model at the largest amount of data; of all models where none is known to be the best."""
+    """Error at the horizon of the best model at the largest amount of data; of all where none is known as best."""
+    best, largest = case.best, case.table.amounts[-1]
+    rows, runs = case.rows[case.rows["N_D"] == largest].set_index("model"), counted_text(largest, "run")
+    if best is None:
+        yield f"With {runs}, no model is {BEST}. {_mean_errors(case.results, rows['H_end'])}"
+        return
+    without = f" Without physics: {case.error(NO_MODEL, largest, 'H_end')}." if NO_MODEL in rows.index else ""
+    yield (
+        f"{case.ahead} ahead, {best} ({BEST}) with {runs} errs by {case.error(best, largest, 'H_end')} on average, "
+        f"nine in ten below {metres_text(float(rows['H_end_90'][best]))}.{without}"
+    )
+
+
+def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
+    """H of the best model at the largest amount of data, and what it is the mean of."""
     best, largest = case.best, case.table.amounts[-1]
     rows = case.rows[case.rows["N_D"] == largest].set_index("model")
-    if best is None:
-        yield f"With {counted_text(largest, 'run')}, no model is {BEST}. {_mean_errors(case.results, rows['H'])}"
-        return
-    alone, worst = (metres_text(float(rows[name][best])) for name in ("A", "H_90"))
-    without = f" Without physics: {case.H(NO_MODEL, largest)}." if NO_MODEL in rows.index else ""
-    yield (
-        f"With {counted_text(largest, 'run')}, {best} ({BEST}; {alone} mean error alone) predicts "
-        f"{_horizon_in_words(case.results)} ahead with {case.H(best, largest)} mean error; "
-        f"nine errors in ten are below {worst}.{without}"
-    )
+    if best is not None:
+        yield (
+            f"H is the mean over the horizon, over all {case.ahead}: {case.error(best, largest)} for {best} with "
+            f"{counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
+            + (f" Without physics H is {case.error(NO_MODEL, largest)}." if NO_MODEL in rows.index else "")
+        )
 
 
 def _reservations(case: AnswerCase) -> Iterator[str]:
@@ -267,7 +287,7 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         yield from _sentences_on_sides(
             sides, f"{are} worse than {smallest} for", f"{are} not clearly better than {smallest} for"
         )
-    constant = f"constant u, v, r ({metres_text(float(case.results.naive.mean()))})"
+    constant = f"constant u, v, r (H {metres_text(float(case.results.naive.mean()))})"
     if models:
         errors = np.stack([table.by_run(name, last) for name in models])
         ahead = case.results.by_run(error_of_windows(case.results.naive)) - errors
@@ -299,8 +319,9 @@ def _how_to_read(case: AnswerCase) -> Iterator[str]:
         yield f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another."
         return
     yield (
-        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} of one world. A test of several "
-        "models is corrected for their number (Holm): one that a short list names may be missing in a longer one."
+        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} of one world. Models are compared by "
+        "H. A test of several models is corrected for their number (Holm): one that a short list names may be missing "
+        "in a longer one."
     )
     if len(amounts) > 1 and case.results.cells["seed"].nunique() == 1:
         yield (

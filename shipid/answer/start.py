@@ -80,6 +80,8 @@ def event_line(event: Event) -> str:
         return {"note": event.text, "start": start}.get(event.kind, "")
     result = f"{row['status']}: {row['sentence']}"
     if row["status"] == "ok":
-        H, H_90 = (f"{row[name]:.{max(length_decimals(row[name]), 3)}f} m" for name in ("H", "H_90"))
-        result = f"H {H}, H_90 {H_90}"
+        end, end_90, H = (
+            f"{row[name]:.{max(length_decimals(row[name]), 3)}f} m" for name in ("H_end", "H_end_90", "H")
+        )
+        result = f"at the horizon {end}, nine in ten below {end_90}, H {H}"
     return f"[{event.done}/{event.total}] {row['cell']}: {result}, {row['seconds']:.1f} s"

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 import shipid
-from shipid.cli import data, identify, predict, simulation, study, vessel
+from shipid.cli import data, family, identify, predict, simulation, study, vessel
 from shipid.cli.outputs import GuardedCommand
 from shipid.cli.terminal import log_to_stderr
 from shipid.errors import ShipidError, is_utf_8
@@ -37,7 +37,7 @@ NAMELESS = {  # errors of the system that name no file -> what helps
     errno.EMFILE: "raise `ulimit -n`",
     errno.ENOENT: "change to a working folder that is there, and set TMPDIR to a folder that can be written",
 }
-GROUPS = {"vessel": vessel.app, "data": data.app, "study": study.app}
+GROUPS = {"vessel": vessel.app, "family": family.app, "data": data.app, "study": study.app}
 
 
 def main() -> None:

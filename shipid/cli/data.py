@@ -185,7 +185,7 @@ def data_check(
     with open_answer(as_json) as answer:
         if html is not None:
             from shipid.data.contents import check_content
-            from shipid.report.checks import write_checks
+            from shipid.report.logs import write_checks
 
             page = write_checks(check_content(dataset.stem, log, checks), html)
             answer.say(f"plots: {page}", page=page)

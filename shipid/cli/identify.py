@@ -238,9 +238,8 @@ def _show_groups(groups: DataFrame, whose: str, answer: Answer) -> None:
 def _look_first(ship: Vessel, log: Dataset, runs: Sequence[str], test: Sequence[str], answer: Answer) -> None:
     """Say before anything is fitted whether the vessel predicts the log better than constant u, v, r."""
     from shipid.identification.outcome import pick_runs, without_shared
-    from shipid.study.first_look import first_look
     from shipid.study.new import proposed_horizon
-    from shipid.study.survey import survey_dataset
+    from shipid.study.survey import first_look, survey_dataset
 
     log, fitted, _ = without_shared(log, *pick_runs(log, runs, test))
     with suppress(DataError), show_steps("comparing the vessel as it is with the runs, before the fit"):

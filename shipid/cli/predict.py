@@ -37,6 +37,7 @@ def predict_command(
     frame, outside = predict_log(folder, cell, log, mapping, file, level=level, kind=kind, rate=adaptive)
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     notes = [
+        frame.attrs["errors"],
         frame.attrs["coarse"],
         frame.attrs["gaps"] and f"{frame.attrs['gaps']}: a past over one of them is interpolated",
         outside

@@ -47,7 +47,7 @@ def simulate_command(
 def _simulate_vessel(vessel: str, manoeuvres: str, out: Path, as_json: bool) -> None:
     """A log of a vessel: manoeuvres by a document."""
     from shipid.files import write_table
-    from shipid.simulation.scripted import simulate_script
+    from shipid.simulation.truth import simulate_script
 
     check_output(out, endings=TABLES)
     ship = shipid.load_vessel(vessel)
@@ -114,7 +114,7 @@ def manoeuvre_command(
     """Simulate a standard manoeuvre: measures with the IMO criteria, and a page with plots."""
     from pandas import DataFrame
 
-    from shipid.report.manoeuvre import write_manoeuvre
+    from shipid.report.motion import write_manoeuvre
     from shipid.simulation.measured import approach_words, manoeuvre_content
 
     out = check_output(out or Path(f"{document_stem(vessel)}-{name}.html"), endings=(".html",))

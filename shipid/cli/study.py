@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Studies: questions, run and answered.")
 MOST_DIFFERENCES = 20  # of documents, on a terminal
+DIFFERENCE = {"difference": "difference", "low": "95 % from", "high": "to"}
 CELL = {"family": "family", "method": "method", "N_D": "N_D"}
 
 
@@ -198,6 +199,47 @@ def study_check(folder: Folder, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
+@app.command("windows")
+def study_windows(
+    study: Annotated[str, typer.Argument(help="bundled study, path of one, or folder of a run")],
+    out: Annotated[Path, typer.Option(help="folder for windows, past, future and physics, each .parquet")],
+    N_D: Annotated[int | None, typer.Option("--N_D", help="amount of data; default: the largest of the grid")] = None,
+    seed: Annotated[int | None, typer.Option(help="seed of the grid; default: the least")] = None,
+    with_truth: Annotated[
+        bool, typer.Option("--with-truth", help='with the future of the test; scores are then "not blind"')
+    ] = False,
+    device: Device = "cpu",
+) -> None:
+    """Write the windows of a study for a method of your own: what is known, what the physics says, what it misses."""
+    cut = shipid.windows(study, N_D=N_D, seed=seed, with_truth=with_truth, device=device)
+    for file in cut.write(check_output(out / "windows.parquet", option="--out").parent):
+        typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
+
+
+@app.command("score")
+def study_score(
+    folder: Folder,
+    predictions: Annotated[
+        Path, typer.Argument(help="table (Parquet) with run, instant, ahead, north, east; every test window once")
+    ],
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="score predictions that seem to be wrong, as doubtful")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Score predictions of others on the test windows of a run, beside its methods, also in its page."""
+    with open_answer(as_json) as answer:
+        heads = CELL | {"H_end": "at horizon [m]", "H_end_90": "nine in ten below [m]", "H": "H [m]"} | DIFFERENCE
+        for label, table in shipid.score(folder, predictions, anyway=anyway).items():
+            mine = table[table["method"].eq(label)].iloc[0]
+            end, end_90, H = (f"{mine[name]:.4g} m" for name in ("H_end", "H_end_90", "H"))
+            words = f"{label}: at the horizon {end}, nine in ten below {end_90}, H {H}"
+            answer.say(f"{words}\nothers, and their H less this one, with its 95 % interval over test runs:")
+            answer.records(label, table, heads | {"better": "better runs"}, shown=table[table["method"].ne(label)])
+    with show_steps() as say:
+        shipid.write_pages(folder, say)
+
+
 @app.command("compare")
 def study_compare(
     folders: Annotated[
@@ -211,7 +253,7 @@ def study_compare(
     out: Annotated[Path | None, typer.Option(help="file for a row per comparison: .csv or .parquet")] = None,
     as_json: Json = False,
 ) -> None:
-    """Compare runs with the first one: what their documents differ in, and H of equal cells with paired intervals.
+    """Compare runs with the first one: what their documents differ in, and errors of equal cells, paired.
 
     Finished runs of one study in several worlds (another --set seed= each) are repetitions: then it shows findings and
     errors over the worlds.
@@ -241,13 +283,19 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     words = "the documents are equal" if documents.empty else f"and {more} more: --json shows all" if more > 0 else ""
     answer.say(words, folders=compared.names)
     answer.say(
-        f"H [m] of {first}, of the other run, and the difference, the other less {first}, with its 95 % interval:"
+        f"error at the horizon [m] and H [m], its mean over the horizon, of {first} and of the other run, and the "
+        f"difference of H, the other less {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
-    lengths = {"first": first, "other": "other", "difference": "difference", "low": "95 % from", "high": "to"}
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}
     banded = bool(errors[list(bands)].notna().any(axis=None))
-    heads |= {"cells": "cells"} | lengths | (bands if banded else {}) | {"verdict": "verdict"}
+    heads |= (
+        {"cells": "cells", "first_end": f"at horizon, {first}", "other_end": "other"}
+        | {"first": f"H, {first}", "other": "other"}
+        | DIFFERENCE
+        | (bands if banded else {})
+        | {"verdict": "verdict"}
+    )
     answer.records("errors", errors, heads, dict.fromkeys(bands, share_text))
     answer.say("verdict: lower or higher where the test shows it, corrected for the rows of a run; empty: it does not")
     answer.say("\n".join(compared.notes), notes=compared.notes)
@@ -262,8 +310,12 @@ def _show_worlds(worlds: list[Results], answer: Answer) -> DataFrame:
     heads = {"id": "finding", "verdicts": f"in {len(worlds)} worlds", "number": "number", "mean": "mean over worlds"}
     answer.records("findings", compare_findings(worlds), heads | {"low": "95 % from", "high": "to"})
     level = level_text(worlds[0].plan.study.bands.level)
-    answer.say(f"mean, least and greatest over the worlds of H [m], and of bands of {level}: share of whole test paths")
-    for name, what in (("H", "H [m]"), ("coverage", "in band"), ("width", "radius of band [m]")):
+    answer.say(
+        "mean, least and greatest over the worlds of the error at the horizon [m], of H [m], its mean over the "
+        f"horizon, and of bands of {level}: share of whole test paths"
+    )
+    shown = {"H_end": "at the horizon [m]", "H_end_90": "nine in ten below [m]", "H": "H [m]", "coverage": "in band"}
+    for name, what in (*shown.items(), ("width", "radius of band [m]")):
         numbers = {name: what, f"{name}_low": "least", f"{name}_high": "greatest", "worlds": "worlds"}
         answer.records("errors", errors, CELL | numbers, shown=errors.dropna(subset=name))
     return errors
@@ -281,8 +333,8 @@ def _run_to_report(
     from shipid.answer.start import event_line
     from shipid.files import quote_argument
     from shipid.study import run, store
+    from shipid.study.check import search_words
     from shipid.study.plan import program_of
-    from shipid.study.progress import search_words
 
     resume = f"{program_of(plan)} study resume {quote_argument(folder)}"
     with end_on_interrupt(f"interrupted; what is finished is kept. Continue with: {resume}"):

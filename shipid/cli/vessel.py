@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated, Any
 
 import typer
@@ -44,9 +45,10 @@ def vessel_show(
     ]
     with open_answer(as_json) as answer:
         words = [ship.name, document.get("description"), f"file {ship.file}, digest {ship.digest}"]
-        answer.say("\n".join(filter(None, words)), name=ship.name, file=ship.file, digest=ship.digest)
+        text = "\n".join(fill(line, 100, break_long_words=False) for line in words if line)
+        answer.say(text, name=ship.name, file=ship.file, digest=ship.digest)
         sentence = ", ".join(f"{key} {value:g} {PARTICULARS[key]}" for key, value in known.items())
-        answer.say(f"particulars: {sentence}", particulars=known)
+        answer.say(fill(f"particulars: {sentence}", 100), particulars=known)
         answer.records("terms", terms)
         rows = [{"path": path, "value": value, "unit": ship.units[path]} for path, value in ship.parameters.items()]
         heads = {"path": "parameter", "value": "value", "unit": "unit"}

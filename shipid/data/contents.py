@@ -6,7 +6,7 @@ import pandas as pd
 
 from shipid.data.checks import check_series
 from shipid.data.dataset import Dataset
-from shipid.report.checks import CheckContent
+from shipid.report.logs import CheckContent
 
 
 def check_content(name: str, log: Dataset, checks: pd.DataFrame) -> CheckContent:

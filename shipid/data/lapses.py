@@ -30,10 +30,7 @@ NOISY_STEP_RATIO, ZERO_STEP_RATIO, SPIKE_STEP_RATIO = (
 )  # times the largest other step: rows of 0 in noise, other zeros, spikes
 BEYOND_RANGE = 0.1  # of the range, that a spike of 1.2 times the largest other step lies outside of it
 STEPPED_SHARE = 0.2  # share of the changes that are large, of an order, at least
-NOISY_CHANGE_SHARE, NOISY_REVERSAL_SHARE = (
-    0.3,
-    0.3,
-)  # of noise: share of the rows that change, and of the changes that turn back, at least
+NOISY_SHARE = 0.3  # of noise: share of the rows that change, and of the changes that turn back, at least
 HELD_LENGTHS = 3  # times as long as a zero an order is held before and after it
 MOST_ZERO_ROWS, MOST_SPIKE_ROWS = 0.05, 0.02  # share of the rows that are zeros, and spikes, at most
 WIDEST_RUDDER, FASTEST_GEAR = np.radians(47.0), np.radians(40.0)  # rad, no rudder is there; rad/s, no gear is faster
@@ -134,7 +131,8 @@ def _is_no_kick(name: str, values: Array, spike: CommandFault, step: float) -> b
 def _find_zeros(t: Array, values: Array, follows: RowMask, least: float, step: float) -> list[CommandFault]:
     """Stretches of 0 between values far from it."""
     found = []
-    for first, end in _spans_of_rows(values == 0.0):
+    edges = np.flatnonzero(np.diff(values == 0.0, prepend=False, append=False))
+    for first, end in edges.reshape(-1, 2).tolist():
         if first == 0 or end == len(values) or not follows[first - 1 : end].all():
             continue
         size = float(min(abs(values[first - 1]), abs(values[end])))
@@ -216,8 +214,8 @@ def _find_still_values(name: str, values: Array, psi: Array, follows: RowMask) -
 def _is_noise(changes: Array) -> bool:
     """Whether changes (N,) from row to row are those of a noisy column: there are many, to and fro."""
     signs = np.sign(changes[changes != 0])
-    many = len(signs) > NOISY_CHANGE_SHARE * len(changes) and len(signs) > 1
-    return bool(many and np.mean(signs[1:] != signs[:-1]) > NOISY_REVERSAL_SHARE)
+    many = len(signs) > NOISY_SHARE * len(changes) and len(signs) > 1
+    return bool(many and np.mean(signs[1:] != signs[:-1]) > NOISY_SHARE)
 
 
 def _turning_steps(psi: Array) -> RowMask:
@@ -233,9 +231,3 @@ def _turns_both_ways(psi: Array) -> bool:
     rise = float(np.max(psi - np.minimum.accumulate(psi)))
     fall = float(np.max(np.maximum.accumulate(psi) - psi))
     return bool(min(rise, fall) > TURN_TO_BOTH_SIDES)
-
-
-def _spans_of_rows(rows: RowMask) -> list[tuple[int, int]]:
-    """First row of each stretch of chosen rows (N,), and the row after its last."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(int), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -30,7 +30,7 @@ from shipid.engine.tables import RampTable, even_tables, find_tables
 from shipid.engine.threads import run_tasks, threaded_source
 from shipid.engine.vectors import DOUBLE, CompilerTarget, Precision, vector_source
 from shipid.errors import escape_unprintable
-from shipid.metrics import BINS, BINS_AN_OCTAVE, LEAST, OCTAVES, SHIFT
+from shipid.metrics import BINS, BINS_AN_OCTAVE, FIRST_OCTAVE, LAST_OCTAVE, LEAST, SHIFT
 from shipid.vessel.dynamics import Dynamics
 
 log = logging.getLogger(__name__)
@@ -184,8 +184,8 @@ def compiler_version(command: str) -> str:
 def _distance_source(of: Precision) -> str:
     """C functions: distances of a group, noted and later tallied. A number without its last bits is its bin's."""
     shift = SHIFT - DOUBLE.mantissa + of.mantissa
-    first = ((1 << of.bits - of.mantissa - 2) - 1 + OCTAVES[0]) * BINS_AN_OCTAVE
-    most = float(np.nextafter(of.dtype.type(2.0 ** OCTAVES[1]), 0))
+    first = ((1 << of.bits - of.mantissa - 2) - 1 + FIRST_OCTAVE) * BINS_AN_OCTAVE
+    most = float(np.nextafter(of.dtype.type(2.0**LAST_OCTAVE), 0))
     return f"""
 typedef struct {{ long count; unsigned short bins[{NOTED}][W]; }} Notes;
 static __attribute__((noinline)) void count(Notes *notes, unsigned *tally) {{

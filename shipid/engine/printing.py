@@ -1,7 +1,7 @@
 """A CasADi SX function as text in another language, one operation an instruction, so that whole batches go at once.
 
 What depends on parameters alone, or on commands and weather, is printed into stages that run early; the rest goes over
-(variant, sample). PyTorch (`lowering`) and C (`native`) are two dialects.
+(variant, sample). PyTorch (`torch`) and C (`native`) are two dialects.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -41,9 +41,9 @@ class Trajectories:
     interval : time between records [s].
     """
 
-    states: Array
+    states: Array = field(repr=False)
     names: tuple[str, ...]
-    diverged: Array
+    diverged: Array = field(repr=False)
     interval: float
 
     def __getitem__(self, name: str) -> Array:
@@ -82,7 +82,7 @@ def rollout(
     memory : hidden state -> (S,); default: each actuator has reached its first order.
     tau_extra : (n_dof,), (S, n_dof) or (num_steps, S, n_dof) extra force [N, N m]; zero by default.
     components : path of a term whose components are drawn (`waves.first_order`) -> (S, num_components, num_entries), as
-        from `shipid.simulation.sea`; default: none, calm water.
+        from `shipid.simulation.weather`; default: none, calm water.
     helmsman : control law that gives the orders; `commands` are then its inputs; see `shipid.physics.helm`.
     keep : channels to record, default all states and memories.
     engine : of `ENGINES`, or `auto`: by size and by what there is; `repeated` is `auto` where so many calls follow that

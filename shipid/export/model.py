@@ -51,9 +51,14 @@ class ExportModel:
         `shipid.export.band.BAND_ROWS`; where `promised` is 0 it is not a number. The choice of a band and the last two
         outputs are there where the predictor has bands; a band has no derivative.
 
-        ShipidError for a method whose parts do not fit together, or are too large.
+        ShipidError for a method that has no counterpart, whose parts do not fit together, or are too large.
         """
         corrector, bands = self.predictor.corrector, self.predictor.bands
+        if type(corrector) not in CORRECTORS:
+            kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
+            raise ShipidError(
+                f"a predictor by the method {self.predictor.method} cannot be exported; these can: {', '.join(kinds)}"
+            )
         arrays = [*corrector.arrays().values(), *([] if bands is None else bands.arrays().values())]
         count = sum(np.size(array) for array in arrays)
         if count > MOST_NUMBERS:
@@ -95,17 +100,12 @@ class ExportModel:
 
 
 def build_model(predictor: DeployedMethod) -> ExportModel:
-    """A predictor as a model; ShipidError for a method that has no counterpart.
+    """A predictor as a model.
 
     Its inputs are those of the physics, and what the alarm and the band look at: every input of a method is among them,
     but for the direction of the wind.
     """
     corrector, physics = predictor.corrector, predictor.physics
-    if type(corrector) not in CORRECTORS:
-        kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
-        raise ShipidError(
-            f"a predictor by the method {predictor.method} cannot be exported; these can: {', '.join(kinds)}"
-        )
     if isinstance(corrector, ForceCorrector):
         physics = corrector.with_force(physics)
     states, memory, orders, weather = (tuple[str, ...](),) * 4

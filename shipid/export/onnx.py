@@ -23,12 +23,20 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     """Write the networks; ShipidError for a method without networks, or where onnx is not installed.
 
     Inputs (S, d) are those of the method, in the order that the metadata `inputs` says. The output of a compensator is
-    `compensation` (S, T, 2) [m], of `one-step` `acceleration` (S, 3) [m/s^2, rad/s^2].
+    `compensation` (S, T, 2) [m], of `one-step` `acceleration` (S, 3) [m/s^2, rad/s^2]. A network of a user has the
+    inputs `past` (P + 1, S, d), the oldest first, and `now` (S, e), in single precision.
     """
     try:
-        from onnx import TensorProto, checker, helper, numpy_helper, save
+        from onnx import TensorProto, checker, helper, load, numpy_helper, save
     except ImportError:
         raise ShipidError("an ONNX file needs the package onnx: pip install 'shipid[export]'") from None
+    trace, provenance = getattr(model.predictor.corrector, "trace_onnx", None), dict(model.predictor.provenance)
+    if trace is not None:
+        with replace_whole(file) as temporary:
+            inputs, traced = json.dumps(trace(temporary)), load(str(temporary))
+            helper.set_model_props(traced, {"inputs": inputs, "provenance": json.dumps(provenance, default=str)})
+            save(traced, str(temporary))
+        return file
     networks, result, shape = _networks_to_write(model)
     kind = np.dtype(np.float32 if single else np.float64)
     names = list(dict.fromkeys(each for normaliser, _ in networks for each in normaliser.names))
@@ -62,8 +70,7 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     opset = [helper.make_opsetid("", OPSET)]
     made = helper.make_model(graph, opset_imports=opset, producer_name="shipid", producer_version=__version__)
     made.ir_version = 8
-    provenance = json.dumps(dict(model.predictor.provenance), default=str)
-    helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": provenance})
+    helper.set_model_props(made, {"inputs": json.dumps(names), "provenance": json.dumps(provenance, default=str)})
     checker.check_model(made)
     with replace_whole(file) as temporary:
         save(made, str(temporary))

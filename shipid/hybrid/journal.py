@@ -88,7 +88,7 @@ class Journal:
         if cell not in self._studies:
             try:
                 self._studies[cell] = optuna.create_study(study_name=cell, storage=self.storage)
-            except (AssertionError, DuplicatedStudyError):  # of Optuna, where lines before say something else by now
+            except AssertionError:  # of Optuna, which does not find the study that it has just written
                 raise ResultError(f"damaged: no journal of trials; {REMEDY}", file=self.file) from None
             self._studies[cell].set_user_attr(DIGEST, self.digest)
         return self._studies[cell]
@@ -144,4 +144,7 @@ def merge_journals(files: Iterable[Path], target: Path) -> None:
         for file in files:
             storage = Journal(file).storage
             for name in optuna.get_all_study_names(storage):
-                optuna.copy_study(from_study_name=name, from_storage=storage, to_storage=into)
+                try:
+                    optuna.copy_study(from_study_name=name, from_storage=storage, to_storage=into)
+                except DuplicatedStudyError:
+                    raise ResultError(f"another journal holds {name}, too; {REMEDY}", file=file) from None

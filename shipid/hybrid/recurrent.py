@@ -140,12 +140,12 @@ class RecurrentProblem(PathProblem):
             losses.append(mean_squared_error(predicted, self.targets[:, validation]))
         return float(np.mean(losses)), point, max(epochs for _, epochs in networks)
 
-    def corrector(self, best: Sequence[Row]) -> RecurrentCorrector:
+    def corrector(self, best: Sequence[Row]) -> Any:
         """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
         number, params = best[0]["number"], best[0]["params"]
         if number not in self.trained:
             self.judge(number, params)
-        return RecurrentCorrector(self.inputs, self.method.past, self.trained[number], params)
+        return self.method.corrector(self.inputs, self.method.past, self.trained[number], params)
 
     def _reader(self, training: Index) -> SequenceReader:
         """Statistics of the training windows alone."""
@@ -159,9 +159,7 @@ class RecurrentProblem(PathProblem):
 
     def _train(self, number: int, point: Point, fold: int) -> tuple[GatedNetwork, int]:
         """The network of the best epoch of a fold, and the number of epochs."""
-        from shipid.hybrid.training import Length, train_gated  # a study is read without PyTorch
-
-        method, training = self.method, self.task.folds[fold][0]
+        training = self.task.folds[fold][0]
         reader, parts = self._reader(training), []
         scale = max(float(np.sqrt(np.square(self.weights[:, training]).mean())), 1e-9)
         for windows in self.task.folds[fold]:
@@ -169,6 +167,13 @@ class RecurrentProblem(PathProblem):
             both = [seen] if reader.mirrors is None else [seen, reader.mirrored(seen)]
             parts.append((both, flatten_paths(self.weights[:, windows]) / scale))
         seed = seed_of(self.task.seed, self.name, number, fold)
+        return self.learn(reader, parts, point, scale, seed)
+
+    def learn(self, reader: SequenceReader, parts: Any, point: Point, scale: float, seed: int) -> tuple[Any, int]:
+        """Return a network trained on parts of the data, see `train_gated`, and its epochs; outputs have a scale."""
+        from shipid.hybrid.training import Length, train_gated  # a study is read without PyTorch
+
+        method = self.method
         length = Length(method.epochs, method.batch, method.patience)
         layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
         scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}

@@ -49,6 +49,7 @@ class SearchMethod(Method):
     SEARCHED: ClassVar[tuple[str, ...]] = ()
     COUNTS: ClassVar[tuple[str, ...]] = ()
     LINEAR: ClassVar[tuple[str, ...]] = ()
+    suggest: ClassVar[Any] = None
 
     trials: PositiveInt = 50
     budget: PositiveFloat | None = None
@@ -76,7 +77,7 @@ class SearchMethod(Method):
 
     def varied(self) -> tuple[str, ...]:
         """Return the names of the hyperparameters that differ between trials."""
-        return (*self.ranges(), *self.choices())
+        return (*self.ranges(), *self.choices()) if self.suggest is None else tuple(self.space())
 
     def num_trials(self) -> int | None:
         """Return how many sets of hyperparameters are tried per foundation; None where the budget decides it."""
@@ -88,8 +89,13 @@ class SearchMethod(Method):
 
     def space(self) -> dict[str, Any]:
         """Return where each hyperparameter that differs between trials is searched, as Optuna's distributions."""
-        from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution  # slow to import
+        from optuna import create_study  # slow to import
+        from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
+        if self.suggest is not None:
+            trial = create_study().ask()
+            self.suggest(trial)
+            return trial.distributions
         space: dict[str, Any] = {}
         for name, (low, high) in self.ranges().items():
             log = name not in self.LINEAR
@@ -222,6 +228,26 @@ def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"
         yield {**fixed, **point}
 
 
+def suggested_points(method: SearchMethod, search: Search, name: str, seed: int) -> Iterator[dict[str, float]]:
+    """The trials of a foundation as Optuna's TPE chooses them by `suggest`; other settings are in the middle.
+
+    The trials of an interrupted search are told again; the sampler of a trial is seeded by its number.
+    """
+    import optuna  # a study is read without it
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study, middle, rows = optuna.create_study(), next(trial_points(method, frozenset())), search.rows[name]
+    for number in count():
+        study.sampler = optuna.samplers.TPESampler(seed=seed_of(seed, name, number))
+        if number < len(rows):
+            study.enqueue_trial(rows[number]["params"])
+        trial = study.ask()
+        method.suggest(trial)
+        yield {**middle, **trial.params}
+        value = rows[number]["value"] if rows[number]["state"] == "complete" else None
+        study.tell(trial, value, state=optuna.trial.TrialState.FAIL if value is None else None)
+
+
 def setting_at_share(method: SearchMethod, name: str, share: float) -> float:
     """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
     low, high = method.ranges()[name]
@@ -345,7 +371,8 @@ class SearchedAlone(SearchMethod):
     def _fit(self, task: Task, name: str) -> FitResult:
         """Search for one foundation; the best trials make its corrector."""
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
-        for number, point in search.left(self.points()):
+        points = self.points() if self.suggest is None else suggested_points(self, search, name, task.seed)
+        for number, point in search.left(points):
             start = time.process_time()
             value, params, epochs = problem.judge(number, point)
             search.record({name: trial_row(number, params, value, start, epochs)})

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from math import cos, pi
 
@@ -259,12 +260,7 @@ def train_gated(
     parts: Sequence[Part], units: int, learning_rate: float, decay: float, length: Length, seed: int
 ) -> tuple[dict[str, Array], int]:
     """Train on the first part of the data, stop by the second; layers by name and the number of epochs."""
-    generator = torch.Generator().manual_seed(seed)
-    (seen, outputs), watched = (
-        ([(_single_tensor(past, "cpu"), _single_tensor(now, "cpu")) for past, now in pairs], _single_tensor(out, "cpu"))
-        for pairs, out in parts
-    )
-    (past, now), *_ = seen
+    generator, ((past, now), *_), outputs = torch.Generator().manual_seed(seed), *parts[0]
     shapes = {
         "W_i": (3 * units, past.shape[2]),
         "W_h": (3 * units, units),
@@ -276,20 +272,38 @@ def train_gated(
         "c_2": (outputs.shape[1],),
     }
     weights = _first_weights(shapes, units, generator)
+    return train_reader(parts, gated_outputs, weights, shapes, (learning_rate, decay), length, generator)
+
+
+def train_reader(
+    parts: Sequence[Part],
+    network: Callable[[Mapping[str, Tensor], Tensor, Tensor], Tensor],
+    weights: Tensor,
+    shapes: Shapes,
+    rates: tuple[float, float],
+    length: Length,
+    generator: torch.Generator,
+) -> tuple[dict[str, Array], int]:
+    """Train what reads past and present on the first part, stop by the second; layers by name, number of epochs.
+
+    network : (layers, past, now) -> outputs. weights : (1, P), changed in place. shapes : of the layers in them.
+    rates : of learning, and of decay. generator : of the batches.
+    """
     layers = {name: layer.requires_grad_() for name, layer in _layers_by_name(weights, shapes).items()}
-
-    def loss(rows: Tensor | slice) -> Tensor:
-        return _gated_loss(layers, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows])
-
+    (seen, outputs), watched = (
+        ([(_single_tensor(past, "cpu"), _single_tensor(now, "cpu")) for past, now in pairs], _single_tensor(out, "cpu"))
+        for pairs, out in parts
+    )
+    reader = partial(network, layers)
     best = minimise_losses(
         weights,
         list(layers.values()),
-        [decay],
+        [rates[1]],
         length,
         batches=lambda: torch.split(torch.randperm(len(outputs), generator=generator), length.batch),
-        rate=lambda epoch: torch.tensor([[learning_rate * (1 + cos(pi * epoch / length.epochs)) / 2]]),
-        loss=loss,
-        watched=lambda: _gated_loss(layers, *watched),
+        rate=lambda epoch: torch.tensor([[rates[0] * (1 + cos(pi * epoch / length.epochs)) / 2]]),
+        loss=lambda rows: _mirrored_loss(reader, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows]),
+        watched=lambda: _mirrored_loss(reader, *watched),
     )
     kept = {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
     return kept, int(best.epochs[0])
@@ -308,14 +322,21 @@ def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
     return {name: piece.view(shape) for (name, shape), piece in zip(shapes.items(), pieces, strict=True)}
 
 
-def _gated_loss(layers: Mapping[str, Tensor], seen: Sequence[tuple[Tensor, Tensor]], outputs: Tensor) -> Tensor:
-    """Mean squared error (1,) of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
-    past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
+def gated_outputs(layers: Mapping[str, Tensor], past: Tensor, now: Tensor) -> Tensor:
+    """Outputs (S, 2 r) of a gated recurrent unit on the past (P + 1, S, d), with inputs at the instant (S, e)."""
     flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
     start = torch.zeros(1, len(now), layers["W_h"].shape[1])
     _, hidden = torch.gru(past, start, flat, True, 1, 0.0, False, False, False)
     full = torch.cat([hidden[0], now], dim=1)
-    made = torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+    return torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]
+
+
+def _mirrored_loss(
+    network: Callable[[Tensor, Tensor], Tensor], seen: Sequence[tuple[Tensor, Tensor]], outputs: Tensor
+) -> Tensor:
+    """Mean squared error (1,) of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
+    past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
+    made = network(past, now)
     if len(seen) == 2:
         sign = torch.ones(made.shape[1])
         sign[len(sign) // 2 :] = -1.0

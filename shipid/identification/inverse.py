@@ -49,7 +49,6 @@ class Inverse:
     paths, factors : first path of each group, and its factor (n,). linear : (n,) whether forces are linear in it.
     jacobian : (m, n) d residual / d factor, residuals over their standard deviation.
     levels : velocity (u, v, r) -> standard deviation of the residuals of its equation [m/s^2, rad/s^2].
-    settled : whether the iteration converged.
     """
 
     paths: tuple[str, ...]
@@ -57,7 +56,6 @@ class Inverse:
     linear: NDArray[np.bool_]
     jacobian: Array
     levels: Mapping[str, float]
-    settled: bool
 
 
 def inverse_dynamics(
@@ -92,15 +90,13 @@ def inverse_dynamics(
     model = vessel_dynamics(vessel)
     problem = _Problem(vessel, model, tied, sizes, _long_stretches(vessel, model, dataset, runs, environment or {}))
     linear = problem.linear(centre)
-    factors, levels, settled = _solve_weighted(problem, centre, widths, bool(linear.all()))
+    factors, levels = _solve_weighted(problem, centre, widths, bool(linear.all()))
     weight = np.array([1 / levels[name] for name in problem.signals])
-    return Inverse(paths, factors, linear, problem.evaluate(factors)[1] * weight[:, None], levels, settled)
+    return Inverse(paths, factors, linear, problem.evaluate(factors)[1] * weight[:, None], levels)
 
 
-def _solve_weighted(
-    problem: _Problem, centre: Array, widths: Array, linear: bool
-) -> tuple[Array, dict[str, float], bool]:
-    """Gauss-Newton with step halving on weighted residuals and priors: factors (n,), levels, whether it converged.
+def _solve_weighted(problem: _Problem, centre: Array, widths: Array, linear: bool) -> tuple[Array, dict[str, float]]:
+    """Gauss-Newton with step halving on weighted residuals and priors: factors (n,), levels.
 
     Minimum-norm steps keep undetermined factors at their base.
     """
@@ -121,14 +117,14 @@ def _solve_weighted(
                 break
             step = step / 2
         else:
-            return factors, levels, False  # no step lowers the cost
+            return factors, levels  # no step lowers the cost
         factors, (residual, jacobian) = trial, evaluated
         after = problem.levels(residual)
         moved = max(abs(after[name] / levels[name] - 1) for name in levels)
         levels = after
         if round_ and moved < SETTLED:
-            return factors, levels, True
-    return factors, levels, False
+            break
+    return factors, levels
 
 
 @dataclass(frozen=True)

@@ -580,7 +580,7 @@ def _add_measure_bands(
 def _measure_manoeuvre(
     vessel: Vessel, kind: str, angles: Sequence[float], logs: dict[str, pd.DataFrame] | None = None
 ) -> dict[str, dict[str, Any]]:
-    """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.rows.measure_rows`."""
+    """Simulate a standard manoeuvre in calm water; measure -> row of `shipid.measures.criteria.measure_rows`."""
     done = measure_standard(vessel, kind, angles, engine=REPEATED)
     if logs is not None:
         logs[_manoeuvre_title(kind, angles)] = done.frame

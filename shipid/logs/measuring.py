@@ -10,9 +10,8 @@ import pandas as pd
 
 from shipid.data.dataset import FIRST_DATED_TIME, Dataset, stretches_of_runs
 from shipid.errors import DataError, suggest_name
-from shipid.measures.criteria import judge_criteria
+from shipid.measures.criteria import criterion_rows, judge_criteria, measure_rows
 from shipid.measures.recognise import recognise_kinds, record_of
-from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import is_command, is_steering
 from shipid.simulation.standard import standard_manoeuvres
 
@@ -24,7 +23,7 @@ NO_HELM = (
 
 @dataclass(frozen=True, eq=False)
 class MeasuredDataset:
-    """Tables of a dataset's manoeuvres, one row each: `run`, `kind`, and the rows of `shipid.measures.rows`.
+    """Tables of a dataset's manoeuvres, one row each: `run`, `kind`, and the rows of `shipid.measures.criteria`.
 
     left : run -> sentence: why it was not measured.
     """

@@ -37,7 +37,7 @@ class NmeaSentence:
         if not text:
             return None
         hour, minute, second = int(text[:2]), int(text[2:4]), float(text[4:])
-        if not (hour < 24 and minute < 60 and 0.0 <= second < 61.0):  # 60: a leap second
+        if not (0 <= hour < 24 and 0 <= minute < 60 and 0.0 <= second < 61.0):  # 60: a leap second
             raise ValueError(f"{text!r} is no time of day")
         return 3600.0 * hour + 60.0 * minute + second
 

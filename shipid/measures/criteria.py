@@ -1,9 +1,10 @@
-"""IMO criteria of ship manoeuvrability: resolution MSC.137(76), annex, 5.3."""
+"""IMO criteria of manoeuvrability (resolution MSC.137(76), annex, 5.3), and measures and criteria as rows of tables."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from shipid.units import DEGREE
 SHORTEST_SHIP = 100.0  # m: length from which the standards apply
 ANGLE_TOLERANCE = 0.5 * DEGREE  # tolerance of the angle of a test
 LARGEST_CURRENT = 0.1  # of the steady speed: a current from which a turning circle is not judged
+SHOWN_UNITS = {
+    "rad": ("deg", DEGREE),
+    "rad/s": ("deg/s", DEGREE),
+}  # SI unit -> unit in tables, and its size in SI units
 
 
 @dataclass(frozen=True)
@@ -128,3 +133,30 @@ def _judge_criterion(
     short = f"the standards are for ships of {SHORTEST_SHIP:g} m and more" if length and length < SHORTEST_SHIP else ""
     met = None if note else value <= limit
     return Criterion(label, value, limit, unit, met, "; ".join(filter(None, [note, remark, short])))
+
+
+def measure_rows(measures: Measures, length: float | None) -> list[dict[str, Any]]:
+    """Rows of `measure`, `value`, `unit`, `lengths`, `note`.
+
+    lengths : value in ship lengths; NaN if it is no distance or the ship length `length` [m] is None.
+    """
+    rows = []
+    for name, measure in measures.items():
+        unit, size = SHOWN_UNITS.get(measure.unit, (measure.unit, 1.0))
+        lengths = measure.value / length if length and measure.unit == "m" else float("nan")
+        label = name.replace("_", " ")
+        rows.append(
+            {"measure": label, "value": measure.value / size, "unit": unit, "lengths": lengths, "note": measure.why}
+        )
+    return rows
+
+
+def criterion_rows(criteria: Sequence[Criterion]) -> list[dict[str, Any]]:
+    """Rows of `criterion`, `value`, `limit`, `unit`, `verdict` ("met", "not met", "not judged"), `note`."""
+    words = {True: "met", False: "not met", None: "not judged"}
+    rows = []
+    for one in criteria:
+        unit, size = SHOWN_UNITS.get(one.unit, (one.unit, 1.0))
+        numbers = {"value": one.value / size, "limit": one.limit / size}
+        rows.append({"criterion": one.name, **numbers, "unit": unit, "verdict": words[one.met], "note": one.note})
+    return rows

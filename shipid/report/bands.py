@@ -121,7 +121,7 @@ def width_figure(content: ReportContent) -> PageFigure | None:
         top = frame[frame.level.eq(_level_of_sentences(frame))][["model", "N_D", "width"]]
         cells = cells.drop(columns="width").merge(top, how="left", on=["model", "N_D"])
     cells = cells[cells.width.notna()]
-    shown = map_of_cells(replace(content, cells=cells.assign(H=cells.width, H_90=cells.width)))
+    shown = map_of_cells(replace(content, cells=cells.assign(H=cells.width)), with_physics=False)
     if shown is None:
         return None
     words = [

@@ -100,10 +100,10 @@ class ReportContent(PageContent):
     `source` is "physics", "cooperative" or "naive"; N_D is 0 for physics and naive. The model without physics, of
     family "none", has the source "cooperative" and is called `no physics`.
 
-    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, A, A_90, H, H_90, rms [m] (NaN
-    where failed); then member, runs, minutes, seconds, hyperparameters (text).
-    naive : mean, p90, rms [m] of constant u, v, r.
-    models : model, family, A, A_90, A_rms [m], status, description; where known A_along and A_across [m].
+    cells : model, family, N_D, seed, status ("ok", "diverged", "failed"), sentence, A_end, A_end_90, A, A_90, A_rms,
+    H_end, H_end_90, H, H_90, rms [m] (NaN where failed); then member, runs, minutes, seconds, hyperparameters (text).
+    naive : end, end_90, mean, p90, rms [m] of constant u, v, r.
+    models : model, family, A, A_90, A_rms [m], status, description; where known A_end, A_end_90, A_along, A_across [m].
     factors : model, path, group ("hull", ...), factor [1]; 0 where a term was removed.
     trials : `TRIAL_COLUMNS` and a float column per searched hyperparameter; state is "complete", "diverged" or
     "stopped", value [m^2] NaN where diverged; chosen: its network is in the compensator.

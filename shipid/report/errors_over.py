@@ -18,6 +18,7 @@ from shipid.report.figure import (
     Panel,
     Trace,
     even_places,
+    log_axis,
     make_axis,
     make_line,
     make_plot,
@@ -57,8 +58,8 @@ KIND_COLUMNS = {
     "test runs": "runs",
     "model": "model",
     "how": "how",
-    "over the horizon [m]": "mean",
-    "at its end [m]": "end",
+    "at the horizon [m]": "end",
+    "mean over the horizon [m]": "mean",
 }
 HOW_PREDICTED = {"naive": CONSTANT_MOTION, "physics": "physics alone", "cooperative": "with data"}
 
@@ -88,7 +89,7 @@ def _draw_horizon(content: ReportContent, means: pd.DataFrame, statistic: str, s
     column, title, unit = HORIZON_ERRORS[statistic]
     lines = _error_lines(content, means[means.N_D.isin([0, size])], "ahead", column, unit)
     x = make_axis("time ahead [s]", range=[0.0, float(means.ahead.max())])
-    return make_plot(lines, x, make_axis(f"{title} [{unit}]", rangemode="tozero"), hovermode="x unified")
+    return make_plot(lines, x, log_axis(f"{title} [{unit}]"), hovermode="x unified")
 
 
 def time_figure(content: ReportContent) -> PageFigure | None:
@@ -242,7 +243,7 @@ def error_by_kind(content: ReportContent) -> PageTable:
     learned = frame[frame.source.eq(source)]
     best = learned.loc[learned.groupby("kind", sort=False)["mean"].idxmin()] if len(learned) else learned
     parts = [
-        f"{row['kind']}: {number_text(row['mean'])} m, at the end {number_text(row['end'])} m ({row['model']})"
+        f"{row['kind']}: {number_text(row['end'])} m at the horizon, H {number_text(row['mean'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
     takeaway = f"Least error {of}: {'; '.join(parts)}." if parts else "No model with data has a result."

@@ -30,6 +30,8 @@ STRIP_HEIGHT = 30  # height of a model [px]
 MODEL_COLUMNS = {
     "model": "model",
     "family": "family",
+    "at the horizon [m]": "A_end",
+    "nine in ten below [m]": "A_end_90",
     "A [m]": "A",
     "A_90 [m]": "A_90",
     "rms [m]": "A_rms",
@@ -46,6 +48,8 @@ CELLS = {
     "N_D [1]": "N_D",
     "data [min]": "minutes",
     "seed": "seed",
+    "at the horizon [m]": "H_end",
+    "nine in ten below [m]": "H_end_90",
     "H [m]": "H",
     "H_90 [m]": "H_90",
     "rms [m]": "rms",
@@ -80,17 +84,38 @@ def factors_figure(content: ReportContent) -> PageFigure | None:
         alternative=f"Dots at the factors of {counted_text(len(names), 'model')}; the table of models has A.",
         height=STRIP_HEIGHT * len(names) + 70,
         draw=lambda: [_draw_strips(frame, names)],
-        chips=[
-            Chip(
-                f"group:{name}",
-                str(name).replace("_", " "),
-                category_colour(i),
-                "none",
-                symbol=MARKERS[i % len(MARKERS)],
-            )
-            for i, name in enumerate(pd.unique(frame.group))
-        ],
+        chips=_group_chips(frame),
     )
+
+
+def family_figure(factors: pd.DataFrame) -> PageFigure:
+    """Dot strips of the factors (members, paths) of a family, a row per perturbed number with a dot per member."""
+    rows = [
+        (path, member, path.partition(".")[0], factor)
+        for path in map(str, factors)
+        for member, factor in factors[path].dropna().items()
+    ]
+    frame = pd.DataFrame(rows, columns=["model", "path", "group", "factor"])
+    names = [str(name) for name in pd.unique(frame.model)]
+    span = " to ".join(number_text(end) for end in (frame.factor.min(), frame.factor.max()))
+    return PageFigure(
+        id="factors",
+        title="How the members differ from their base",
+        takeaway=f"{counted_text(len(names), 'number')} of {counted_text(len(factors), 'member')}, times {span}.",
+        how="One dot per member, at its factor on the base, logarithmic; one that is not positive is at the left edge.",
+        alternative="Dots at the factors of every member.",
+        height=max(STRIP_HEIGHT * len(names), 150) + 70,
+        draw=lambda: [_draw_strips(frame, names)],
+        chips=_group_chips(frame),
+    )
+
+
+def _group_chips(frame: pd.DataFrame) -> list[Chip]:
+    """A chip for each group of perturbed numbers (`hull`, `inertia`)."""
+    return [
+        Chip(f"group:{name}", str(name).replace("_", " "), category_colour(i), "none", symbol=MARKERS[i % len(MARKERS)])
+        for i, name in enumerate(pd.unique(frame.group))
+    ]
 
 
 def _draw_strips(frame: pd.DataFrame, names: list[str]) -> Panel:

@@ -42,7 +42,7 @@ PAGE_COLOURS = {
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 MARKERS = ("circle", "diamond", "square", "triangle-up", "cross", "star")
 LINE_DASHES = ("solid", "dash", "dot", "dashdot")
-COLOUR_LEVELS = 24
+COLOUR_LEVELS, DARK_LEVELS = 24, 11  # of a scale; those of viridis on which white has more contrast than black
 ROUNDING_SHARE = 1e-9  # of the greatest error: that of an exact model
 MILLION = 6  # power of ten from which ticks are short: Plotly would write -5k on one axis and -6000 on the other
 MOST_LINE_POINTS = 600  # of a line over time: more than pixels are wide
@@ -59,7 +59,8 @@ def category_colour(index: int) -> str:
 def page_colours(theme: str) -> dict[str, str]:
     """Name of a CSS variable -> colour of the `light` or `dark` page, with viridis and the Okabe-Ito colours.
 
-    `scale-0` on are for lines: those of viridis with contrast to the page; `heat-0` on are all of it.
+    `scale-0` on are for lines: those of viridis with contrast to the page; `heat-0` on are all of it, and `on-heat-0`
+    on what is written on them.
     """
     dark = theme == "dark"
     # Dark blue has contrast to white but not to black: the dark page takes sky blue instead, and the reverse.
@@ -69,7 +70,8 @@ def page_colours(theme: str) -> dict[str, str]:
         steps = sample_colorscale("Viridis", list(np.linspace(*ends, COLOUR_LEVELS)))
         colours |= {f"{name}-{i}": colour for i, colour in enumerate(steps)}
         colours[name] = f"linear-gradient(90deg, {', '.join(steps)})"
-    return colours
+    written = {f"on-heat-{i}": "#ffffff" if i < DARK_LEVELS else "#000000" for i in range(COLOUR_LEVELS)}
+    return colours | written
 
 
 def least_coloured(span: tuple[float, float]) -> float:

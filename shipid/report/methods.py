@@ -43,9 +43,10 @@ METHOD_COLUMNS = {
     "family": "family",
     "method": "method",
     "N_D [1]": "N_D",
+    "at the horizon [m]": "H_end",
+    "nine in ten below [m]": "H_end_90",
     "H [m]": "H",
     "H_90 [m]": "H_90",
-    "end [m]": "end",
     "core-seconds [s]": "seconds",
     "trials [1]": "trials",
     "no result": "without",
@@ -88,12 +89,15 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     best, alike = whole.iloc[0], whole.H.iloc[0] * (1 + ALIKE_ERRORS) >= whole.H
     tied, over = [str(name) for name in whole.method[alike]], " over all cells with physics" if first else ""
     err = plural_word(len(tied), "errs", "err alike,")
-    text = f"with N_D = {N_D} {join_few_names(tied)} {err} least{over}, {number_text(best.H)} m"
+    text = f"with N_D = {N_D} {join_few_names(tied)} {err} least{over}, {number_text(best.H_end)} m at the horizon, "
+    text += f"H {number_text(best.H)} m"
     leads = best.reference in tied
     for row in rows_as_tuples(whole[~alike if leads else alike][:1]):
         if math.isfinite(row.low):
             its = f"{row.method} is next, its" if leads else plural_word(len(tied), "its", "their")
-            text += f" ({its} difference to {row.reference} is {difference_text(row.difference, row.low, row.high)})"
+            text += (
+                f" ({its} difference of H to {row.reference} is {difference_text(row.difference, row.low, row.high)})"
+            )
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in rows_as_tuples(mine[mine.failed.gt(0)])]
     text += f", without a result: {join_few_names(failed)}" if failed else ""
     partly = [str(row.method) for row in rows_as_tuples(mine[mine.missing.gt(mine.failed)])]

@@ -1,24 +1,28 @@
-"""Recorded and simulated motion: speeds and yaw rate over time, and the track; the page of a replay."""
+"""Motion as pages show it, over time and on a map: the pages of a replay and of a standard manoeuvre."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from shipid.report.content import AnswerSentence, PageContent
+from shipid.errors import ShipidError
+from shipid.report.content import AnswerSentence, Floats, PageContent, empty_frame, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MOST_LINE_POINTS,
+    MUTED,
     Chip,
     Control,
     PageFigure,
     Panel,
+    Trace,
     category_colour,
+    even_places,
     make_axis,
     make_chart,
     make_line,
@@ -27,8 +31,9 @@ from shipid.report.figure import (
     zero_axis,
 )
 from shipid.report.page import Section, write_page
-from shipid.report.tables import PageTable, frame_table
-from shipid.report.wording import number_text
+from shipid.report.paths import outline_at
+from shipid.report.tables import PageTable, digits_cell, frame_table, note_cells, with_cells, word_cell
+from shipid.report.wording import counted_text, distance_text, number_text
 
 LOG_SERIES = "measured"
 DEGREES = float(np.rad2deg(1.0))
@@ -45,6 +50,33 @@ REPLAY_ERRORS = {
     "v [m/s]": "v",
     "r [deg/s]": "r",
     "position [m]": "position",
+}
+SPREAD_LINES = 40  # members of a family that are drawn: more fill the plane
+SPREAD_QUANTILES = {0.05: "dash", 0.5: "solid", 0.95: "dash"}
+OUTLINES = 12  # ships drawn along the track
+EXECUTE_HEADING = "execute heading"  # the measure that is drawn beside the heading
+MEASURE_COLUMNS = {
+    "measure": "measure",
+    "value": "value",
+    "unit": "unit",
+    "ship lengths": "lengths",
+    "why missing": "missing",
+}
+CRITERION_COLUMNS = {
+    "criterion": "criterion",
+    "value": "value",
+    "limit": "limit",
+    "unit": "unit",
+    "verdict": "verdict",
+    "note": "note",
+}
+MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
+    "heading": ("heading", "deg", False),
+    "helm": ("helm", "deg", True),
+    "u": ("ahead, u", "m/s", False),
+    "v": ("to starboard, v", "m/s", False),
+    "r": ("yaw rate, r", "deg/s", False),
+    "shaft": ("shaft", "rpm", True),
 }
 
 
@@ -145,3 +177,202 @@ REPLAY_PAGE = {
     )
 }
 write_replay = partial(write_page, "replay", REPLAY_PAGE)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ManoeuvreContent(PageContent):
+    """Everything the page shows.
+
+    first : names of the measures that the answer says. measures, criteria : rows from `shipid.measures.criteria`.
+    log : t [s], north, east [m], psi, helm [rad], u, v [m/s], r [rad/s], shaft [rev/s].
+    levels : helm [rad], rate [rad/s] of a spiral in the order performed. outline : (k, 2) of the ship [m].
+    """
+
+    first: Sequence[str]
+    log: pd.DataFrame
+    measures: pd.DataFrame
+    criteria: pd.DataFrame
+    outline: Floats
+    levels: pd.DataFrame = field(default_factory=empty_frame("helm", "rate"))
+
+    @property
+    def answer(self) -> list[AnswerSentence]:
+        """Sentences: the main measures, and how many criteria are met."""
+        known = self.measures[self.measures["measure"].isin(self.first)]
+        measures = [f"{row.measure}: {_amount_words(row.value, row.unit)}" for row in rows_as_tuples(known)]
+        sentences = [AnswerSentence("; ".join(measures).capitalize() + ".", "measures")]
+        judged = self.criteria[self.criteria["verdict"] != "not judged"] if len(self.criteria) else self.criteria
+        if len(judged):
+            met, notes = int((judged["verdict"] == "met").sum()), {str(note) for note in judged["note"]}
+            common = f"; {notes.pop()}" if len(notes) == 1 and "" not in notes else ""
+            words = f"{met} of {len(judged)} criteria of IMO MSC.137(76) are met{common}."
+            sentences.append(AnswerSentence(words, "criteria"))
+        return sentences
+
+
+def _amount_words(value: float, unit: str) -> str:
+    return f"{number_text(round(value, 3) + 0.0)} {unit}" if np.isfinite(value) else "not reached"
+
+
+def measures_table(content: ManoeuvreContent) -> PageTable:
+    """Every measure; one that is missing says why."""
+    frame = content.measures
+    shown = with_cells(frame, value=[digits_cell(round(value, 3), 3) for value in frame["value"]])
+    if frame["note"].ne("").any():
+        shown = with_cells(shown, missing=note_cells(frame["note"]))
+    return frame_table("measures", "Measures", "", shown, MEASURE_COLUMNS)
+
+
+def criteria_table(content: ManoeuvreContent) -> PageTable:
+    """Criteria of IMO MSC.137(76) that apply to this kind of manoeuvre."""
+    frame = content.criteria
+    shown = with_cells(frame, verdict=[word_cell(verdict, bad=verdict == "not met") for verdict in frame["verdict"]])
+    return frame_table("criteria", "Criteria of IMO MSC.137(76)", "", shown, CRITERION_COLUMNS)
+
+
+def track_figure(content: ManoeuvreContent) -> PageFigure:
+    """Path of the ship with its outline to scale, north up, equal axes."""
+    log = content.log.iloc[even_places(len(content.log), MOST_LINE_POINTS)]
+    poses = log[["north", "east", "psi"]].iloc[np.linspace(0, len(log) - 1, OUTLINES).astype(int)]
+    gap = np.full((1, 2), np.nan)
+    hulls = [np.vstack([outline_at(content.outline, pose), gap]) for pose in poses.to_numpy()]
+    drawn = np.vstack([*hulls, log[["north", "east"]].to_numpy()])
+    bounds = [(float(np.nanmin(drawn[:, i])), float(np.nanmax(drawn[:, i]))) for i in (1, 0)]
+    east, north = (distance_text(high - low) for low, high in bounds)
+    ships = np.vstack(hulls)
+    words = [
+        f"t = {row.t:.1f} s<br>{row.east:.1f} m east, {row.north:.1f} m north"
+        for row in rows_as_tuples(log[["t", "east", "north"]])
+    ]
+    ink = {"color": category_colour(0), "width": 2.5}
+    traces = [
+        make_line("ship", ships[:, 1], ships[:, 0], ["ship"], line={"color": MUTED, "width": 1}, hover=""),
+        make_line("track", log["east"], log["north"], ["track"], line=ink, hover=words),
+    ]
+    return PageFigure(
+        id="track",
+        title="The track",
+        takeaway=f"With its outline the ship takes {north} from south to north and {east} from west to east.",
+        how="Path of the logged point, north up, equal axes; the outline of the ship is to scale, at even times.",
+        alternative="Map of the track.",
+        height=460,
+        draw=lambda: [make_chart(traces, "east [m]", "north [m]", bounds)],
+        chips=[Chip("track", "track", category_colour(0), width=2.5), Chip("ship", "ship", MUTED, width=1)],
+    )
+
+
+def histories_figure(content: ManoeuvreContent) -> PageFigure:
+    """Heading, helm, speeds, yaw rate and shaft over time."""
+    log = content.log.iloc[even_places(len(content.log), MOST_LINE_POINTS)]
+    executed, degrees = _value_of_measure(content, EXECUTE_HEADING), DEGREES * log[["psi", "helm", "r"]]
+    values = degrees.assign(heading=degrees["psi"] - degrees["psi"].iloc[0], shaft=60 * log["shaft"])
+    values = values.assign(u=log["u"], v=log["v"]).round(6)  # an axis is no picture of the rounding of a constant
+    panels = {"heading, helm [deg]": ["heading", "helm"], "speed [m/s]": ["u", "v"], "yaw rate [deg/s]": ["r"]}
+    panels |= {"shaft [rpm]": ["shaft"]} if np.ptp(values["shaft"]) > 0 else {}
+    return PageFigure(
+        id="histories",
+        title="Over time",
+        takeaway=f"Yaw rate from {number_text(values['r'].min())} to {number_text(values['r'].max())} deg/s, "
+        f"speed ahead from {number_text(values['u'].max())} down to {number_text(values['u'].min())} m/s.",
+        how="Heading counted from that at the start of the log; helm and shaft as ordered, helm above 0 turns the ship "
+        "to starboard." + (" Dotted: the execute headings." if np.isfinite(executed) else ""),
+        alternative="Heading, helm, speeds and yaw rate over time.",
+        height=270,
+        draw=lambda: [_draw_history(log["t"], values[keys], title, executed) for title, keys in panels.items()],
+        chips=[Chip(key, MANOEUVRE_LINES[key][0], _line_colour(key)) for keys in panels.values() for key in keys],
+    )
+
+
+def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) -> PageFigure:
+    """Tracks of the members of a family, and their headings over time with quantiles.
+
+    interval : between records [s]. motion : north, east [m], psi [rad], each (records, members), of those that do not
+    diverge; `diverged` counts the others. ShipidError where all do.
+    """
+    north, east, heading = motion["north"], motion["east"], DEGREES * motion["psi"]
+    count, t = north.shape[1], interval * np.arange(len(north))
+    if not count:
+        raise ShipidError("there is nothing to draw: every member diverges", path="figures")
+    away = np.hypot(*(values[-1] - np.median(values[-1]) for values in (north, east)))
+    few, rows = even_places(count, SPREAD_LINES), even_places(len(t), MOST_LINE_POINTS)
+    thin: dict[str, Any] = {"line": {"color": MUTED, "width": 1}, "opacity": 0.6, "hover": ""}
+    every = [
+        np.pad(values[rows][:, few], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()  # a gap between two members
+        for values in (np.broadcast_to(t[:, None], north.shape), north, east, heading)
+    ]
+    levels = np.quantile(heading[rows], list(SPREAD_QUANTILES), axis=1)
+    turns = [
+        make_line("members", every[0], every[3], ["member"], **thin),
+        *(
+            make_line(f"{100 * p:g} %", t[rows], level, ["q"], "deg", line={"color": category_colour(0), "dash": dash})
+            for (p, dash), level in zip(SPREAD_QUANTILES.items(), levels, strict=True)
+        ),
+    ]
+    return PageFigure(
+        id="spread",
+        title="How far the members come apart",
+        takeaway=f"After {t[-1]:.4g} s half of {counted_text(count, 'member')} are within "
+        f"{distance_text(np.quantile(away, 0.5))} of the median position, nine in ten within "
+        f"{distance_text(np.quantile(away, 0.9))}; {diverged or 'none'} diverged.",
+        how="One start, the same orders. The lines are those of a few members, the quantiles those of all.",
+        alternative="Tracks and headings of the members.",
+        height=420,
+        draw=lambda: [
+            make_chart([make_line("members", every[2], every[1], ["member"], **thin)], "east [m]", "north [m]"),
+            make_plot(turns, make_axis("time [s]", nticks=6), zero_axis("heading [deg]", nticks=6)),
+        ],
+        chips=[Chip("member", "members", MUTED, width=1), Chip("q", "5, 50, 95 %", category_colour(0))],
+        captions=("Tracks", "Heading"),
+    )
+
+
+def _line_colour(key: str) -> str:
+    return category_colour([*MANOEUVRE_LINES].index(key))
+
+
+def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, executed: float) -> Panel:
+    """Some quantities over time; execute headings are drawn with the heading."""
+    traces: list[Trace] = []
+    for level in (executed, -executed) if "heading" in values and np.isfinite(executed) else ():
+        rule = {"color": MUTED, "width": 1, "dash": "dot"}
+        traces.append(make_line(f"{level:g} deg", [t.iloc[0], t.iloc[-1]], [level] * 2, ["heading"], "deg", line=rule))
+    for key in values:
+        name, unit, held = MANOEUVRE_LINES[str(key)]
+        ink = {"color": _line_colour(str(key)), "shape": "hv" if held else "linear"}
+        traces.append(make_line(name, t, values[key], [str(key)], unit, line=ink))
+    return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6))
+
+
+def _value_of_measure(content: ManoeuvreContent, name: str) -> float:
+    """Value of a measure; NaN where it was not measured."""
+    values = content.measures.loc[content.measures["measure"] == name, "value"]
+    return float(values.iloc[0]) if len(values) else float("nan")
+
+
+def spiral_figure(content: ManoeuvreContent) -> PageFigure:
+    """Steady yaw rate over helm."""
+    levels = np.rad2deg(content.levels[["helm", "rate"]].astype(float))
+    ink = {"color": category_colour(3)}
+    trace = make_line("yaw rate", levels["helm"], levels["rate"], [], "deg/s", mode="lines+markers", line=ink)
+    axes = zero_axis("helm [deg]", nticks=9), zero_axis("yaw rate [deg/s]", nticks=8)
+    return PageFigure(
+        id="spiral",
+        title="Yaw rate over helm",
+        takeaway=f"The loop is {_amount_words(_value_of_measure(content, 'loop width'), 'deg')} of helm wide.",
+        how="One point for each level that became steady, joined in the order performed; > 0 is to starboard.",
+        alternative="Steady yaw rate over helm angle.",
+        height=420,
+        draw=lambda: [make_plot([trace], *axes)],
+    )
+
+
+MANOEUVRE_PAGE = {
+    "results": Section(
+        "What was measured", {"measures": (measures_table, "measures"), "criteria": (criteria_table, "criteria")}
+    ),
+    "motion": Section(
+        "What the ship did",
+        {"track": (track_figure, "log"), "histories": (histories_figure, "log"), "spiral": (spiral_figure, "levels")},
+    ),
+}
+write_manoeuvre = partial(write_page, "manoeuvre", MANOEUVRE_PAGE)

@@ -43,6 +43,10 @@
     return value;
   }
 
+  // Paper is narrower than most windows: A4 without its margins, in two columns where a figure has several panels.
+  const PAPER = 660;
+  const onPaper = (plot) => PAPER / (plot.closest(".panels.many, .head") ? 2 : 1) - 20;
+
   function draw(plot, spec, hidden, view) {
     const { data, layout } = painted(spec, getComputedStyle(root));
     for (const trace of data) trace.visible = !(trace.meta || []).some((key) => hidden.has(key));
@@ -50,6 +54,7 @@
     const coarse = matchMedia("(pointer: coarse)").matches;
     layout.dragmode = coarse ? false : "zoom";
     layout.uirevision = view;
+    if (root.dataset.theme) layout.width = onPaper(plot);
     Plotly.react(plot, data, layout, CONFIG);
   }
 
@@ -289,7 +294,11 @@
     for (const details of document.querySelectorAll("details")) details.open = true;
     repaint();
   });
-  addEventListener("afterprint", () => { delete root.dataset.theme; repaint(); });
+  addEventListener("afterprint", () => {
+    delete root.dataset.theme;
+    repaint();
+    document.querySelectorAll(".js-plotly-plot").forEach((plot) => Plotly.Plots.resize(plot));
+  });
 
   // Printing cannot wait: what the reader has not come to yet is unpacked in idle time.
   async function loadAll() {

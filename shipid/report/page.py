@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import re
 import zlib
 from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import dataclass
@@ -15,18 +16,19 @@ from typing import Any
 
 import numpy as np
 from jinja2 import Environment, StrictUndefined, Template
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from plotly.io.json import to_json_plotly
 
 from shipid.files import write_text
+from shipid.report.content import AnswerSentence
 from shipid.report.figure import PageFigure, Panel, page_colours
-from shipid.report.glossary import mark_short_names
 from shipid.report.tables import PageTable, cell_html
 from shipid.report.wording import number_text, set_sentence
 
 Item = PageFigure | PageTable
 OF_EVERY_PAGE = ("findings", "provenance")  # ids that the template itself makes
-FIRST_SENTENCES = 3  # sentences of the answer that a reader sees; the others unfold
+HEAD = "head"  # id of the section that stands beside the headline, without a heading
+FIRST_SENTENCES, FIRST_WORDS = 3, 60  # of the answer that a reader sees at most; the others unfold
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,13 @@ def _has_part(content: object, name: str) -> bool:
     return value is not None and not (isinstance(value, Sized) and len(value) == 0)
 
 
+def split_answer(answer: Sequence[AnswerSentence]) -> tuple[Sequence[AnswerSentence], Sequence[AnswerSentence]]:
+    """The headline, of a few sentences and words but one sentence at least, and the rest of an answer."""
+    words = np.cumsum([len(sentence.text.split()) for sentence in answer[:FIRST_SENTENCES]])
+    first = max(1, int((words <= FIRST_WORDS).sum()))
+    return answer[:first], answer[first:]
+
+
 def render_page(
     kind: str, sections: Mapping[str, Section], content: Any, windows: Mapping[str, Any] | None = None
 ) -> str:
@@ -81,13 +90,15 @@ def render_page(
     parts = draw_sections(sections, content)
     items = [item for part in parts for item in part.items]
     figures = [item for item in items if isinstance(item, PageFigure)]
+    headline, details = split_answer(content.answer)
     return _template().render(
         content=content,
         kicker=kind,
-        answer=content.answer[:FIRST_SENTENCES],
-        details=content.answer[FIRST_SENTENCES:],
-        warned=any(sentence.text.startswith("Careful: ") for sentence in content.answer[FIRST_SENTENCES:]),
-        sections=parts,
+        answer=headline,
+        details=details,
+        warned=any(sentence.text.startswith("Careful: ") for sentence in details),
+        head=[item for part in parts if part.id == HEAD for item in part.items],
+        sections=[part for part in parts if part.id != HEAD],
         titles={name: name.capitalize() for name in OF_EVERY_PAGE} | {item.id: item.title for item in items},
         numbers={figure.id: i for i, figure in enumerate(figures, start=1)},
         views={figure.id: _draw_views(figure) for figure in figures if not figure.browser},
@@ -161,3 +172,29 @@ def _template() -> Template:
 
 def _resource(name: str) -> str:
     return files("shipid.report").joinpath(name).read_text(encoding="utf-8")
+
+
+MEANINGS = {
+    "H_90": "90th percentile of the position error of the prediction [m]: nine errors in ten are smaller",
+    "N_D": "number of recorded runs (manoeuvres) used to train and to validate",
+    "H": "mean position error over the horizon, compensated or of no physics, over all tests [m], equation (15)",
+    "A": "mean position error over the horizon of the physics alone, over all tests [m], equation (14)",
+    "(11)": "equation (11): the frame with x ahead and y to starboard at the instant of prediction",
+    "(14)": "equation (14): A, the mean distance between true and predicted places, physics alone",
+    "(15)": "equation (15): H, the mean distance between true and predicted places, with compensation",
+    "(16)": "equation (16): each derivative of the hull times a random factor",
+}
+# A and H are words, too ("A runs from"): a letter counts before = [ (, or after a small word, never at the start alone.
+LETTER = r"(?<![\w.>-])(?:A|H)(?=\s(?:=|\[m\]|of\b|over\b|against\b|falls\b|rises\b|and\s[AH]\b|runs\s(?:from|over)))"
+PATTERN = re.compile(rf"H_90|N_D(?![\w])|\((?:11|14|15|16)\)|{LETTER}")
+AFTER = re.compile(r"\b(by|its|is|has|error|below|equal|along|less) (A|H)(?![\w-])")
+
+
+def mark_short_names(text: str) -> Markup:
+    """Escape a text and mark its short names with what they mean."""
+    marked = PATTERN.sub(lambda match: _abbreviation(match[0]), str(escape(text)))
+    return Markup(AFTER.sub(lambda match: f"{match[1]} {_abbreviation(match[2])}", marked))
+
+
+def _abbreviation(name: str) -> str:
+    return f'<abbr title="{escape(MEANINGS[name])}">{name}</abbr>'

@@ -29,8 +29,8 @@ from shipid.report.figure import (
     make_line,
 )
 from shipid.report.page import Section
-from shipid.report.selection import close_up_models, figure_sizes
-from shipid.report.wording import counted_text
+from shipid.report.selection import close_styles, close_up_models, figure_sizes, in_words
+from shipid.report.wording import counted_text, metres_text
 
 MOST_POINTS = 40  # of a path or of the outline of a band
 PLACES_OF_METRE = 3  # a window 1 m wide is drawn to 0.001 m, one of 100 m to 0.1 m: less than a pixel
@@ -48,6 +48,39 @@ def window_sizes(content: ReportContent) -> list[int]:
     return figure_sizes(pd.Series([size for window in content.snapshots for _, _, size in window.paths], dtype=int))
 
 
+def _end_error(window: WindowSnapshot, key: PathKey) -> float:
+    """Distance [m] of the end of a path from the true place."""
+    return float(np.linalg.norm(window.paths[key][-1] - window.truth[-1]))
+
+
+def glance_figure(content: ReportContent) -> PageFigure | None:
+    """A test window as the best model, or another, predicts it with the most data: that with the median error."""
+    known = [key for window in content.snapshots for key in window.paths if key[1] == "cooperative"]
+    if not known:
+        return None
+    key = max(known, key=lambda one: (one[0] == content.best, one[2]))
+    windows = sorted((one for one in content.snapshots if key in one.paths), key=lambda one: _end_error(one, key))
+    window = windows[len(windows) // 2]
+    name, style = line_look(content, key[0], key[1])["name"], close_styles(content)[key[0]]
+    bands = [Chip("band", "its band", style.colour, width=9)] * (key in window.bands)
+    return PageFigure(
+        id="glance",
+        title="A prediction, and what happened",
+        takeaway=f"At the horizon {in_words(key[0])} with {counted_text(key[2], 'run')} errs here by "
+        f"{metres_text(_end_error(window, key))}, the median of {counted_text(len(windows), 'test window')}.",
+        how=f"{window.run} from t = {window.t:g} s, in the axes of the ship at that instant (11). The outline is to "
+        "scale, at the start and where the ship truly was at the end.",
+        alternative="The true path of one test window, the predicted path and its band.",
+        height=400,
+        draw=lambda: [draw_window(content, window, [key])],
+        chips=[
+            Chip("truth", "true path", TRUTH, width=9),
+            Chip(f"model:{key[0]}", name, style.colour, width=style.width),
+            *bands,
+        ],
+    )
+
+
 def browser_figure(content: ReportContent) -> PageFigure | None:
     """Pick a test run and an instant; None without windows."""
     runs, counts = windows_of(content), window_sizes(content)
@@ -63,7 +96,7 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
-        draw=lambda run, size: [draw_window(content, runs[run][len(runs[run]) // 2], size)],
+        draw=lambda run, size: [_draw_size(content, runs[run][len(runs[run]) // 2], size)],
         controls=[Control("Test run", list(runs)), Control("Manoeuvres, N_D", counts, len(counts) - 1)],
         chips=_window_chips(content),
         browser=True,
@@ -85,7 +118,7 @@ def window_data(content: ReportContent) -> dict[str, Any]:
     def path_of(window: WindowSnapshot, key: PathKey) -> list[Any]:
         model, source, size = key
         which = lines.setdefault(("" if source == "naive" else model, source), len(lines))
-        error = round(float(np.linalg.norm(window.paths[key][-1] - window.truth[-1])), 6)
+        error = round(_end_error(window, key), 6)
         band = _rounded_columns(window.bands[key], places) if key in window.bands else []
         at, path = counts.index(size) if source == "cooperative" else -1, _rounded_columns(window.paths[key], places)
         return [which, at, *path, error if math.isfinite(error) else None, *band]
@@ -119,25 +152,26 @@ def _is_drawn(content: ReportContent, key: PathKey, counts: Sequence[int]) -> bo
     return source == "naive" or (model in close_up_models(content) and (source != "cooperative" or size in counts))
 
 
-def draw_window(
-    content: ReportContent,
-    window: WindowSnapshot,
-    size: int,
-) -> Panel:
+def _draw_size(content: ReportContent, window: WindowSnapshot, size: int) -> Panel:
     """Draw one window of a test run as page.js does, with the compensated paths of one N_D."""
+    return draw_window(content, window, [key for key in window.paths if _is_drawn(content, key, [size])])
+
+
+def draw_window(content: ReportContent, window: WindowSnapshot, keys: Sequence[PathKey]) -> Panel:
+    """Draw the true path of a window, the ship at its ends, and some predicted paths with their bands."""
     truth = np.asarray(window.truth)
     traces = [_path_line("true path", truth, ["truth"], line={"color": TRUTH, "width": 9}, hover="true path")]
     for pose in (np.zeros(3), np.append(truth[-1], window.psi_end)):
         hull = outline_at(window.outline, pose)
         fill: Trace = {"line": {"color": MUTED, "width": 1}, "fill": "toself", "fillcolor": "var(--hull)"}
         traces.append(_path_line("ship", hull, ["ship"], hover="", **fill))
-    for key in (key for key in window.paths if _is_drawn(content, key, [size])):
+    for key in keys:
         look = line_look(content, "" if key[1] == "naive" else key[0], key[1])
         if key in window.bands:
             colour = look["line"]["color"]
             shade: Trace = {"line": {"color": colour, "width": 0.5}, "fill": "toself", "fillcolor": colour}
-            keys = [*look["keys"], "band"]
-            traces.append(_path_line(look["name"], window.bands[key], keys, hover="", opacity=0.15, **shade))
+            hides = [*look["keys"], "band"]
+            traces.append(_path_line(look["name"], window.bands[key], hides, hover="", opacity=0.15, **shade))
         words, ink = escape_name(look["name"]), look["line"]
         traces.append(_path_line(look["name"], window.paths[key], look["keys"], line=ink, hover=words))
     return make_chart(traces, TO_STARBOARD, AHEAD)
@@ -169,4 +203,5 @@ def _rounded_columns(path: Floats, places: int) -> list[list[float | None]]:
     return [[value if math.isfinite(value) else None for value in column] for column in columns]
 
 
+AT_A_GLANCE = Section("At a glance", {"glance": (glance_figure, "snapshots")})
 PREDICTIONS = Section("The predictions", {"browser": (browser_figure, "snapshots")})

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.ndimage import gaussian_filter1d
 
-from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, Floats, ReportContent, rows_as_tuples
+from shipid.report.content import DATA_DRIVEN, NO_PHYSICS, ReportContent, rows_as_tuples
 from shipid.report.figure import (
     INK,
     MUTED,
@@ -38,6 +37,7 @@ from shipid.report.selection import (
     MOST_MODELS,
     accuracy_range,
     data_driven,
+    errors_alone,
     errors_over_seeds,
     in_words,
     model_chips,
@@ -48,18 +48,19 @@ from shipid.report.selection import (
     spread_items,
     words_on_left_out,
 )
-from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, shorten_name
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text, shorten_name
 
 HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
 NAME_HEIGHT = 13  # of a row [px]
 INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
-FEWEST_LINED = 12  # models with physics from which lines of equal H are drawn: fewer give a few crooked pieces
-ROUND_DIGITS = (1, 2, 5)  # of the ticks of A
-ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r
-    "mean": ("H", "mean"),
-    "90th percentile": ("H_90", "p90"),
-    "root mean square": ("rms", "rms"),
+ROUND_DIGITS = (1, 2, 3, 5, 7)  # of the ticks of A
+ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r, title of the axis
+    "at the horizon": ("H_end", "end", "error at the horizon, mean [m]"),
+    "at the horizon, 90th percentile": ("H_end_90", "end_90", "error at the horizon, 90th percentile [m]"),
+    "mean": ("H", "mean", "mean over the horizon, H [m]"),
+    "90th percentile": ("H_90", "p90", "90th percentile over the horizon, H_90 [m]"),
+    "root mean square": ("rms", "rms", "root mean square over the horizon [m]"),
 }
 
 
@@ -67,8 +68,8 @@ class CellMap(NamedTuple):
     """What a map shows.
 
     rows : model, family, A [m], y (square root of A; models without A above), short (name beside the row), by A.
-    cells : model, N_D, family, A, y, low and high (reach below and above y), H [m], worse (not below that without
-        physics), words (of the hover box).
+    cells : model, N_D (0: the physics alone), family, A, y, low and high (reach below and above y), H [m], worse (not
+        below that without physics), words (of the hover box).
     """
 
     rows: pd.DataFrame
@@ -82,24 +83,21 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         return None
     rows, cells = shown
     hatched = f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
-    lines = [_isolines(shown)] if rows.A.notna().sum() >= FEWEST_LINED else []
-    lined = " Lines of equal error follow H [m], averaged over neighbouring models; none passes a cell without result."
     return PageFigure(
         id="map",
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown),
-        how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is H, mean over seeds."
+        how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour and number are H, the "
+        "mean error over the horizon, mean over seeds. At N_D = 0 is the physics alone, whose H is A."
         + (hatched if cells.worse.any() else "")
-        + (lined if lines else "")
         + words_on_left_out(content)
         + _not_on_map(content)
         + cells_without_result(content),
         alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
         "The numbers are in the table of cells.",
         height=HEIGHT,
-        draw=lambda: [draw_map(shown, lines)],
-        chips=[Chip("iso", "lines of equal H", INK, width=1.5)] if lines else [],
-        scale=ColourScale("position error, mean, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
+        draw=lambda: [draw_map(shown)],
+        scale=ColourScale("mean error over the horizon, H [m]", float(cells.H.min()), float(cells.H.max()), "heat"),
     )
 
 
@@ -117,8 +115,8 @@ def map_lack(content: ReportContent) -> str:
     return next((f"it needs {name}" for name, there in needs.items() if not there), "")
 
 
-def map_of_cells(content: ReportContent) -> CellMap | None:
-    """What the map shows; None where `map_lack` says why not."""
+def map_of_cells(content: ReportContent, *, with_physics: bool = True) -> CellMap | None:
+    """What the map shows, with the physics alone or not; None where `map_lack` says why not."""
     if map_lack(content):
         return None
     rows = _rows_of_map(content)
@@ -126,9 +124,12 @@ def map_of_cells(content: ReportContent) -> CellMap | None:
     rows = rows.assign(low=np.insert(half, 0, half[0]), high=np.append(half, half[-1]))
     cells = content.cells[["model", "N_D"]].drop_duplicates().merge(rows.drop(columns="short"))
     cells = cells.merge(errors_over_seeds(content)[["model", "N_D", "H"]], how="left")
+    if with_physics:
+        alone = errors_alone(content)[["model", "N_D", "H"]].merge(rows.drop(columns="short"))
+        cells = pd.concat([alone, cells], ignore_index=True)
     learned = cells.N_D.map(cells[cells.model.eq(data_driven(content) or "")].set_index("N_D").H)
     groups = {key: mine.to_dict("records") for key, mine in content.cells.groupby(["model", "N_D"])}
-    words = [_cell_words(groups[row.model, row.N_D], row) for row in rows_as_tuples(cells)]
+    words = [_cell_words(groups.get((row.model, row.N_D), []), row) for row in rows_as_tuples(cells)]
     return CellMap(rows, cells.assign(worse=cells.family.ne(DATA_DRIVEN) & cells.H.ge(learned), words=words))
 
 
@@ -148,103 +149,79 @@ def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
     """The lines of the hover box of one model and N_D, of which there are some cells."""
     good = [one for one in cells if one["status"] == "ok" and math.isfinite(one["H"])]
     accuracy = f"A {metres_text(row.A)}, " if math.isfinite(row.A) else ""
+    if not cells:
+        return f"<b>{escape_name(row.model)}</b>, A {metres_text(row.A)}<br>the physics alone"
     lines = [f"<b>{escape_name(row.model)}</b>, {accuracy}N_D = {row.N_D}"]
     if not good:
         return "<br>".join([*lines, escape_name(f"{cells[0]['status']}: {cells[0]['sentence']}".rstrip(": "))])
-    lines.append(f"H {metres_text(row.H)}, H_90 {metres_text(fmean(one['H_90'] for one in good))}")
+    end, end_90, H_90 = (metres_text(fmean(one[name] for one in good)) for name in ("H_end", "H_end_90", "H_90"))
+    lines += [f"H {metres_text(row.H)}, H_90 {H_90}", f"at the horizon {end}, nine in ten below {end_90}"]
     lost = f"{len(cells) - len(good)} of {counted_text(len(cells), 'seed')} gave no result"
     return "<br>".join([*lines, *[lost] * (len(good) < len(cells))])
 
 
-def draw_map(shown: CellMap, lines: Sequence[Trace] = ()) -> Panel:
-    """Draw cells at A and N_D, hatched or crossed where they are of no use, under lines of equal H."""
+def draw_map(shown: CellMap) -> Panel:
+    """Draw cells at A and N_D, hatched or crossed where they are of no use."""
     rows, cells = shown
-    top, counts = float(rows.y.max()) * 1.04, np.unique(cells.N_D)
-    width = 0.86 * float(np.diff(counts).min())
+    counts = np.unique(cells.N_D)
     good, bad = cells[cells.H.notna()], cells[cells.H.isna()]
     span = float(good.H.min()), float(good.H.max())
-    shades = [f"var(--heat-{colour_level(value, span)})" for value in good.H]
-    box = {"marker": {"color": shades, "line": {"width": 0.5, "color": MUTED}}, "customdata": list(good.words)}
+    levels = [colour_level(value, span) for value in good.H]
+    box = {"marker": {"color": [f"var(--heat-{level})" for level in levels], "line": {"width": 1, "color": MUTED}}}
     lattice = {"shape": "/", "fgcolor": "#000000", "size": 8, "solidity": 0.16}
     hatched = {"marker": {"color": TRANSPARENT, "line": {"width": 1.2, "color": INK}, "pattern": lattice}}
     cross = {"symbol": "x-thin", "size": 8, "line": {"width": 2, "color": "var(--bad)"}}
+    digits = {"color": [f"var(--on-heat-{level})" for level in levels], "size": 12, "shadow": "auto"}
+    numbers = {"text": [number_text(value) for value in good.H], "textfont": digits, "textangle": 0}
+    numbers |= {"marker": {"color": TRANSPARENT}, "textposition": "inside", "insidetextanchor": "middle"}
+    failed = bad.N_D.astype(str).tolist()
+    hover = {"customdata": list(good.words), "hovertemplate": "%{customdata}<extra></extra>"}
     traces: list[Trace] = [
-        {**_cell_bars(good, width), **box, "hovertemplate": "%{customdata}<extra></extra>"},
-        {**_cell_bars(good[good.worse], width), **hatched, "hoverinfo": "skip"},
-        make_line("no result", bad.N_D, bad.y, [], mode="markers", marker=cross, hover=list(bad.words)),
+        {**_cell_bars(good), **box, **hover},
+        {**_cell_bars(good[good.worse]), **hatched, "hoverinfo": "skip"},
+        {**make_line("no result", [], bad.y, [], mode="markers", marker=cross, hover=list(bad.words)), "x": failed},
+        {**_cell_bars(good), **numbers, "hoverinfo": "skip"},
     ]
-    ends = [counts[0] - 0.75 * width, counts[-1] + 0.75 * width]
-    x = make_axis("manoeuvres, N_D [1]", tickvals=counts.tolist(), range=ends, showgrid=False)
-    y = make_axis("error of the physics alone, A [m]", range=[0, top], **_ticks_of_map(rows))
+    low, top = float((rows.y - rows.low).min()), float((rows.y + rows.high).max())
+    room = 0.02 * (top - low)
+    axis = {"type": "category", "categoryarray": counts.astype(str).tolist(), "showgrid": False}
+    x = make_axis("manoeuvres, N_D [1]", range=[-0.5, len(counts) - 0.5], **axis)
+    y = make_axis("error of the physics alone, A [m]", range=[low - room, top + room], **_ticks_of_map(rows, low))
     edge = (rows.y[rows.A.notna()].max() + rows.y[rows.A.isna()].min()) / 2
     rule = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "y0": edge, "y1": edge}
     rules = [{**rule, "line": {"color": MUTED, "width": 1, "dash": "dot"}}] * bool(rows.A.isna().any())
-    above = {f"{side}axis2": {"overlaying": side, "matches": side, "visible": False} for side in "xy" if lines}
-    more = {"annotations": _names_of_rows(rows, top), "margin": MAP_MARGIN, "shapes": rules, **above}
-    return make_plot([*traces, *lines], x, y, barmode="overlay", **more)
+    more = {"annotations": _names_of_rows(rows, top - low), "margin": MAP_MARGIN, "shapes": rules}
+    return make_plot(traces, x, y, barmode="overlay", uniformtext={"mode": "hide", "minsize": 9}, **more)
 
 
-def _cell_bars(cells: pd.DataFrame, width: float) -> Trace:
+def _cell_bars(cells: pd.DataFrame) -> Trace:
     """Bars around each cell."""
-    columns = {"x": cells.N_D, "y": (cells.low + cells.high).round(4), "base": (cells.y - cells.low).round(4)}
-    return {"type": "bar", "width": width, **{name: values.tolist() for name, values in columns.items()}}
+    columns = {"y": (cells.low + cells.high).round(4), "base": (cells.y - cells.low).round(4)}
+    bars = {name: values.tolist() for name, values in columns.items()}
+    return {"type": "bar", "width": 0.9, "x": cells.N_D.astype(str).tolist(), **bars}
 
 
-def _names_of_rows(rows: pd.DataFrame, top: float) -> list[dict[str, Any]]:
-    """Names of the models with an A, right of their cells; of more than have room there, some at even distances."""
-    known = rows[rows.A.notna()].reset_index(drop=True)
-    room = 1 + int(np.ptp(known.y) / top * INSIDE / NAME_HEIGHT)
+def _names_of_rows(rows: pd.DataFrame, height: float) -> list[dict[str, Any]]:
+    """Names of the models, right of their cells; of more than have room there, some at even distances."""
+    known, without = rows[rows.A.notna()].reset_index(drop=True), rows[rows.A.isna()]
+    room = 1 + int(np.ptp(known.y) / height * INSIDE / NAME_HEIGHT)
     some = even_places(len(known), max(room, FEW_MODELS))
-    heights = spread_places(known.y[some].tolist(), NAME_HEIGHT / INSIDE * top, float(known.y.max()))
+    heights = spread_places(known.y[some].tolist(), NAME_HEIGHT / INSIDE * height, float(known.y.max()))
     place = {"xref": "paper", "x": 1, "xanchor": "left", "xshift": 4, "showarrow": False}
+    names = [*zip(heights, known.short[some], strict=True), *zip(without.y, without.short, strict=True)]
     return [
-        {
-            **place,
-            "y": height,
-            "text": escape_name(shorten_name(name)),
-            "font": {"size": 11, "color": INK},
-        }
-        for height, name in zip(heights, known.short[some], strict=True)
+        {**place, "y": y, "text": escape_name(shorten_name(name)), "font": {"size": 11, "color": INK}}
+        for y, name in names
     ]
 
 
-def _ticks_of_map(rows: pd.DataFrame) -> dict[str, list[Any]]:
-    """Round ticks of A, those near 0 left out: there is no room for them; a row without A has its name there."""
-    largest, strips = float(rows.A.max()), rows[rows.A.isna()]
+def _ticks_of_map(rows: pd.DataFrame, low: float) -> dict[str, list[Any]]:
+    """Round ticks of A, from the least A on."""
+    largest = float(rows.A.max())
     decades = range(math.floor(math.log10(max(largest, 1e-6))) - 1, math.ceil(math.log10(max(largest, 1e-6))) + 1)
     ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
-    values = [0.0, *(tick for tick in ticks if largest / 40 <= tick <= largest)]
-    names = [escape_name(shorten_name(name)) for name in strips.short]
-    return {"tickvals": [*np.sqrt(values), *strips.y], "ticktext": [*(f"{value:g}" for value in values), *names]}
-
-
-def _isolines(shown: CellMap) -> Trace:
-    """Lines of equal H through the models with physics."""
-    physics, sizes = shown.rows[shown.rows.A.notna() & shown.rows.family.ne(DATA_DRIVEN)], np.unique(shown.cells.N_D)
-    H = shown.cells.pivot(index="model", columns="N_D", values="H").reindex(index=physics.model, columns=sizes)
-    lines = {"coloring": "none", "showlabels": True, "labelfont": {"size": 12, "color": INK, "shadow": "auto"}}
-    return {
-        "type": "contour",
-        "x": sizes.tolist(),
-        "y": physics.y.tolist(),
-        "z": smooth_rows(H.to_numpy()),
-        "ncontours": 5,
-        "contours": lines,
-        "line": {"color": INK, "width": 1.5, "smoothing": 0},
-        "meta": ["iso"],
-        "hoverinfo": "skip",
-        "showscale": False,
-        "xaxis": "x2",
-        "yaxis": "y2",
-    }  # Plotly draws bars over lines
-
-
-def smooth_rows(values: Floats) -> Floats:
-    """Positive values (m, n), each the geometric mean of its column under a bell of two rows; others are left out."""
-    finite = np.isfinite(values) & (values > 0)
-    logs = np.log(values, where=finite, out=np.zeros(values.shape))
-    total, weight = (gaussian_filter1d(part, 2.0, axis=0, mode="constant") for part in (logs, finite.astype(float)))
-    return np.where(finite, np.exp(total / np.where(finite, weight, 1.0)), np.nan)
+    values = [tick for tick in ticks if max(low**2, largest / 40) <= tick <= largest]
+    return {"tickvals": list(np.sqrt(values)), "ticktext": [f"{value:g}" for value in values]}
 
 
 def _not_on_map(content: ReportContent) -> str:
@@ -266,8 +243,8 @@ def ends_of_map(cells: pd.DataFrame) -> str:
 
 def _takeaway_map(shown: CellMap) -> str:
     """Where H is lowest and highest, and up to which A physics helped at every N_D."""
-    good, rival = shown.cells[shown.cells.H.notna()], _model_without_physics(shown.rows)
-    text = f"H runs from {ends_of_map(good)}"
+    good, rival = shown.cells[shown.cells.H.notna() & (shown.cells.N_D > 0)], _model_without_physics(shown.rows)
+    text = f"H, the mean over the horizon, runs from {ends_of_map(good)}"
     pure = good.family.eq(DATA_DRIVEN)
     physics = good[~pure & good.N_D.isin(good.N_D[pure])]
     if physics.empty:
@@ -302,31 +279,26 @@ def gain_lack(content: ReportContent) -> str:
 
 
 def gain_figure(content: ReportContent) -> PageFigure | None:
-    """H over N_D, from the physics alone where the study has a single N_D; None where `gain_lack` says why not."""
+    """Error over N_D, from the physics alone on; None where `gain_lack` says why not."""
     if gain_lack(content):
         return None
-    means, single = (
-        errors_over_seeds(content).merge(overview_models(content)[["model"]]),
-        content.cells.N_D.nunique() < 2,
-    )
-    takeaway = _takeaway_sizes(content, means)
-    if single:
-        alone = content.models.assign(N_D=0).rename(columns={"A": "H", "A_90": "H_90", "A_rms": "rms"})
-        means = pd.concat([alone[["model", "N_D", "H", "H_90", "rms"]], means])
+    learned = errors_over_seeds(content).merge(overview_models(content)[["model"]])
+    means = pd.concat([errors_alone(content), learned], ignore_index=True)
+    statistics = [word for word, (column, *_) in ERROR_STATISTICS.items() if learned[column].notna().any()]
+    statistics = statistics or list(ERROR_STATISTICS)
     looks, span, (order, drawn) = model_styles(content), accuracy_range(content), _models_with_line(content)
     accuracy = content.cells.groupby("model").A.first()
     words = {name: f"{name}, A {metres_text(accuracy[name])}" for name in order if np.isfinite(accuracy[name])}
     return PageFigure(
         id="gain",
         title="What another manoeuvre buys",
-        takeaway=takeaway,
-        how="Position error over all predicted points of all windows of all test manoeuvres: its mean is H (15), of "
-        "the physics alone A (14). Where a cell has several seeds, the line joins their means and the pale "
-        "points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate stay as they are at the "
-        "instant of prediction, the least that any model must beat."
-        + (" N_D = 0 is the physics alone." if single else "")
-        + (" Colour is A; the" if span else " The")
-        + " marker is the family; N_D counts manoeuvres to train and to validate."
+        takeaway=_takeaway_sizes(content, learned),
+        how="Position error at the horizon, or over all predicted points of all windows of all test manoeuvres: that "
+        "mean is H (15), of the physics alone, at N_D = 0, A (14). Where a cell has several seeds, the line joins "
+        "their means and the pale points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate "
+        "stay as they are at the instant of prediction, the least that any model must beat."
+        + (" Colour is A; marker" if span else " Marker")
+        + " and dashes are the family; N_D counts manoeuvres to train and to validate."
         + words_on_left_out(content)
         + drawn
         + cells_without_result(content),
@@ -335,8 +307,8 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         height=460,
         draw=lambda statistic, kind: [_draw_sizes(content, means, order, statistic, kind == "logarithmic")],
         controls=[
-            Control("Position error", list(ERROR_STATISTICS)),
-            Control("Axis", ["linear", "logarithmic"]),
+            Control("Position error", statistics),
+            Control("Axis", ["logarithmic", "linear"]),
         ],
         chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT_MOTION, NAIVE, "dash")],
         scale=ColourScale("error of the physics alone, A [m]", *span) if span else None,
@@ -361,7 +333,7 @@ def _draw_sizes(
     content: ReportContent, means: pd.DataFrame, order: Sequence[str], statistic: str, logarithmic: bool
 ) -> Panel:
     """Lines over N_D; what has no physics first: it must not cover the others."""
-    column, looks = ERROR_STATISTICS[statistic][0], model_styles(content)
+    (column, constant, title), looks = ERROR_STATISTICS[statistic], model_styles(content)
     sizes = sorted({*content.cells.N_D, *means.N_D})
     ended, traces = content.cells[content.cells.status.eq("ok")], []
     for name in (name for name in reversed(order) if means.model.eq(name).any()):
@@ -369,32 +341,31 @@ def _draw_sizes(
         marker = {"symbol": look.symbol, "size": 8, "color": look.colour}
         # A size whose cells all failed stays NaN: the line has a gap there.
         heights = means[means.model.eq(name)].set_index("N_D")[column].reindex(sizes)
-        ink = {"color": look.colour, "width": look.width}
+        ink = {"color": look.colour, "width": look.width, "dash": look.dash}
         traces.append(make_line(name, sizes, heights, keys, mode="lines+markers", line=ink, marker=marker))
         if seeds.seed.nunique() > 1:
             faint: Trace = {"mode": "markers", "marker": {**marker, "size": 5}, "opacity": 0.4}
             traces.append(make_line(f"{name}, seed", seeds.N_D, seeds[column], keys, **faint))
-    level, dashed = content.naive[ERROR_STATISTICS[statistic][1]], {"color": NAIVE, "dash": "dash", "width": 1.5}
+    level, dashed = content.naive[constant], {"color": NAIVE, "dash": "dash", "width": 1.5}
     hover = f"{CONSTANT_MOTION}: {metres_text(level)}"
     traces.append(make_line(CONSTANT_MOTION, [sizes[0], sizes[-1]], [level] * 2, ["naive"], line=dashed, hover=hover))
-    title = f"position error, {statistic} [m]"
     x = make_axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
     return make_plot(traces, x, log_axis(title) if logarithmic else make_axis(title, rangemode="tozero"))
 
 
-def _takeaway_sizes(content: ReportContent, means: pd.DataFrame) -> str:
-    if means.empty:
+def _takeaway_sizes(content: ReportContent, learned: pd.DataFrame) -> str:
+    if learned.empty:
         return "No cell gave a result."
+    column, words = ("H_end", "At the horizon") if learned.H_end.notna().any() else ("H", "Over the horizon")
     parts = []
-    for size in dict.fromkeys((means.N_D.min(), means.N_D.max())):
-        mine = means[means.N_D.eq(size)].set_index("model").H
+    for size in dict.fromkeys((learned.N_D.min(), learned.N_D.max())):
+        mine = learned[learned.N_D.eq(size)].set_index("model")[column]
         named = [name for name in (content.best, data_driven(content)) if name and name in mine.index]
-        known = " and ".join(f"{in_words(name)} has H = {metres_text(mine[name])}" for name in named)
-        parts.append(
-            f"t N_D = {size}, {known or f'H runs from {metres_text(mine.min())} to {metres_text(mine.max())}'}"
-        )
+        known = " and ".join(f"{in_words(name)} errs by {metres_text(mine[name])}" for name in named)
+        known = known or f"errors run from {metres_text(mine.min())} to {metres_text(mine.max())}"
+        parts.append(f"with N_D = {size} {known}")
     best = f" {content.best} is the best in validation." if content.best else ""
-    return f"A{'; a'.join(parts)}.{best}"
+    return f"{words}, {'; '.join(parts)}.{best}"
 
 
 WHAT_PHYSICS_AND_DATA_BUY = Section(

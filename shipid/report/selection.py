@@ -15,16 +15,20 @@ from shipid.report.figure import INK, MARKERS, MUTED, Chip, category_colour, col
 FEW_MODELS = 6  # up to so many models each has a separate colour and is drawn in every figure
 MOST_MODELS = 12  # with more, figures of all models leave out the methods that the study does not judge by
 FEW_RUNS = 40  # test runs in the error-over-time figure and the window browser
+FAMILY_DASHES = ("solid", "dashdot", "longdash", "longdashdot")
+PHYSICS_ERRORS = {"A_end": "H_end", "A_end_90": "H_end_90", "A": "H", "A_90": "H_90", "A_rms": "rms"}
+"""Errors of the physics alone -> those of a prediction: at N_D = 0 they are the same."""
 SOURCE_DASHES = {"cooperative": "solid", "physics": "dot", "naive": "dash"}
 
 
 @dataclass(frozen=True)
 class Style:
-    """How one model is drawn: colour (CSS variable), marker of its family, line width [px]."""
+    """How one model is drawn: colour (CSS variable), marker and dash of its family, line width [px]."""
 
     colour: str
     symbol: str
     width: float
+    dash: str = "solid"
 
 
 def spread_items(items: Sequence[str], count: int) -> list[str]:
@@ -114,8 +118,10 @@ def model_styles(content: ReportContent) -> Mapping[str, Style]:
             # A is unknown where the physics diverged. Of several methods on one model the first marker is filled.
             known = span is not None and np.isfinite(row.A)
             shade = f"var(--scale-{colour_level(row.A, span)})" if known and span else MUTED
-            symbol = MARKERS[kinds.index(row.family) % len(MARKERS)] + "-open" * bool(span and again)
-            result[str(row.model)] = Style(category_colour(index) if span is None else shade, symbol, 2.0)
+            kind = kinds.index(row.family)
+            symbol = MARKERS[kind % len(MARKERS)] + "-open" * bool(span and again)
+            colour = category_colour(index) if span is None else shade
+            result[str(row.model)] = Style(colour, symbol, 2.0, FAMILY_DASHES[kind % len(FAMILY_DASHES)])
     return result
 
 
@@ -140,7 +146,7 @@ def _styles_without_physics(names: Sequence[str]) -> dict[str, Style]:
 def model_chips(names: Sequence[str], looks: Mapping[str, Style], words: Mapping[str, str] | None = None) -> list[Chip]:
     """Legend of models: each with its colour, line width and marker, by its name or other words."""
     return [
-        Chip(f"model:{name}", (words or {}).get(name, name), look.colour, width=look.width, symbol=look.symbol)
+        Chip(f"model:{name}", (words or {}).get(name, name), look.colour, look.dash, look.width, look.symbol)
         for name in names
         for look in [looks[name]]
     ]
@@ -158,7 +164,13 @@ def over_seeds(frame: pd.DataFrame, by: list[str], values: list[str]) -> pd.Data
 
 
 def errors_over_seeds(content: ReportContent) -> pd.DataFrame:
-    """Cells that gave a result, by model and N_D: mean over seeds of H, H_90, rms [m] and the number of seeds."""
+    """Cells that gave a result, by model and N_D: mean over seeds of H_end, H_end_90, H, H_90, rms [m]."""
     good = content.cells[content.cells.status.eq("ok") & content.cells.H.notna()]
-    means = over_seeds(good, ["model", "N_D"], ["H", "H_90", "rms"])
-    return means.merge(good.groupby(["model", "N_D"], as_index=False).agg(seeds=("seed", "nunique")))
+    return over_seeds(good, ["model", "N_D"], list(PHYSICS_ERRORS.values()))
+
+
+def errors_alone(content: ReportContent) -> pd.DataFrame:
+    """Errors of the physics alone by model, as of `errors_over_seeds` at N_D = 0; not where the data identify it."""
+    known = content.models.family[content.models.A.notna()]
+    fixed = content.cells[content.cells.family.isin(known) & content.cells.A.notna()].drop_duplicates("model")
+    return fixed[["model", *PHYSICS_ERRORS]].rename(columns=PHYSICS_ERRORS).assign(N_D=0)

@@ -8,24 +8,24 @@ from collections.abc import Iterable, Sequence
 from shipid.report.content import AnswerSentence, ReportContent
 from shipid.report.errors_over import error_by_kind
 from shipid.report.factors import cells_table, models_table
-from shipid.report.page import FIRST_SENTENCES
+from shipid.report.page import split_answer
 from shipid.report.wording import CONSTANT_MOTION, metres_text
 
 
 def summary_text(content: ReportContent) -> str:
     """Answer, findings, errors of constant u, v, r, models, cells and provenance as Markdown."""
-    mean, p90, rms = (metres_text(content.naive[name]) for name in ("mean", "p90", "rms"))
-    more, findings = (
-        content.answer[FIRST_SENTENCES:],
-        [[f["id"], f["claim"], f["verdict"], f["evidence"]] for f in content.findings],
-    )
+    errors = {name: metres_text(value) for name, value in content.naive.items()}
+    headline, more = split_answer(content.answer)
+    findings = [[f["id"], f["claim"], f["verdict"], f["evidence"]] for f in content.findings]
     parts = [
         f"# {_one_line(content.title)}",
-        _bullet_list(content.answer[:FIRST_SENTENCES]),
+        _bullet_list(headline),
         *(["## In detail", _bullet_list(more)] if more else []),
         *(["## Findings", _markdown_table(["", "claim", "verdict", "evidence"], findings)] if findings else []),
         f"## {CONSTANT_MOTION.capitalize()}",
-        f"Mean error {mean}, 90th percentile {p90}, root mean square {rms}.",
+        "At the horizon {end}, nine in ten below {end_90}; mean over it {mean}, 90th percentile {p90}.".format(
+            **errors
+        ),
     ]
     by_kind = [error_by_kind(content)] if len(content.frame("kinds")) else []
     for table in (*by_kind, models_table(content), cells_table(content)):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
 
-from shipid.checked import CheckedModel
+from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.errors import DocumentError, suggest_name
 from shipid.measures.record import Measures, Record
 from shipid.measures.spiral import SpiralLevels, helm_levels, spiral_measures
@@ -33,12 +33,11 @@ from shipid.vessel.schema import term_blocks
 
 Array = NDArray[np.float64]
 Range = tuple[FiniteFloat, FiniteFloat]
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg
 Helm = Annotated[FiniteFloat, Field(ge=-MOST_HELM, le=MOST_HELM)]
 
-HELMS = (25, 20, 15, 10, 5, 3, 1, 0, -1, -3, -5, -10, -15, -20, -25)
+STARBOARD_HELMS = (25, 20, 15, 10, 5, 3, 1)
+HELMS = (*STARBOARD_HELMS, 0, *(-angle for angle in reversed(STARBOARD_HELMS)))
 SPIRAL = (*HELMS, *HELMS[-2::-1])  # to the other side and back
 ZIGZAG, TURN, LEVEL, STOP = 30.0, 60.0, 40.0, 80.0  # ship lengths of standard manoeuvres
 

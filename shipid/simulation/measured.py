@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 
 from shipid.errors import ShipidError
-from shipid.measures.criteria import judge_criteria
+from shipid.measures.criteria import criterion_rows, judge_criteria, measure_rows
 from shipid.measures.recognise import record_of
 from shipid.measures.record import Record
-from shipid.measures.rows import criterion_rows, measure_rows
 from shipid.physics.signals import ACTUAL, is_steering, neutral_value, signal_of
-from shipid.report.manoeuvre import ManoeuvreContent
+from shipid.report.motion import ManoeuvreContent
 from shipid.simulation.approach import Controls, NotStraight
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.standard import Standard, define_standard

@@ -49,7 +49,7 @@ def perform_manoeuvres(
     duration : length of every log [s]; default: that of each manoeuvre.
     environment : name (`V_w` [m/s], `beta_w` [rad, towards]) -> one value for all runs, (num_manoeuvres,), or a series
         (num_instants, num_manoeuvres) at t = 0, step, 2 step, ... to the end of the longest log; default 0.
-    components : wave components for each manoeuvre, from `shipid.simulation.sea.wave_loads`; default: calm water.
+    components : wave components for each manoeuvre, from `shipid.simulation.weather.wave_loads`; default: calm water.
     outputs : of the vessel's components, such as `propeller.thrust`, that are logged too.
 
     Returns
@@ -152,31 +152,19 @@ def _perform_batch(
     rows : of the longest log. environment, seas : series of the channels, and wave components, of these manoeuvres.
     """
     vessel, num_steps, manoeuvres = controls.vessel, every * (rows - 1), list(named.values())
-    model, t = vessel_dynamics(vessel, helmsman), np.arange(num_steps) * how["step"]
-    start, memory, helms = _initial_states(manoeuvres, controls, how)
-    inputs = [one.inputs(controls, t, speed) for one, speed in zip(manoeuvres, start["u"], strict=True)]
-    for sample, helm in helms.items():
-        one = manoeuvres[sample]
-        assert isinstance(one, ApproachedManoeuvre)
-        inputs[sample] = one.held(inputs[sample], t, helm)
-    commands = {name: np.stack([one[name] for one in inputs], axis=1) for name in inputs[0]}
-    if helmsman is None:
-        ready = [sample for sample, one in enumerate(manoeuvres) if one.start.at_order]
-        for name, values in memory.items():
-            values[ready] = commands[name][0, ready]
+    model = vessel_dynamics(vessel, helmsman)
     weather = {name: values[: num_steps + 1] for name, values in environment.items()}
+    commands, begun = rollout_inputs(controls, helmsman, manoeuvres, num_steps, how)
     constant = all((values == values[0]).all() for values in commands.values())  # which is faster in the engines
     path = rollout(
         vessel,
-        start,
-        {name: values[0] for name, values in commands.items()} if constant else commands,
-        {name: values[0] if len(values) == 1 else values[:-1] for name, values in weather.items()},
+        commands={name: values[0] for name, values in commands.items()} if constant else commands,
+        environment={name: values[0] if len(values) == 1 else values[:-1] for name, values in weather.items()},
         num_steps=num_steps,
         every=every,
-        memory=memory,
-        helmsman=helmsman,
         components=seas,
         keep=None if helmsman else (*model.state, *(f"{ACTUAL}{name}" for name in model.memory)),
+        **begun,
         **how,
     )
     if path.diverged.any():
@@ -198,6 +186,29 @@ def _perform_batch(
     lagged = (name for name in model.memory if not name.startswith(f"{HELM}."))
     log |= {f"{ACTUAL}{name}": path[f"{ACTUAL}{name}"][:, 0] for name in lagged}
     return log | {name: felt[name] for name in measurable_signals(felt)}
+
+
+def rollout_inputs(
+    controls: Controls,
+    helmsman: Helmsman | None,
+    manoeuvres: Sequence[Manoeuvre],
+    num_steps: int,
+    how: Mapping[str, Any],
+) -> tuple[dict[str, Array], dict[str, Any]]:
+    """Commands (num_steps, num_manoeuvres) by name; start, actuator states and helmsman as arguments of `rollout`."""
+    t = np.arange(num_steps) * how["step"]
+    start, memory, helms = _initial_states(manoeuvres, controls, how)
+    inputs = [one.inputs(controls, t, speed) for one, speed in zip(manoeuvres, start["u"], strict=True)]
+    for sample, helm in helms.items():
+        one = manoeuvres[sample]
+        assert isinstance(one, ApproachedManoeuvre)
+        inputs[sample] = one.held(inputs[sample], t, helm)
+    commands = {name: np.stack([one[name] for one in inputs], axis=1) for name in inputs[0]}
+    if helmsman is None:
+        ready = [sample for sample, one in enumerate(manoeuvres) if one.start.at_order]
+        for name, values in memory.items():
+            values[ready] = commands[name][0, ready]
+    return commands, {"start": start, "memory": memory, "helmsman": helmsman}
 
 
 def _environment_series(

@@ -1,40 +1,156 @@
-"""Simulated truth of a study: random manoeuvres, weather and sea, simulated and logged like a sea trial."""
+"""Simulated runs, logged like a sea trial: the truth of a study, drawn at random, and a document of manoeuvres."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Annotated, Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
 import pandas as pd
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
+from shipid import document as documents
 from shipid.arguments import check_class, whole_steps
-from shipid.checked import CheckedModel
+from shipid.capacity import excess_memory_words
+from shipid.checked import CheckedModel, NotNegative, Positive
+from shipid.document import requirement_words, taken_for_numbers
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, ShipidError, suggest_name
-from shipid.physics.signals import ACTUAL, is_output, measurable_signals
-from shipid.simulation import gusts
+from shipid.physics.signals import ACTUAL, is_output, is_wrapped_angle, measurable_signals
 from shipid.simulation.approach import Controls
-from shipid.simulation.draw import ManoeuvreDraw, range_limits
-from shipid.simulation.gusts import Gusts
 from shipid.simulation.log import state_column
-from shipid.simulation.manoeuvre import Manoeuvre, order_keys, order_unit
+from shipid.simulation.manoeuvre import KINDS, Manoeuvre, order_keys, order_unit
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.sea import Sea, draw_components, share_outside, wave_loads, wave_table_range
-from shipid.simulation.sensors import Sensor, measure_record
+from shipid.simulation.weather import (
+    Gusts,
+    Sea,
+    draw_components,
+    gust_series,
+    share_outside,
+    wave_loads,
+    wave_table_range,
+)
 from shipid.units import DEGREE, percent_text
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import check_rising, uniform_draw
 
+At = Callable[[str], float]
+"""Name of a quantity -> where in its range it lies, in [0, 1)."""
+
+SHARED = ("name", "duration")  # keys of a kind that [truth] sets for all runs
+SEEDS = 2**31  # number of different seeds that may be drawn
+COURSE = "course_deg"
 Array = np.ndarray
-NotNegative = Annotated[
-    tuple[Annotated[FiniteFloat, Field(ge=0)], Annotated[FiniteFloat, Field(ge=0)]], AfterValidator(check_rising)
-]
+SpeedRange = Annotated[tuple[NotNegative, NotNegative], AfterValidator(check_rising)]
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
 LONGEST = 1e6  # s of a run: a longer one is a slip of unit or exponent
+SAME = 1e-6  # of a step of the record: two instants closer than this are equal
+
+
+class ManoeuvreDraw(CheckedModel, BaseModel):
+    """`[[truth.manoeuvre]]`: a kind of manoeuvre, its share of the runs, and the keys of the kind.
+
+    A number is a fixed value. A pair [low, high] in place of a number is a range; each run draws from it uniformly.
+    From a list of texts each run draws one with equal probability. `course_deg` and `seed` are drawn if absent. In
+    kinds with `orders`, every other key is an order to commands: `n_rpm`, `alpha_deg`, `bow.n_rpm`.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    kind: str = "turning"
+    share: Annotated[FiniteFloat, Field(gt=0, description="weight among all blocks")] = 1.0
+
+    @model_validator(mode="after")
+    def _fits(self) -> ManoeuvreDraw:
+        if self.kind not in KINDS:
+            raise ValueError(f"{self.kind!r} is no kind of manoeuvre: {suggest_name(self.kind, KINDS)}")
+        for place in (0.0, 1.0):  # valid at both ends of every range: valid between them
+            self.manoeuvre(1.0, lambda _, place=place: place)  # type: ignore[misc]
+        return self
+
+    def manoeuvre(self, duration: float, at: At) -> Manoeuvre:
+        """Return the manoeuvre of one run.
+
+        duration : length of the log [s].
+        at : quantity -> position in its range, in [0, 1). A quantity is a key without its unit (`n`, `angle`), or `psi`
+            for the course.
+
+        Raises
+        ------
+        ValueError : a key that the kind does not have, or an invalid value.
+        """
+        kind = KINDS[self.kind]
+        fields = {name: field.annotation for name, field in kind.model_fields.items() if name not in SHARED}
+        given: dict[str, Any] = {}
+        orders: dict[str, Any] = {}
+        level = get_args(fields["orders"])[1] if "orders" in fields else None
+        for key, value in _flatten_keys(self.model_extra or {}):
+            if key in fields and key != "orders":
+                given[key] = value if is_collection_type(fields[key]) else _draw_value(key, value, at)
+            elif level is not None and key not in SHARED:
+                orders[key] = range_limits(key, value) if is_collection_type(level) else _draw_value(key, value, at)
+            else:
+                remedy = "[truth] gives it for all runs" if key in SHARED else suggest_name(key, fields)
+                raise ValueError(f"{key}: no key of {self.kind}: {remedy}")
+        if level is not None:
+            given["orders"] = orders
+        if "seed" in fields:
+            given.setdefault("seed", int(at("seed") * SEEDS))
+        if "duration" in kind.model_fields:
+            given["duration"] = duration
+        given.setdefault(COURSE, 360.0 * at("psi"))
+        try:
+            manoeuvre: Manoeuvre = kind.__pydantic_validator__.validate_python(given)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            key = ".".join(str(part) for part in first["loc"] if part != "orders")
+            raise ValueError(f"{key or self.kind}: {requirement_words(first)}") from None
+        for key, value in taken_for_numbers(given, manoeuvre):
+            raise ValueError(f"{key}: {value!r}: must be a number")
+        return manoeuvre
+
+
+def _flatten_keys(given: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Pairs of key and value; a key in a table becomes `table.key`, because `bow.n_rpm = 0` is a table in TOML."""
+    return [
+        (f"{key}.{inner}" if inner else key, one)
+        for key, value in given.items()
+        for inner, one in (value.items() if isinstance(value, Mapping) else [("", value)])
+    ]
+
+
+def is_collection_type(annotation: Any) -> bool:
+    """Whether the type of a field is a tuple, list or table, so that a list is its value and not a range."""
+    if get_origin(annotation) is Annotated:
+        return is_collection_type(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        return any(map(is_collection_type, get_args(annotation)))
+    return get_origin(annotation) in (tuple, list, dict)
+
+
+def _draw_value(key: str, value: Any, at: At) -> Any:
+    """The value itself, a number from the range [low, high], or one of several texts."""
+    if not isinstance(value, list | tuple):
+        return value
+    if value and all(isinstance(one, str) for one in value):
+        return value[min(int(at(key) * len(value)), len(value) - 1)]
+    low, high = range_limits(key, value)
+    quantity = "psi" if key == COURSE else key.removesuffix("_rpm").removesuffix("_deg")
+    return low + (high - low) * at(quantity)
+
+
+def range_limits(key: str, value: Any) -> tuple[float, float]:
+    """(low, high) of a pair; (x, x) of a number x; ValueError for anything else."""
+    pair = value if isinstance(value, list | tuple) else [value, value]
+    if len(pair) != 2 or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in pair):
+        raise ValueError(f"{key}: give a number or [low, high], not {value!r}")
+    low, high = pair
+    if low > high:
+        raise ValueError(f"{key} has low > high: give [low, high], not [{low:g}, {high:g}]")
+    return low, high
 
 
 class Truth(CheckedModel, BaseModel):
@@ -54,10 +170,10 @@ class Truth(CheckedModel, BaseModel):
     method: Method = "rk4"
     interval: Annotated[FiniteFloat, Field(gt=0, description="s between logged rows")] = 1.0
     seed: int = 0
-    wind_speed: NotNegative = (0.0, 6.0)
+    wind_speed: SpeedRange = (0.0, 6.0)
     gusts: Gusts | None = None
     waves: Sea | None = None
-    current_speed: Annotated[NotNegative, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
+    current_speed: Annotated[SpeedRange, Field(description="m/s, for a vessel with a [current] block")] = (0.0, 0.0)
     environment: dict[str, FiniteFloat | tuple[FiniteFloat, FiniteFloat]] = Field(
         default={},
         description="other signals of the environment: signal with its unit -> value or [low, high]",
@@ -177,7 +293,7 @@ def simulate_truth(truth: Truth, vessel: Vessel) -> pd.DataFrame:
     if truth.gusts is not None and "V_w" in environment:
         instants = np.arange(whole_steps(truth.length, truth.step) + 1, dtype=float)
         mean = environment["V_w"]
-        environment["V_w"] = mean + gusts.gust_series(truth.gusts, mean, truth.step * instants, keys)
+        environment["V_w"] = mean + gust_series(truth.gusts, mean, truth.step * instants, keys)
     try:
         frame = perform_manoeuvres(
             vessel,
@@ -227,3 +343,134 @@ def _draw_weather(truth: Truth, vessel: Vessel) -> tuple[dict[str, Array], Array
         "beta_c": between("beta_c", around, DEGREE),
     }
     return {name: weather[name] for name in vessel_dynamics(vessel).environment}, between("chi", around, DEGREE)
+
+
+class Script(BaseModel):
+    """Given manoeuvres: blocks with a `kind` and the keys of the kind, a run each; times in s."""
+
+    model_config = ConfigDict(extra="forbid")
+    manoeuvre: Annotated[list[dict[str, Any]], Field(min_length=1)]
+    step: Annotated[Positive, Field(description="s, of the integration")] = 0.05
+    interval: Annotated[Positive, Field(description="s between logged rows, a multiple of step")] = 1.0
+
+
+def simulate_script(vessel: Vessel, name: str) -> pd.DataFrame:
+    """Simulate a vessel by the manoeuvres of a document; the columns are those of a dataset.
+
+    name : path of a TOML document. Its `[[manoeuvre]]` blocks are performed in calm water.
+
+    Raises DocumentError with file, path and remedy for what this vessel cannot perform.
+    """
+    file = documents.find_document(name, "studies")
+    document = documents.read_document(file)
+    try:
+        if "truth" in document:
+            raise DocumentError("is a study: simulate it by its name, with --set truth.vessel=...")
+        script = documents.parse_model(Script, document, file)
+        manoeuvres = _script_manoeuvres(script, vessel)
+        length = max(one.length for one in manoeuvres)
+        if length > LONGEST:
+            raise DocumentError(f"a run of {length:g} s: at most {LONGEST:g} s, make it shorter", path="manoeuvre")
+        instants = len(manoeuvres) * length / script.step
+        if fault := excess_memory_words(instants * 2 * len(vessel_dynamics(vessel).commands)):
+            raise DocumentError(f"{len(manoeuvres)} runs in steps of {script.step:g} s {fault}", path="step")
+        frame = perform_manoeuvres(vessel, manoeuvres, step=script.step, interval=script.interval)
+    except ShipidError as error:
+        raise DocumentError(error.message, file=file, path=error.path) from None
+    return frame.drop(columns=[column for column in frame if str(column).startswith(ACTUAL)])
+
+
+def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
+    """The manoeuvres of a document, which this vessel can perform."""
+    controls, manoeuvres = Controls(vessel), []
+    for place, block in enumerate(script.manoeuvre):
+        kind, where = str(block.get("kind", "")), f"manoeuvre.{place}"
+        if kind not in KINDS:
+            raise DocumentError(f"{kind!r} is no kind of manoeuvre: {suggest_name(kind, KINDS)}", path=f"{where}.kind")
+        rest = {key: value for key, value in block.items() if key != "kind"}
+        one: Manoeuvre = documents.parse_model(KINDS[kind], rest, None, where)
+        try:
+            one.check(controls)
+        except DocumentError as error:
+            raise DocumentError(error.message, path=path_in_block(error.path, where)) from None
+        manoeuvres.append(one)
+    return manoeuvres
+
+
+class Sensor(CheckedModel, BaseModel):
+    """One sensor of a `sensors` table: column -> block, in the SI unit of the column."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    noise: Annotated[NotNegative, Field(description="standard deviation of the white noise on each sample")] = 0.0
+    bias: Annotated[
+        NotNegative, Field(description="standard deviation over runs of an offset that is constant in a run")
+    ] = 0.0
+    latency: Annotated[NotNegative, Field(description="s by which a sample is old when it is taken")] = 0.0
+    interval: Annotated[Positive | None, Field(description="s between samples; absent: one per logged row")] = None
+    quantum: Annotated[NotNegative, Field(description="samples are rounded to its multiples; 0: not rounded")] = 0.0
+
+
+def measure_record(fine: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int) -> pd.DataFrame:
+    """Measured log of a true record: a frame with the columns of `fine` and a row every `interval` [s] of each run.
+
+    A sample is the true value at the time minus `latency` (linear between rows; the first value before the start), plus
+    bias and noise, rounded to `quantum`. Samples are taken every `Sensor.interval` from the first row on and held until
+    the next. Bias and noise are normal, drawn by hash(seed, run, column). A column without a sensor is copied.
+
+    fine : columns `run`, `t` [s] and others (SI), `t` in equal steps within each run.
+
+    DocumentError where `interval` is no multiple of the record's step.
+    """
+    logs = [_measure_run(str(run), rows, sensors, interval, seed) for run, rows in fine.groupby("run", sort=False)]
+    return pd.concat(logs, ignore_index=True)
+
+
+def _measure_run(
+    run: str, rows: pd.DataFrame, sensors: Mapping[str, Sensor], interval: float, seed: int
+) -> pd.DataFrame:
+    """Measured log of one run."""
+    step = float(rows["t"].iloc[-1] - rows["t"].iloc[0]) / (len(rows) - 1)
+    stride = whole_steps(interval, step)
+    if not stride:
+        raise DocumentError(
+            f"{interval:g} s between logged rows must be a multiple of the record's step, {step:g} s", path="interval"
+        )
+    log = rows.iloc[::stride].copy()
+    for name, sensor in sensors.items():
+        truth = rows[name].to_numpy(dtype=np.float64)
+        truth = np.unwrap(truth) if is_wrapped_angle(name) else truth
+        log[name] = _sensor_samples(sensor, truth, step, stride, (seed, run, name))
+    return log
+
+
+def _sensor_samples(sensor: Sensor, truth: Array, step: float, stride: int, key: tuple[Any, ...]) -> Array:
+    """Output of a sensor at every `stride`-th row of the true values (N,), which are `step` [s] apart."""
+    logged = np.arange(0, len(truth), stride)  # all clocks below count rows of the record from the run's first
+    period = stride if sensor.interval is None else sensor.interval / step
+    latest = np.floor(logged / period + SAME)  # number of the last sample taken by each logged row
+    taken, which = np.unique(latest, return_inverse=True)  # samples between logged rows are not needed
+    values = (
+        _value_at_row(truth, taken * period - sensor.latency / step)
+        + sensor.bias * _normal_draws(1, *key, "bias")
+        + sensor.noise * _normal_draws(len(taken), *key, "noise")
+    )
+    if sensor.quantum > 0:
+        values = sensor.quantum * np.rint(values / sensor.quantum)
+    return np.asarray(values[which])
+
+
+def _value_at_row(truth: Array, place: Array) -> Array:
+    """Values (N,) at fractional row numbers: linear between rows, constant before the first, exact at a row."""
+    nearest = np.rint(place)
+    place = np.where(np.abs(place - nearest) < SAME, nearest, place)
+    return np.asarray(np.interp(place, np.arange(len(truth)), truth))
+
+
+def _normal_draws(count: int, *key: Any) -> Array:
+    """Standard normal draws (count,) that depend only on the key; a longer series begins with the shorter one.
+
+    Box-Muller transform of PCG64's raw output: NumPy guarantees the raw output for all versions, but not its normals.
+    """
+    raw = np.random.PCG64(int(uniform_draw(*key) * 2**53)).random_raw(2 * count).reshape(count, 2)
+    first, second = ((raw >> np.uint64(11)) / 2.0**53).T
+    return np.asarray(np.sqrt(-2 * np.log1p(-first)) * np.cos(2 * np.pi * second))

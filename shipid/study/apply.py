@@ -25,10 +25,12 @@ from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adapt
 from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
+from shipid.metrics import summarise_errors
 from shipid.observer import run_observer
 from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
+from shipid.units import length_text, plural_word
 
 Array = np.ndarray
 COOPERATIVE_COLUMNS = ("cooperative_north", "cooperative_east")
@@ -83,7 +85,8 @@ def predict_log(
     with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
     the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
     training's limits. Cells without physics have NaN for physics. `attrs["gaps"]` of the frame says how many times
-    without rows the log has, and the longest; `attrs["coarse"]` that its rows are farther apart than the step.
+    without rows the log has, and the longest; `attrs["coarse"]` that its rows are farther apart than the step;
+    `attrs["errors"]` how far off the paths are that end before the log does.
     """
     check_table(out)
     predictor = read_predictor(_find_cell_file(folder, cell))
@@ -100,8 +103,10 @@ def predict_log(
         needed = f"{steps * predictor.physics.step:g} s"
         raise DataError(f"no run has {needed} for the past and, where commands are known, the horizon", file=log)
     frame = pd.concat(parts, ignore_index=True)
+    errors = frame.pop("error").to_numpy().reshape(-1, predictor.physics.horizon).T
     write_table(out, frame)
     step = predictor.physics.step
+    frame.attrs["errors"] = _errors_in_words(errors[:, np.isfinite(errors).all(axis=0)], step)
     frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step)}
     return frame, float(frame["outside"].mean())
 
@@ -109,16 +114,28 @@ def predict_log(
 def table_of_stretch(
     predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, band: BandSettings | None = None
 ) -> pd.DataFrame:
-    """The table of `predict_log` for one unbroken stretch; empty where no row has the past and the plan it needs."""
+    """The table of `predict_log` for one stretch, and `error` [m]; empty where no row has the past and plan needed."""
     some = _usable_rows(predictor, rows["t"].to_numpy())
     if some.start >= some.stop:
         return pd.DataFrame()
     forecast = predict_instants(predictor, instants_along(predictor, dataset, rows, some, plan=True), band)
     points, instants = tables_along(predictor, run, rows, forecast, band)
-    points = points.drop(columns="error").rename(columns=dict(zip(("north", "east"), COOPERATIVE_COLUMNS, strict=True)))
+    points = points.rename(columns=dict(zip(("north", "east"), COOPERATIVE_COLUMNS, strict=True)))
     if band is not None and band.rate is not None:
         points["band_factor"] = np.repeat(instants["factor"].to_numpy(), predictor.physics.horizon)
     return points.assign(outside=np.repeat(forecast.outside, predictor.physics.horizon))
+
+
+def _errors_in_words(error: Array, step: float) -> str:
+    """How far off (T, S) [m] predictions are whose whole path the log holds; empty without one."""
+    if not error.size:
+        return ""
+    known, count = summarise_errors(error), error.shape[1]
+    end, end_90, mean = (length_text(value) for value in (known["end"], known["end_90"], known["mean"]))
+    return (
+        f"{len(error) * step:g} s ahead predictions err by {end} m on average, nine in ten below {end_90} m; mean over "
+        f"the horizon {mean} m ({count} {plural_word(count, 'path')} that the log holds whole)"
+    )
 
 
 def read_or_import(log: Path, mapping: str | None) -> Dataset:

@@ -1,26 +1,31 @@
-"""From methods to cells: what a method is fitted to, what bands rest on, and the errors of a predictor on the test."""
+"""From foundations and methods to cells: what is fitted to what, and the errors of a predictor on the test."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, NamedTuple
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
-from shipid.errors import DataError, shorten_line
+from shipid.errors import DataError, ShipidError, shorten_line
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
-from shipid.metrics import coverage_share, position_error, summarise_errors, vector_lengths
+from shipid.metrics import PREDICTION_ERRORS, coverage_share, position_error, summarise_errors, vector_lengths
+from shipid.observer import Estimates
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, StudyMethod
-from shipid.study.foundations import FoundationPrediction, predictions
 from shipid.study.plan import Batch, Unit
 from shipid.study.prepare import (
     PreparedStudy,
     at_instants,
+    chosen_observer,
+    estimates_of,
     instants_of,
+    paths_of,
     physics_of,
     rows_apart_from_test,
     rows_outside_test,
@@ -30,7 +35,11 @@ from shipid.study.store import Cell
 from shipid.units import percent_text
 from shipid.version import __version__
 
-NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms"), np.nan)  # of no physics
+if TYPE_CHECKING:
+    from shipid.identification.solve import Solution
+
+
+NO_ACCURACY = dict.fromkeys(("A", "A_90", "A_rms", "A_end", "A_end_90"), np.nan)  # of no physics
 Errors = dict[tuple[str, str], tuple[Array, float]]
 
 
@@ -193,14 +202,15 @@ def evaluate_cell(
 
 
 def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
-    """A, A_90, A_rms [m] of the paths (T, S, 2) of the physics alone on the test windows."""
+    """A, A_90, A_rms, A_end, A_end_90 [m] of the paths (T, S, 2) of the physics alone on the test windows."""
     known: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
-    return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"]}
+    ends = {"A_end": known["end"], "A_end_90": known["end_90"]}
+    return {"A": known["mean"], "A_90": known["p90"], "A_rms": known["rms"], **ends}
 
 
 def _failed_columns(status: str, sentence: str) -> dict[str, Any]:
     """The columns of a row without a result."""
-    blank = dict.fromkeys(("H", "H_90", "rms", "coverage", "width"), np.nan)
+    blank = dict.fromkeys((*PREDICTION_ERRORS, "rms", "coverage", "width"), np.nan)
     return {**blank, "status": status, "sentence": sentence, "hyperparameters": ""}
 
 
@@ -224,8 +234,9 @@ def _test_errors(
         return _failed_columns(
             "diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"
         ), None
-    error = summarise_errors(position_error(paths, test.future))
-    outcome = {"H": error["mean"], "H_90": error["p90"], "rms": error["rms"], "coverage": np.nan, "width": np.nan}
+    error: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
+    outcome = {column: error[name] for column, name in PREDICTION_ERRORS.items()}
+    outcome |= {"rms": error["rms"], "coverage": np.nan, "width": np.nan}
     level = study.bands.level
     if predictor.bands is not None and predictor.bands.promises(level):
         region = predictor.band(paths, instants, level)
@@ -249,3 +260,91 @@ def _predictor(
         run_up=windows.num_past * windows.step if foundation.observer is not None else 0.0,
         provenance={**origin, **named, "runs": list(windows.spans), "shipid": __version__},
     )
+
+
+@dataclass(frozen=True)
+class FoundationPrediction:
+    """What a foundation of one batch predicts before any method improves it.
+
+    foundation : with the numbers that were identified and the observer that was chosen, if any.
+    paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
+    sentence : the message of the identification; empty where nothing was identified. seconds : core-seconds that
+        identification and choice took.
+    estimates : what the observer knows at every row of the runs; None without one.
+    """
+
+    foundation: Foundation
+    paths: Array
+    test_paths: Array
+    sentence: str = ""
+    seconds: float = 0.0
+    estimates: Estimates | None = None
+
+
+def predictions(
+    prepared: PreparedStudy, runs: tuple[str, ...], device: str, wanted: Collection[str] | None = None
+) -> dict[str, FoundationPrediction]:
+    """Every foundation for some runs of the pool; those to be fitted see these runs, and no moment of the test.
+
+    wanted : names of foundations; None: all.
+    """
+    mask = np.isin(prepared.pool.run, runs)
+    windows = prepared.pool.select(mask)
+    result = {}
+    data: Dataset | None = None
+    known: dict[Any, Solution] = {}
+    for one in prepared.foundations:
+        if wanted is not None and one.name not in wanted:
+            continue
+        if not one.fitted:
+            paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
+            result[one.name] = FoundationPrediction(one, *paths, estimates=prepared.estimates.get(one.name))
+        else:
+            data = rows_apart_from_test(prepared.data, prepared.test) if data is None else data
+            result[one.name] = _fit_foundation(prepared, one, runs, data, windows, device, known)
+    return result
+
+
+def _fit_foundation(
+    prepared: PreparedStudy,
+    foundation: Foundation,
+    runs: tuple[str, ...],
+    data: Dataset,
+    windows: Windows,
+    device: str,
+    known: dict[Any, Solution],
+) -> FoundationPrediction:
+    """One foundation fitted to the runs; `known` keeps solutions for foundations that differ in the observer alone.
+
+    Where that fails, its paths are no numbers, and the sentence says why.
+    """
+    study = prepared.study
+    now, sentence, seconds, estimates = foundation, "", 0.0, None
+    try:
+        variant, vessel = foundation.variant, foundation.vessel
+        if foundation.identify is not None and variant is not None and vessel is not None:
+            from shipid.identification.solve import identify  # SciPy's statistics: a quarter of what workers import
+
+            key = variant.name, foundation.identify.model_dump_json()
+            if key not in known:
+                known[key] = identify(vessel, data, runs, foundation.identify)
+            if known[key].status != "ok":
+                raise ShipidError(known[key].sentence)
+            values: Mapping[str, float] = {**variant.values, **known[key].values}
+            now = replace(foundation, variant=replace(variant, values=values))
+            sentence, seconds = known[key].sentence, known[key].seconds
+        if now.observer is not None:
+            begun = time.thread_time()
+            if now.observer.choose:
+                now = replace(now, observer=chosen_observer(study, now, data.select(runs), windows))
+                seconds += time.thread_time() - begun
+            calls = sum(one.observer is not None for one in prepared.foundations)
+            estimates = estimates_of(study, now, prepared.data, prepared.test, calls)
+        pair = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
+        if not np.isfinite(pair[0]).all():
+            raise ShipidError("the model diverges on training windows")
+    except ShipidError as error:
+        words = "identification" if foundation.identify is not None else "observer"
+        here, there = (np.full_like(part.future, np.nan) for part in (windows, prepared.test))
+        return FoundationPrediction(foundation, here, there, f"{words}: {error.message}")
+    return FoundationPrediction(now, *pair, sentence, seconds, estimates)

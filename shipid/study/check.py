@@ -1,16 +1,20 @@
-"""Faults of a folder of results, for `shipid study check`."""
+"""How far a folder of results is, also while others write it, and its faults, for `shipid study check`."""
 
 from __future__ import annotations
 
+import json
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 from shipid.study import seals, store
 from shipid.study.lock import has_writer
-from shipid.study.plan import Plan
+from shipid.study.plan import WITH, Plan
 from shipid.study.seals import Fault
 from shipid.units import plural_word
+
+BEGUN, COUNTED, TRIED = 0, 2, 4  # entries of Optuna's journal: a study, an attribute of it, a trial that ended
 
 
 @dataclass(frozen=True)
@@ -57,3 +61,32 @@ def _state(folder: Path, plan: Plan, faults: list[Fault], name: str = "") -> lis
     for before, after in pairwise(store.provenance(folder).get("sessions", [])):
         lines.append(f"{name}computed in parts: {'; '.join(store.differences(before, after))}")
     return lines
+
+
+def search_words(plan: Plan, folder: Path) -> str:
+    """Cell and trial of the search of a run, or of its parts, that was written to last; empty where there is none."""
+    places = [store.part_folder(folder, name) for name in plan.parts] or [folder]
+    journals = [
+        file
+        for place in places
+        for file in (place / store.JOURNALS).glob("*.log")
+        if not seals.is_sealed(place, file.stem)
+    ]
+    with suppress(OSError, ValueError, KeyError, IndexError, TypeError):  # taken away, damaged, or there is none
+        return _words_of_journal(plan, max(journals, key=lambda file: file.stat().st_mtime))
+    return ""
+
+
+def _words_of_journal(plan: Plan, file: Path) -> str:
+    *whole, _ = file.read_bytes().split(b"\n")  # the last line may be half written
+    entries = [json.loads(line) for line in whole]
+    tried = [entry["study_id"] for entry in entries if entry["op_code"] == TRIED]
+    cell = [entry["study_name"] for entry in entries if entry["op_code"] == BEGUN][tried[-1]]
+    planned = [way.method.num_trials() for way in plan.methods if f"{WITH}{way.name}-N" in cell]
+    noted = [
+        entry["user_attr"]["trials"]  # of a budget
+        for entry in entries
+        if entry["op_code"] == COUNTED and entry["study_id"] == tried[-1] and "trials" in entry["user_attr"]
+    ]
+    counts = [f"/{count}" for count in (*planned, *noted) if count]
+    return f"{cell}: trial {tried.count(tried[-1])}{''.join(counts[-1:])}"

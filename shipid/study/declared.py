@@ -15,7 +15,7 @@ from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
 from shipid.study.schema import PAIRED_ROLES, Study
 from shipid.vessel.load import Vessel, load_vessel
-from shipid.vessel.perturb import Family, Variant, draw_members, resolve_families
+from shipid.vessel.perturb import Family, Variant, change_structure, draw_members, resolve_families
 
 NO_MODEL = "none"
 NO_METHOD = "alone"  # of the rows of A in comparisons of runs, whose N_D is 0: no data improve it
@@ -88,7 +88,7 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
         assert family.base is not None  # written out by resolve
         if family.name.lower() == NO_MODEL:
             raise DocumentError("this name is taken by the foundation without physics", path=f"family.{index}.name")
-        vessel = named_vessel(family.base, file, f"family.{index}.base", known)
+        vessel = change_structure(family, named_vessel(family.base, file, f"family.{index}.base", known))
         parent = families[_root(study.family, index)]
         identify = None if family.identify is None else _identify(study, family, index, vessel)
         observer = None if family.observer is None else _observer(study, family, index, vessel)

@@ -24,10 +24,9 @@ from shipid.physics.signals import SIGNALS, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
-from shipid.study.first_look import Look, first_look
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import obtain_runs, partition, prepare
-from shipid.study.survey import Survey, separation_of_sources, survey_dataset, typical_runs
+from shipid.study.survey import Look, Survey, first_look, separation_of_sources, survey_dataset, typical_runs
 from shipid.units import GRAVITY, RPM, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
@@ -99,6 +98,16 @@ def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     for vessel in loaded.values():
         check_columns(vessel, dataset.frame.columns, str(data))
     return _recorded_study(loaded, dataset, data, out)
+
+
+def draft_families(vessel: str, members: int, out: Path) -> str:
+    """A document of families of a vessel as TOML, to be written to `out`; each that is drawn has so many members."""
+    blocks = [
+        {key: members if key == "members" else value for key, value in block.items() if key != "base"}
+        for block in _degraded_families("", load_vessel(vessel))
+    ]
+    words = f"Written by `shipid family new`. `shipid family show {out}` shows what is drawn."
+    return _comment([words]) + tomlkit.dumps({"vessel": _vessel_key(vessel, out), "family": blocks})
 
 
 def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -> tuple[float, str]:

@@ -24,9 +24,9 @@ from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.files import quote_argument
 from shipid.logs.importing import file_digest, log_digest
 from shipid.logs.mapping import read_mapping
+from shipid.simulation.families import expand_families
 from shipid.simulation.manoeuvre import KINDS
-from shipid.simulation.truth import Truth, check_truth, truth_vessel
-from shipid.study.code import users_code
+from shipid.simulation.truth import LONGEST, Truth, check_truth, truth_vessel
 from shipid.study.declared import (
     NO_MODEL,
     Foundation,
@@ -37,9 +37,8 @@ from shipid.study.declared import (
     methods_of,
     named_vessel,
 )
-from shipid.study.ranges import check_ranges
 from shipid.study.schema import Data, Study
-from shipid.users import is_user_code
+from shipid.users import is_user_code, users_code
 from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, resolve_families
 from shipid.vessel.schema import equation_functions
@@ -259,11 +258,6 @@ def grid_seeds(plan: Plan) -> tuple[int, ...]:
     return tuple(sorted(set(plan.study.grid.seeds)))
 
 
-def whole_unit(plan: Plan, batch: Batch) -> Unit:
-    """All cells of a batch as one unit."""
-    return Unit(batch, tuple((name, way.name) for name, way in plan.pairs), batch.key)
-
-
 def verdict_method(plan: Plan) -> str:
     """Name of the method that findings and the answer speak of."""
     named = plan.study.claims.method if plan.study.claims else None
@@ -337,9 +331,9 @@ def read_plan(name: str | Path, changes: Mapping[str, Any] | None = None) -> Pla
     """
     check_mapping("changes", changes or {}, "a dotted path to a value", DocumentError)
     file = documents.find_document(str(name), "studies")
-    document = documents.read_document(file)
+    document = expand_families(documents.read_document(file), file)  # so that changes reach them
     try:
-        document = _changed_document(document, changes or {}, "", Study.model_fields)
+        document = expand_families(_changed_document(document, changes or {}, "", Study.model_fields), file)
     except DocumentError as error:
         raise DocumentError(f"--set: {error.message}", file=file, path=error.path) from None
     return build_plan(document, file, changes=changes)
@@ -513,3 +507,48 @@ def _check_memory(truth: Truth, vessel: Vessel) -> None:
         if fault := excess_memory_words(truth.manoeuvres * truth.length / between * columns):
             words = f"{between:g} s: {truth.manoeuvres} runs of {truth.length:g} s {fault}"
             raise DocumentError(words, path=f"truth.{path}")
+
+
+UNUSUAL_KEY = "unusual"
+"""Key of the list of dotted paths (* matches any characters) whose numbers may lie outside their range."""
+
+RANGES: dict[str, tuple[float, float, str]] = {
+    "truth.duration": (0.0, LONGEST, "s"),
+    "truth.run_up": (0.0, LONGEST, "s"),
+    "truth.step": (1e-4, 60.0, "s"),
+    "truth.interval": (1e-4, 3600.0, "s"),
+    "truth.wind_speed.*": (0.0, 100.0, "m/s"),
+    "truth.current_speed.*": (0.0, 20.0, "m/s"),
+    "truth.waves.H_s": (0.0, 30.0, "m"),
+    "truth.waves.T_p": (0.1, 60.0, "s"),
+    "truth.manoeuvre.*_deg*": (-360.0, 360.0, "deg"),
+    "truth.manoeuvre.*n_rpm*": (-1e5, 1e5, "rpm"),
+    "truth.manoeuvre.*start_speed*": (-60.0, 60.0, "m/s"),
+    "truth.manoeuvre.*_time": (0.0, LONGEST, "s"),
+    "prediction.ahead": (0.0, 1e5, "s"),
+    "prediction.step": (1e-3, 3600.0, "s"),
+    "prediction.interval": (1e-3, 1e5, "s"),
+    "prediction.past": (0.0, 1e5, "s"),
+    "family.*.perturb.*.factor*": (-100.0, 100.0, "a factor"),
+    "method.*.trials": (0, 1e5, "trials"),
+    "method.*.epochs": (0, 1e6, "epochs"),
+    "method.*.units": (0, 1e5, "units"),
+}
+"""Dotted path with * for any characters -> least, greatest, unit."""
+
+
+def check_ranges(document: Document) -> None:
+    """Raise DocumentError for a number of a study document outside `RANGES`, unless it is named in `unusual`."""
+    meant = document.get(UNUSUAL_KEY, [])
+    for path, value in documents.document_leaves(document):
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            continue
+        limits = next((row for pattern, row in RANGES.items() if documents.match_paths(pattern, [path])), None)
+        named = documents.path_with_names(document, path)
+        if limits is None or any(documents.match_paths(str(one), [path, named]) for one in meant):
+            continue
+        least, most, unit = limits
+        if not least <= value <= most:
+            message = f"{value:g}: expected {least:g} to {most:g} {unit}"
+            remedy = f'if it is meant, write {UNUSUAL_KEY} = ["{named}"] at the top of the study'
+            raise DocumentError(f"{message}; {remedy}", path=path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from shipid.capacity import excess_memory_words
 from shipid.data.causal import causal_columns
 from shipid.data.checks import copies_of_earlier_runs
-from shipid.data.dataset import Dataset, clock_slack, keep_rows, read_dataset, rows_outside_spans, stretches_of_runs
+from shipid.data.dataset import (
+    Dataset,
+    clock_slack,
+    keep_rows,
+    read_dataset,
+    rows_outside_spans,
+    stretches_by_run,
+    stretches_of_runs,
+)
 from shipid.data.held import warn_of_constant_commands
 from shipid.data.windows import (
     Instants,
@@ -38,12 +46,12 @@ from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
-from shipid.metrics import ErrorSummary, position_error, summarise_errors
+from shipid.logs.segments import run_kind
+from shipid.metrics import position_error
 from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
 from shipid.study.declared import Foundation
-from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Batch, Plan, mapping_of, past_steps, path_from_study
 from shipid.study.schema import Study
 from shipid.units import percent_text, plural_word
@@ -85,10 +93,6 @@ class PreparedStudy:
     def commands(self) -> tuple[str, ...]:
         """Command columns of the runs."""
         return tuple(self.data.commands)
-
-    def accuracy(self, foundation: str) -> ErrorSummary:
-        """Mean (A, method eq. 14), 90th percentile and RMS error [m] of the physics alone on the test windows."""
-        return summarise_errors(position_error(self.test_paths[foundation], self.test.future))
 
     @cached_property
     def naive(self) -> Array:
@@ -304,11 +308,7 @@ def _roll_out(
         again = []
         for foundation, paths, share in _one_round(study, dataset, parts, waiting, device, known):
             if share:
-                drawn = _redraw(foundation, families[foundation.family], share, plan.file)
-                assert drawn.variant is not None
-                words = f"{foundation.name} diverged on {percent_text(share, 1)} of the training windows"
-                notes.append(f"{words}: redrawn, counter {drawn.variant.counter}")
-                again.append(drawn)
+                again.append(_redraw(foundation, families[foundation.family], share, plan.file, notes))
             else:
                 finished[foundation.name] = (foundation, paths)
         waiting = again
@@ -461,8 +461,8 @@ def paths_of(
     return (np.full_like(pool[:, 0], np.nan), test[:, 0]) if pool_bad.any() else (pool[:, 0], test[:, 0])
 
 
-def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> Foundation:
-    """The member drawn again with the next counter; Diverges where nothing can be drawn, or no more."""
+def _redraw(foundation: Foundation, family: Family, share: float, file: str, notes: list[str]) -> Foundation:
+    """The member drawn again with the next counter, which is noted; Diverges where nothing can be drawn, or no more."""
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1
@@ -471,6 +471,8 @@ def _redraw(foundation: Foundation, family: Family, share: float, file: str) -> 
         words = f"{foundation.name} diverges on {percent_text(share, 1)} of the training windows{tries}"
         remedy = "take a smaller [prediction] step, rk4, or narrower factors"
         raise DivergenceError(f"{words}: {remedy}", path=f"family.{foundation.family}")
+    words = f"{foundation.name} diverged on {percent_text(share, 1)} of the training windows"
+    notes.append(f"{words}: redrawn, counter {counter}")
     return replace(foundation, variant=draw_variant(family, foundation.member, foundation.base, counter, file))
 
 
@@ -524,3 +526,21 @@ def foundation_record(foundation: Foundation) -> dict[str, Any]:
         row |= {"base": variant.base, "base_digest": variant.base_digest, "counter": variant.counter}
         row |= {"seed": variant.seed, "factors": dict(variant.factors), "values": dict(variant.values)}
     return row
+
+
+def kinds_of_runs(dataset: Dataset, runs: Container[str] | None = None) -> dict[str, str]:
+    """Run -> kind of manoeuvre: as the mapping says, else as the words in its name say, else by orders and motion.
+
+    runs : those wanted; all by default.
+    """
+    declared = dataset.metadata.get("manoeuvres", {})
+    return {
+        run: declared.get(run) or kind_in_name(run) or run_kind(longest_piece(parts))
+        for run, parts in stretches_by_run(dataset).items()
+        if runs is None or run in runs
+    }
+
+
+def longest_piece(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """The longest of the unbroken pieces of a run."""
+    return max(parts, key=lambda part: float(part["t"].iloc[-1] - part["t"].iloc[0]))

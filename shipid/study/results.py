@@ -19,12 +19,12 @@ from shipid.data.windows import Windows
 from shipid.errors import DataError, ResultError
 from shipid.files import read_arrays, read_json
 from shipid.hybrid.bands import Bands
-from shipid.metrics import error_by_axis, error_of_windows, position_error
+from shipid.metrics import error_by_axis, error_of_windows, position_error, summarise_errors
 from shipid.predictor import check_bands, read_bands
 from shipid.study import seals, store
 from shipid.study.declared import NO_MODEL
-from shipid.study.kinds import kinds_of_runs
 from shipid.study.plan import Plan, families_set_from, model_label, uncounted_families, verdict_method
+from shipid.study.prepare import kinds_of_runs
 
 MOST_KEPT = 1000  # predicted paths in memory, of about 1 MB each
 
@@ -127,7 +127,8 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
     """Read one row per finished cell of a run, without its predictors.
 
     Columns: cell, foundation, family, member, method, model (foundation, with the method where several learn), N_D,
-    runs, minutes [min], seed, status, sentence, A, A_90, A_rms, H, H_90, rms, width [m], coverage [1], seconds [s],
+    runs, minutes [min], seed, status, sentence, A_end, A_end_90, A, A_90, A_rms,
+    H_end, H_end_90, H, H_90, rms, width [m], coverage [1], seconds [s],
     trials (a list of dicts), and, of a study of several parts, condition and part. Raises ResultError where there is no
     finished cell, or a row is not as it was written.
     """
@@ -149,9 +150,24 @@ def read_cells(folder: str | os.PathLike[str]) -> pd.DataFrame:
 def _read_part_cells(folder: Path, plan: Plan) -> pd.DataFrame:
     """The rows of one run, with the name that figures give their models."""
     seals.check_seals(folder, "batches/")
-    cells = store.read_rows(folder, plan)
+    cells = _with_errors_at_horizon(folder, store.read_rows(folder, plan))
     labels = [model_label(plan, *pair) for pair in zip(cells["foundation"], cells["method"], strict=True)]
     return cells.assign(model=labels)
+
+
+def _with_errors_at_horizon(folder: Path, cells: pd.DataFrame) -> pd.DataFrame:
+    """The rows of cells; those of an earlier version get the errors at the horizon from the paths that it kept."""
+    without = cells[cells["status"].eq("ok") & cells["H_end"].isna()]
+    if without.empty:
+        return cells
+    test, physics, _ = store.read_test(folder)
+    for index, cell, foundation in without[["cell", "foundation"]].itertuples():
+        predicted = read_arrays(store.paths_file(folder, cell))["paths"]
+        for name, path in (("H", predicted), ("A", physics.get(foundation))):
+            if path is not None and np.isfinite(cells.loc[index, name]):
+                known = summarise_errors(position_error(path, test.future))
+                cells.loc[index, [f"{name}_end", f"{name}_end_90"]] = known["end"], known["end_90"]
+    return cells
 
 
 def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | None = None) -> Results:
@@ -204,7 +220,10 @@ def _read_models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows)
         frame[name] = frame[name].astype(float)
     diverged = {name: not np.isfinite(path).all() for name, path in physics.items()}
     frame["status"] = ["diverged" if diverged.get(name) else "ok" for name in frame["model"]]
-    known = {name: error_by_axis(path, test.future) for name, path in physics.items() if name != NO_MODEL}
-    for axis, column in enumerate(("A_along", "A_across")):
-        frame[column] = [known[name][axis] if name in known else np.nan for name in frame["model"]]
-    return frame
+    for name, path in physics.items():
+        mine = frame["model"].eq(name)
+        if name != NO_MODEL:
+            known = summarise_errors(position_error(path, test.future))
+            frame.loc[mine, ["A_along", "A_across"]] = error_by_axis(path, test.future)
+            frame.loc[mine, ["A_end", "A_end_90"]] = known["end"], known["end_90"]
+    return frame.reindex(columns=list(dict.fromkeys([*frame.columns, "A_along", "A_across", "A_end", "A_end_90"])))

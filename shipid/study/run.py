@@ -5,23 +5,28 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import platform
+import sys
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from shipid.arguments import as_path, check_class, check_whole_number
-from shipid.capacity import usable_cores
+from shipid.capacity import processor_name, usable_cores
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.engine.engines import check_device
-from shipid.engine.native import engine_description
+from shipid.engine.native import engine_description, noted_engine
+from shipid.errors import ShipidError
 from shipid.files import make_folder, write_json
-from shipid.hybrid.device import use_threads
+from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
 from shipid.study import seals, store
@@ -29,13 +34,19 @@ from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evalua
 from shipid.study.cluster import Line, SentJournal, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
-from shipid.study.plan import Plan, Unit, own_code
+from shipid.study.plan import USER_SCRIPT, Plan, Unit, own_code
 from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
-from shipid.study.sessions import Code, code_at_worker, machine, note_sessions, session_by_now, session_on
-from shipid.study.shards import check_prepared, shard_folder, take_in
 from shipid.study.workers import import_for_workers, on_workers
+from shipid.users import code_digest
+from shipid.version import __version__
 
 DATA, COMMON = "dataset", "common"  # names of seals: of the runs, and of what all units share
+PACKAGES = (
+    *("casadi", "numpy", "scipy", "scikit-learn", "torch", "optuna", "pandas", "pyarrow"),
+    *("dask", "distributed", "plotly"),
+)
+Code = Mapping[str, Mapping[str, str]]  # what a user wrote, as `Plan.code`
+MAIN = "__main__"  # module of a script, a cell or a console
 Computed = Iterator[tuple[Unit, list[store.Cell]]]
 
 
@@ -110,11 +121,11 @@ def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "
 def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
     """Run a study of one part, or a shard of it, alone in its folder."""
     start, shard = time.perf_counter(), means.shard
-    place = folder if shard is None else shard_folder(folder, shard)
+    place = folder if shard is None else store.shard_folder(folder, shard)
     if shard is not None:
-        check_prepared(folder, plan, (DATA, COMMON))
+        store.check_prepared(folder, plan, (DATA, COMMON))
     with store.open_folder(place, plan):
-        for words in (*seals.unseal_missing(place), *(take_in(folder, plan) if shard is None else ())):
+        for words in (*seals.unseal_missing(place), *(store.take_in(folder, plan) if shard is None else ())):
             yield Event("note", words)
         begun = session_on(means.device, own_code(plan))
         if changed := store.note_session(place, begun):
@@ -276,7 +287,7 @@ def _run_parts(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
 def _units(plan: Plan, folder: Path, shard: tuple[int, int] | None) -> tuple[Sequence[Unit], list[Unit]]:
     """The units of a plan, or of a shard of it, and those that are not finished."""
     mine = plan.units if shard is None else plan.units[shard[0] - 1 :: shard[1]]
-    places = (folder,) if shard is None else (folder, shard_folder(folder, shard))
+    places = (folder,) if shard is None else (folder, store.shard_folder(folder, shard))
     finished = {unit.key for place in places for unit in store.finished_units(place, mine)}
     return mine, [unit for unit in mine if unit.key not in finished]
 
@@ -290,3 +301,63 @@ def _obtaining_words(plan: Plan) -> str:
     if plan.study.data is None:
         return "simulating the truth"
     return "importing the log" if plan.study.data.dataset is None else "reading the dataset"
+
+
+def note_sessions(folder: Path, *sessions: Mapping[str, Any]) -> None:
+    """Note what this process or a worker computes with by now; a warning for a session that is new to the folder."""
+    for session in sessions:
+        known = session in store.provenance(folder)["sessions"]
+        if not known and (changed := store.note_session(folder, session)):
+            logging.getLogger(__name__).warning(
+                "computed otherwise in this process or a worker: %s", "; ".join(changed)
+            )
+
+
+def session_by_now(begun: Mapping[str, Any]) -> dict[str, Any]:
+    """A session of this process with its engine of now: another one from when on a model could not be compiled."""
+    return {**begun, "engine": noted_engine() or begun["engine"]}
+
+
+def session_on(device: str, code: Code) -> dict[str, Any]:
+    """What results depend on beside the plan, to the last digit: versions, engine, processor, device, users' code."""
+    computer = machine()
+    others = {name: version for name, version in computer["packages"].items() if name != "shipid"}
+    return {
+        "shipid": f"{__version__}, code {code_digest()}",  # the code may differ and the version not
+        "engine": engine_description(),
+        "processor": computer["processor"],
+        "python": computer["python"],
+        "device": device,
+        "packages": others,
+        **code,
+    }
+
+
+def machine() -> dict[str, Any]:
+    """What the results were computed with: interpreter, packages, machine."""
+    packages = {"shipid": __version__}
+    for name in PACKAGES:
+        with suppress(PackageNotFoundError):  # an extra that is not installed
+            packages[name] = version(name)
+    system = {"python": sys.version.split()[0], "system": platform.platform(terse=True), "machine": platform.machine()}
+    return {
+        **system,
+        "processor": f"{processor_name()}, {vector_instructions()}",
+        "cores": usable_cores(),
+        "packages": packages,
+    }
+
+
+def code_at_worker(plan: Plan, code: Code) -> dict[str, dict[str, str]]:
+    """What the user wrote as a worker has it; `code` is that of the process that gave the work.
+
+    A method of that process's script has no file on another machine. Raises ShipidError where the worker lacks a term.
+    """
+    imported = replace(plan, methods=tuple(way for way in plan.methods if type(way.method).__module__ != MAIN))
+    try:
+        here = own_code(imported)
+    except KeyError as unknown:
+        words = f"workers lack the term {unknown}: write its line TERMS[...] = ... into a script, as {USER_SCRIPT} in"
+        more = 'docs/extending.md, above its line `if __name__ == "__main__":`; start those of Dask with --preload'
+        raise ShipidError(f"{words} {more}") from None
+    return {what: {**code.get(what, {}), **here.get(what, {})} for what in {**code, **here}}

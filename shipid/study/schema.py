@@ -118,7 +118,7 @@ class BandsBlock(Strict):
 
 
 PAIRED_ROLES = (("accurate", "inaccurate"), ("moderate", "high"))  # keys of `[claims]`: both are given, or neither
-ROLES = (*PAIRED_ROLES[0], *PAIRED_ROLES[1], "nominal")
+ROLES = (*(role for pair in PAIRED_ROLES for role in pair), "nominal")
 
 
 class Claims(Strict):
@@ -210,6 +210,7 @@ class Study(Strict):
     published: PublishedEnvelope | None = None
     bands: BandsBlock = BandsBlock()
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
+    families: str | None = Field(default=None, description="a document of families that come first: a path, or a study")
     family: Annotated[list[Family], Field(min_length=1)]
     repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
         default={}, description="dotted path -> values: the study is done for each; the comparison pools them"

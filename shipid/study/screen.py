@@ -24,7 +24,7 @@ from shipid.metrics import BINS, rank_correlation, tally_quantile
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
-from shipid.vessel.perturb import Family, Variant, draw_members
+from shipid.vessel.perturb import Family, Variant, change_structure, draw_members
 
 Array = np.ndarray
 CutWindows = tuple[Windows, Windows, list[str]]  # what `partition` gives
@@ -50,7 +50,8 @@ def drawn_families(plan: Plan, name: str | None = None) -> list[Family]:
 def notes_on_windows(plan: Plan, cut: CutWindows, wanted: Sequence[Family]) -> list[str]:
     """Windows that a study leaves out, and inputs that the base vessels need and the runs do not have."""
     pool, _, left_out = cut
-    return [*left_out, *dict.fromkeys(note for f in wanted for note in not_measured(plan.vessels[str(f.base)], pool))]
+    bases = [change_structure(family, plan.vessels[str(family.base)]) for family in wanted]
+    return [*left_out, *dict.fromkeys(note for base in bases for note in not_measured(base, pool))]
 
 
 def screen(
@@ -79,7 +80,7 @@ def screen(
     pool, test, _ = partition(plan, dataset) if cut is None else cut
     size = min(MEMBERS_OF_BLOCK, max(1, NUMBERS_OF_BLOCK // (len(pool) + len(test) + BINS)))
     for family in wanted:
-        base = plan.vessels[str(family.base)]
+        base = change_structure(family, plan.vessels[str(family.base)])
         check_columns(base, test.columns, plan.file)
         for first in range(0, count, size):
             numbers = range(first, min(first + size, count))

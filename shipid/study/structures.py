@@ -131,8 +131,7 @@ class StructureComparison:
                 f"{len(wide)} of {len(self.spread)} measures, most in the {worst['measure']} of "
                 f"{worst['manoeuvre']}: {worst['least']:.3g} to {worst['greatest']:.3g} {worst['unit']}"
             )
-        notes += [*self.beyond, *self.uneven]
-        return notes
+        return [*notes, *self.beyond, *self.uneven]
 
     def document(self) -> str:
         """The vessel with the chosen structure, fitted to all runs, as TOML."""

@@ -22,28 +22,32 @@ from shipid.physics.returned import check_returned
 from shipid.physics.signals import rows_of_role, signal_units
 from shipid.units import plural_word
 from shipid.users import definition_location, is_user_code
-from shipid.vessel.bindings import Binding, bind_document
-from shipid.vessel.bindings import parameter_units as units_of
 from shipid.vessel.load import Vessel
 from shipid.vessel.schema import (
     BEHIND,
+    DOFS,
+    Binding,
     active_actuators,
+    bind_document,
+    call_user_function,
+    check_term,
     equation_functions,
+    function_parameters,
     function_signals,
+    parameter_units,
     structural_keys,
     term_blocks,
     term_parameters,
+    term_states,
     upstream_signals,
     vessel_model,
 )
-from shipid.vessel.schema import function_parameters as declared
-from shipid.vessel.terms import call_user_function, check_term, term_states
 
 ETA = ("north", "east", "down", "phi", "theta", "psi")
 NU = ("u", "v", "w", "p", "q", "r")
 INPUTS = ("state", "memory", "commands", "environment", "parameters")
 LAST = {"rates": "tau_extra", "advance": "dt", "sum": "component"}  # input of each function beside those of all
-PLANE, HEAVE = (0, 1, 5), 2
+PLANE, HEAVE = DOFS[3], 2
 CORIOLIS = {"full": PLANE, "mmg": (0, 1), "none": ()}  # axes on which added mass turns with the ship by formula
 HELM = "(helm)"  # prefix of the states of a helmsman: no thruster has such a name
 WASH = 3  # numbers that a propeller gives to what is behind it, `shipid.physics.propeller.propeller_wash`
@@ -138,7 +142,7 @@ def _assemble_dynamics(vessel: Vessel, helmsman: Helmsman | None) -> Dynamics:
         check_term(key)
     if any(is_user_code(function) for held in equation_functions(vessel.document).values() for function in held):
         documents.parse_model(vessel_model(), vessel.document, vessel.file)
-        if (bind_document(vessel.document), units_of(vessel.document)) != (vessel.bound, vessel.units):
+        if (bind_document(vessel.document), parameter_units(vessel.document)) != (vessel.bound, vessel.units):
             raise ShipidError("its terms take other numbers than when it was read: load it again", file=vessel.file)
     names = tuple(ETA[i] for i in axes) + tuple(NU[i] for i in axes)
     hidden = _hidden_states(terms)
@@ -275,7 +279,7 @@ def _call_term(
     where : the function in words, for errors.
     """
     others = {parameter.name for parameter in term_parameters(TERMS[key])}
-    others -= {parameter.name for parameter in declared(function)}
+    others -= {parameter.name for parameter in function_parameters(function)}
     kept = {keyword: value for keyword, value in keywords.items() if keyword not in others}
     unknown = next((name for name in function_signals(function) if name not in available), None)
     if unknown is not None:
@@ -412,7 +416,7 @@ def _assemble_actuators(
             member = ACTUATORS[actuator["kind"]]
             memory[name] = SX.sym(name)
             keywords = _symbol_arguments(bound[f"{path}.actuator.{command}"], value_of)
-            taken = {parameter.name for parameter in declared(member.output)}
+            taken = {parameter.name for parameter in function_parameters(member.output)}
             actual[name] = member.output(memory[name], **{k: v for k, v in keywords.items() if k in taken})
             advanced.append(member.advance(orders[name], memory[name], dt, **keywords))
     return memory, actual, advanced

@@ -22,12 +22,14 @@ from shipid.physics.grammar import AXES, MOTIONS
 from shipid.physics.inertia import total_mass
 from shipid.physics.signals import ACTUAL
 from shipid.physics.waves import TABLES
-from shipid.vessel.bindings import Binding, bind_document, parameter_units
 from shipid.vessel.ranges import LEAST_BLOCK, UNUSUAL, first_contradiction, out_of_range
 from shipid.vessel.schema import (
     BEHIND,
     DOFS,
     TABLE,
+    Binding,
+    bind_document,
+    parameter_units,
     term_blocks,
     upstream_signals,
     vessel_model,
@@ -254,6 +256,7 @@ class VesselPatch(BaseModel):
     base_digest: str | None = None
     name: str | None = None
     source: str | None = None
+    structure: dict[str, Any] = {}
     set: dict[str, Annotated[FiniteFloat, "value"]] = {}
     unusual: list[str] = []
     provenance: dict[str, Any] = {}
@@ -262,6 +265,7 @@ class VesselPatch(BaseModel):
 def _apply_patch(document: Document, file: Path, above: tuple[Path, ...]) -> Vessel:
     patch: VesselPatch = documents.parse_model(VesselPatch, document, file)
     base = _load_file(_find_base(patch.base, "base", file, above), (*above, file.resolve()))
+    base = base.with_values(patch.structure) if patch.structure else base
     if patch.base_digest not in (None, base.digest):
         changed = f"the base {patch.base!r} has changed since (now {base.digest!r}); make the patch anew"
         raise DocumentError(f"{patch.base_digest!r}: {changed}", file=file, path="base_digest")

@@ -1,7 +1,7 @@
 """Families of perturbed vessels: a variant is a named patch on a base vessel with a given digest.
 
-Each draw comes from hash(seed, family, member, path, counter), so that adding a member, a parameter or a family never
-changes another draw.
+Each independent draw comes from hash(seed, family, member, path, counter), so that adding a member, a parameter or a
+family never changes another draw.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tomlkit
 from pydantic import (
@@ -60,10 +60,7 @@ class PerturbationRule:
     note: str = ""
 
 
-WITHOUT = (
-    "a family changes numbers only; for a model without the term write a vessel that `extends` this one, with "
-    "`off = true` in the block, and name it as `base`"
-)
+WITHOUT = 'a rule changes numbers; a whole term goes by structure = {"wind.off" = true} of the family'
 
 
 def _removed_paths(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[str, Any]:
@@ -79,9 +76,9 @@ def _checked_values(values: Mapping[str, float], base: Vessel, file: Any, where:
     return values
 
 
-def _scale_number(number: float, factor: float | tuple[float, float], u: float) -> float:
-    low, high = factor if isinstance(factor, tuple) else (factor, factor)
-    return number * (low + (high - low) * u)
+def _number_between(ends: float | tuple[float, float], u: float) -> float:
+    low, high = ends if isinstance(ends, tuple) else (ends, ends)
+    return low + (high - low) * u
 
 
 def check_rising(value: Any) -> Any:
@@ -103,9 +100,21 @@ RULES: dict[str, PerturbationRule] = {
     ),
     "factor": PerturbationRule(
         Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
-        _scale_number,
-        drawn=lambda factor: isinstance(factor, tuple),
+        lambda number, ends, u: number * _number_between(ends, u),
+        drawn=lambda ends: isinstance(ends, tuple),
         note="a number is fixed, a pair is a range drawn from uniformly",
+    ),
+    "bias": PerturbationRule(
+        Annotated[FiniteFloat | tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
+        lambda number, ends, u: number + _number_between(ends, u),
+        drawn=lambda ends: isinstance(ends, tuple),
+        note="added, in the unit of the number: fixed, or a pair drawn from uniformly",
+    ),
+    "range": PerturbationRule(
+        Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(check_rising)],
+        lambda _number, ends, u: _number_between(ends, u),
+        drawn=lambda _: True,
+        note="[low, high] of a new value, in the unit of the number, drawn uniformly",
     ),
 }
 """Key -> rule; a block with several applies them in this order. To add one, write its change and name it here."""
@@ -120,6 +129,7 @@ class Perturbation(CheckedModel, BaseModel):
     model_config = ConfigDict(extra="allow")
     parameters: list[str] = Field(default=[], description="dotted paths; * and [order >= 3] select")
     together: bool = Field(default=False, description="one draw for all parameters of the block")
+    change_sign: bool = Field(default=False, description="allows a range of factors that holds 0 or less")
 
     @model_validator(mode="before")
     @classmethod
@@ -136,6 +146,11 @@ class Perturbation(CheckedModel, BaseModel):
         if empty or bool(self.parameters) != any(key in self.given for key in selecting):
             others = ", ".join(key for key in RULES if key not in selecting)
             raise ValueError(f"give `parameters` together with {' or '.join(selecting)}, or one of {others}")
+        factor = self.given.get("factor")
+        if isinstance(factor, tuple) and factor[0] <= 0 and not self.change_sign:
+            raise ValueError(
+                f"factor {list(factor)} holds 0 or less: +-30 % is [0.7, 1.3]; change_sign = true allows it"
+            )
         return self
 
     @classmethod
@@ -166,12 +181,12 @@ def _block_model(rules: tuple[tuple[str, PerturbationRule], ...]) -> type[BaseMo
     fields: dict[str, Any] = {
         key: (Annotated[rule.argument | None, Field(description=rule.note)], None) for key, rule in rules
     }
-    shared: dict[str, Any] = {"parameters": (list[str], []), "together": (bool, False)}
+    shared: dict[str, Any] = {"parameters": (list[str], []), "together": (bool, False), "change_sign": (bool, False)}
     return create_model("perturbation", __config__=ConfigDict(extra="forbid"), **shared, **fields)
 
 
 class Family(CheckedModel, BaseModel):
-    """A `[[family]]` block of a study: so many members of one base, perturbed by the same rules."""
+    """A `[[family]]` block of a document: so many members of one base, perturbed by the same rules."""
 
     model_config = ConfigDict(extra="forbid")
     name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,79}$")]
@@ -179,7 +194,14 @@ class Family(CheckedModel, BaseModel):
     extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
     members: Annotated[int, Field(ge=1, le=100000)] = 1
     seed: int = 0
+    sample: Literal["independent", "latin-hypercube", "sobol"] = Field(
+        default="independent", description="how members are spread over the ranges; the latter two fill them evenly"
+    )
+    equal: bool = Field(default=False, description="allows several members that nothing drawn tells apart")
     description: str | None = None
+    structure: dict[str, Any] = Field(
+        default={}, description='dotted path -> value of the base before any rule, such as {"wind.off" = true}'
+    )
     perturb: list[Perturbation] = []
     seen: list[str] = Field(
         default=[], description="runs that its numbers were set from: where one of them tests, no claim is about it"
@@ -193,11 +215,22 @@ class Family(CheckedModel, BaseModel):
     _inherited: int = PrivateAttr(default=0)  # how many blocks of `perturb` come from the family that it extends
 
 
+class FamilyDocument(BaseModel):
+    """A document of families."""
+
+    model_config = ConfigDict(extra="forbid")
+    description: str | None = None
+    vessel: str | None = Field(default=None, description="base of the families that name none and extend none")
+    family: Annotated[list[Family], Field(min_length=1)]
+    lock: dict[str, Any] | None = Field(default=None, description="what was drawn, as `shipid family export` writes it")
+
+
 @dataclass(frozen=True)
 class Variant:
     """A named patch on a digested base.
 
     values : dotted path -> new value. factors : path -> new / old, where the old value is not 0.
+    structure : what was changed in the named base before; the digest is that of the changed base.
     counter : 0, or how often this member was redrawn because it diverged on training windows.
     """
 
@@ -211,6 +244,7 @@ class Variant:
     counter: int = 0
     seed: int = 0
     base_parameters: Mapping[str, float] = field(default_factory=dict, repr=False)
+    structure: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def parameters(self) -> list[float]:
@@ -220,7 +254,7 @@ class Variant:
     def document(self) -> str:
         """The patch as TOML: `load_vessel` on it rebuilds the variant exactly."""
         source = f"family {self.family!r}, member {self.member}, seed {self.seed}, redrawn {self.counter} times"
-        return patch_text(self.name, self.base, self.base_digest, source, self.values)
+        return patch_text(self.name, self.base, self.base_digest, source, self.values, structure=self.structure)
 
 
 def patch_text(
@@ -231,18 +265,20 @@ def patch_text(
     values: Mapping[str, float],
     provenance: Mapping[str, Any] | None = None,
     unusual: Sequence[str] = (),
+    structure: Mapping[str, Any] | None = None,
 ) -> str:
     """A patch document as TOML: a base, by bundled name or by path from the patch, and new values by dotted path.
 
-    unusual : paths of numbers that would be refused where the patch is read.
+    unusual : paths of numbers that would be refused where the patch is read. structure : changes of the base that come
+        before the digest is taken.
     """
     patch = tomlkit.document()
     patch.update({"name": name, "base": base, "base_digest": base_digest, "source": source})
     if unusual:
         patch[UNUSUAL] = list(unusual)
-    patch["set"] = dict(values)
-    if provenance:
-        patch["provenance"] = dict(provenance)
+    for table, content in {"structure": structure, "set": values, "provenance": provenance}.items():
+        if content or table == "set":
+            patch[table] = dict(content or {})
     return tomlkit.dumps(patch)
 
 
@@ -258,23 +294,32 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
         where = f"family.{list(by_name).index(family.name)}"
         if family.name in above:
             raise DocumentError(f"extends itself by way of {' -> '.join(above)}", file=file, path=f"{where}.extends")
-        base, perturb, identify, observer = family.base, family.perturb, family.identify, family.observer
-        inherited, seen = 0, family.seen
+        parent = Family(name="empty")
         if family.extends is not None:
             if family.extends not in by_name:
                 hint = suggest_name(family.extends, by_name)
                 raise DocumentError(f"no family {family.extends!r}: {hint}", file=file, path=f"{where}.extends")
             parent = written_out(by_name[family.extends], (*above, family.name))
-            base, perturb, inherited = base or parent.base, [*parent.perturb, *perturb], len(parent.perturb)
-            identify = parent.identify if identify is None else identify
-            observer = parent.observer if observer is None else observer
-            seen = [*parent.seen, *seen]
-        if base is None:
-            raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
-        changes: dict[str, Any] = {"base": base, "perturb": perturb, "identify": identify, "observer": observer}
-        changes |= {"seen": seen, "extends": None}
+        changes = {
+            "base": family.base or parent.base,
+            "extends": None,
+            "structure": parent.structure | family.structure,
+            "perturb": [*parent.perturb, *family.perturb],
+            "seen": [*parent.seen, *family.seen],
+            "identify": parent.identify if family.identify is None else family.identify,
+            "observer": parent.observer if family.observer is None else family.observer,
+        }
         resolved = family.model_copy(update=changes)
-        resolved._inherited = inherited
+        resolved._inherited = len(parent.perturb)
+        if resolved.base is None:
+            raise DocumentError("missing: name a base vessel, or a family to extend", file=file, path=f"{where}.base")
+        drawn = any(block.drawn for block in resolved.perturb)
+        if resolved.members > 1 and not (resolved.equal or resolved.identify or resolved.observer or drawn):
+            raise DocumentError(
+                f"the {family.members} members are equal: give a range to draw from; equal = true allows it",
+                file=file,
+                path=f"{where}.members",
+            )
         return resolved
 
     return [written_out(family, ()) for family in families]
@@ -285,6 +330,15 @@ def draw_variant(
 ) -> Variant:
     """Draw one member of a resolved family, redrawn so often; see `draw_members`."""
     return draw_members(family, base, file, [member], counter)[0]
+
+
+def change_structure(family: Family, base: Vessel) -> Vessel:
+    """The base of a family with its `structure`; DocumentError where that makes no valid vessel."""
+    try:
+        return base.with_values(family.structure) if family.structure else base
+    except DocumentError as error:
+        words = f"{error.path}: {error.message}" if error.path else error.message
+        raise DocumentError(words, path=f"family.{family.name}.structure") from None
 
 
 Step = tuple[str, Callable[[float, Any, float], float], Any, str | None]
@@ -300,19 +354,24 @@ def draw_members(
 ) -> list[Variant]:
     """Members of a resolved family, all or those of the given numbers from 0; the same on every machine to the bit.
 
-    Range factors are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
+    Ranges are uniform; a path drawn by several blocks is drawn anew in each and the factors multiply.
 
-    counter : how often each was redrawn. Raises ShipidError where a number is no whole one, DocumentError for a path
-    that the base lacks or a member that is no valid vessel.
+    base : with the `structure` of the family, see `change_structure`. counter : how often each was redrawn.
+
+    Raises ShipidError where a number is no whole one, DocumentError for a path that the base lacks or a member that is
+    no valid vessel.
     """
-    steps, original, result = _draw_steps(family, base, file), base.parameters, []
+    steps, original, result = _draw_steps(family, base, file), base.parameters, list[Variant]()
     counter, numbers = check_whole_number("counter", counter), range(family.members) if numbers is None else numbers
     if not isinstance(numbers, Iterable):
         raise DocumentError(f"numbers must be several whole numbers, such as [0, 1], not {numbers!r}")
+    draw = _unit_draws(family, (key for *_, key in steps if key is not None), counter)
     for number in (check_whole_number("member", number) for number in numbers):  # of 1.0 is another hash
+        if family.sample != "independent" and number >= family.members:
+            raise DocumentError(f"no member {number}: a {family.sample} sample has {family.members}, from 0")
         values: dict[str, float] = {}
         for path, change, argument, key in steps:
-            u = 0.0 if key is None else uniform_draw(family.seed, family.name, number, key, counter)
+            u = 0.0 if key is None else draw(number, key)
             values[path] = change(values.get(path, original[path]), argument, u)
         try:
             base.with_values(values)
@@ -323,8 +382,8 @@ def draw_members(
         changed = {path: value for path, value in values.items() if original[path] != 0}
         factors = {path: value / original[path] + 0.0 for path, value in changed.items()}  # + 0.0: none is -0.0
         name = family.name if family.members == 1 else f"{family.name}-{number + 1}"
-        of, digest = family.base or base.key, base.digest
-        result.append(Variant(name, family.name, number, of, digest, values, factors, counter, family.seed, original))
+        drawn = (values, factors, counter, family.seed, original, family.structure)
+        result.append(Variant(name, family.name, number, family.base or base.key, base.digest, *drawn))
     return result
 
 
@@ -356,6 +415,34 @@ def _draw_steps(family: Family, base: Vessel, file: str | Path | None) -> list[S
             }
             result += [(path, rule.change, argument, keys[path]) for path in paths]
     return result
+
+
+def _unit_draws(family: Family, keys: Iterable[str], counter: int) -> Callable[[int, str], float]:
+    """What gives the number in [0, 1] of a member for the key of a draw, by the sample of the family.
+
+    Latin hypercube (McKay 1979): each member has one of as many equal parts of a range as there are members, in an
+    order hashed from the key. Sobol: SciPy's sequence, a dimension for each key in their order, each rotated by a hash
+    of its key (Cranley and Patterson 1976). A member that is drawn again is drawn independently.
+    """
+    of, count = (family.seed, family.name), family.members
+
+    def hashed_draw(member: int, key: str) -> float:
+        return uniform_draw(*of, member, key, counter)
+
+    if counter or family.sample == "independent":
+        return hashed_draw
+    columns: dict[str, Any] = dict.fromkeys(keys)
+    if family.sample == "latin-hypercube":
+        for key in columns:
+            parts = sorted(range(count), key=lambda part: uniform_draw(*of, part, key, "part"))
+            columns[key] = [(part + hashed_draw(member, key)) / count for member, part in enumerate(parts)]
+    else:
+        from scipy.stats import qmc  # most families are drawn without it
+
+        points = qmc.Sobol(len(columns) or 1, scramble=False).random_base2((count - 1).bit_length()).T
+        shifted = zip(columns, points, strict=False)
+        columns = {key: (point + uniform_draw(*of, "rotation", key)) % 1 for key, point in shifted}
+    return lambda member, key: float(columns[key][member])
 
 
 def uniform_draw(*key: Any) -> float:

@@ -1,27 +1,36 @@
-"""Schema of vessel documents, derived from the signatures of the physics functions."""
+"""Schema of vessel documents, derived from the signatures of the physics functions, and the bindings to these."""
 
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, reduce
+from numbers import Real
 from operator import or_
 from types import GenericAlias
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, create_model, model_validator
 
-from shipid.physics import ACTUATORS, GIVEN, TERMS, ActuatorModel, Term
+from shipid.document import Document
+from shipid.errors import ShipidError, suggest_name
+from shipid.physics import ACTUATORS, GIVEN, MOTION, TERMS, ActuatorModel, Term
 from shipid.physics.grammar import POSITIVE, Grammar
 from shipid.physics.inertia import added_mass_entries, rigid_body_entries
-from shipid.physics.signals import rows_of_role
+from shipid.physics.signals import SIGNALS, rows_of_role
 from shipid.physics.symbols import argument_types
+from shipid.units import join_names, unit_fault
+from shipid.users import definition_location, error_location, locate_errors
 from shipid.vessel.ranges import UNUSUAL
-from shipid.vessel.terms import FIXED, NAME, POSITIONAL, check_term, split_keys
 
+FIXED = ("hull", "restoring", "radiation", "waves")  # groups whose members go by the name of their kind, one of each
+GROUPS = (*FIXED, "wind", "thruster")
+NAME = r"[A-Za-z][A-Za-z0-9_-]*"  # of a kind
+RESERVED = ("off", "source", "kind", "actuator", "behind")  # keys that blocks have beside parameters
+POSITIONAL = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 DOFS = {3: (0, 1, 5), 4: (0, 1, 3, 5), 6: (0, 1, 2, 3, 4, 5)}
-
 PARTICULARS = {
     "L_pp": "m",
     "L_oa": "m",
@@ -32,6 +41,132 @@ PARTICULARS = {
 }
 CONSTANTS = {"rho": "kg m^-3", "rho_a": "kg m^-3", "g": "m s^-2"}
 SHARED = {**dict.fromkeys(PARTICULARS, "particulars"), **dict.fromkeys(CONSTANTS, "constants")}
+BEHIND = "behind"  # the key that names another component
+TABLE = "table"  # the structural key that names a file of columns; every other one is a whole number
+_CORIOLIS = Annotated[Literal["full", "mmg", "none"], Field(description="what the hull's derivatives do not hold")]
+_TURNING = Annotated[Literal["full", "none"], Field(description="whether the mass turns with the ship")]
+_Table = dict[str, Annotated[list[FiniteFloat], Field(min_length=4)]]
+Binding = dict[str, str | list[str] | dict[str, str] | float]
+
+
+@cache
+def split_keys(keys: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
+    """Group and kind of each key of TERMS; ShipidError for a key that is not `<group>.<kind>`."""
+    pairs = []
+    for key in keys:
+        group, _, kind = str(key).partition(".")
+        if not isinstance(key, str) or group not in GROUPS or not re.fullmatch(NAME, kind) or kind in RESERVED:
+            function = getattr(TERMS[key], "function", None)
+            place = definition_location(function) if callable(function) else ""
+            remedy = f"write <block>.<kind>, such as TERMS['hull.drag'], with one of the blocks {join_names(GROUPS)}"
+            raise ShipidError(f"TERMS[{key!r}]: no block of a vessel document and a kind in it: {remedy}{place}")
+        pairs.append((group, kind))
+    return tuple(pairs)
+
+
+def check_term(key: str) -> Term:
+    """The term of a key of TERMS; ShipidError, one line with its place, where its functions cannot be used."""
+    term: Any = TERMS[key]
+    if not isinstance(term, Term):
+        name = getattr(term, "__name__", repr(term))
+        place = definition_location(term) if callable(term) else ""
+        raise ShipidError(f"TERMS[{key!r}] is no Term: write TERMS[{key!r}] = Term({name}){place}")
+    _check_functions(key, term)
+    return term
+
+
+@cache
+def _check_functions(key: str, term: Term) -> None:
+    gives = {f"{name} of {key}": function for name, function in term.gives.items()}
+    read = {key: term.function, **gives, f"rates of {key}": term.rates}  # whose arguments are signals and parameters
+    others = {"components": term.components, "drawn": term.drawn, "states": term.states}
+    for where, function in {**read, **{f"{part} of {key}": one for part, one in others.items()}}.items():
+        if function is not None and not callable(function):
+            raise ShipidError(f"{where} must be a function, not {function!r}")
+    place = definition_location(term.function)
+    if (term.states is None) != (term.rates is None):
+        raise ShipidError(f"{key}: `states` and `rates` belong together: it needs both, or neither{place}")
+    outputs = [*rows_of_role("output"), *GIVEN]
+    unknown = next((name for name in term.gives if name not in outputs), None)
+    if unknown is not None:
+        raise ShipidError(f"{key}: it gives {unknown!r}, which is no output: {suggest_name(unknown, outputs)}{place}")
+    for where, function in read.items():
+        if function is not None:
+            _check_signature(where, term, function)
+
+
+def _check_signature(where: str, term: Term, function: Any) -> None:
+    """ShipidError for an argument that is neither a signal nor a parameter with its unit."""
+    place = definition_location(function)
+    try:
+        hints = argument_types(function)
+        arguments = inspect.signature(function).parameters
+    except (TypeError, ValueError, NameError, AttributeError, SyntaxError) as error:
+        raise ShipidError(f"{where}: its arguments cannot be read ({error}): write a plain function{place}") from None
+    sums = function is term.function and bool(term.components or term.drawn)  # over arrays named as they are called
+    for argument in arguments.values():
+        if fault := _argument_fault(argument, hints.get(argument.name), () if sums else term_signals(term)):
+            raise ShipidError(f"{where}: {fault}{place}")
+
+
+def _argument_fault(argument: inspect.Parameter, hint: Any, signals: tuple[str, ...]) -> str:
+    """What is wrong with an argument; empty for nothing. signals : names of positional ones; empty: any."""
+    name, known = argument.name, get_origin(hint) is Annotated
+    parameter = f'{name}: Annotated[SX, "m"]'
+    if argument.kind in (*POSITIONAL, argument.VAR_POSITIONAL):
+        if argument.kind in POSITIONAL and not known and (not signals or name in signals):
+            return ""
+        remedy = f"a parameter is behind a `*`, with its unit: `*, {parameter}`"
+        return f"its positional argument {name!r} is no signal: {suggest_name(name, signals)}: {remedy}"
+    base, unit = get_args(hint)[:2] if known else (hint, None)
+    tables = any(get_origin(one) in (Mapping, dict) or one in (Mapping, dict) for one in (base, *get_args(base)))
+    if name in RESERVED:
+        return f"its parameter {name!r} is a key that blocks have anyway: use another name"
+    if argument.kind is argument.VAR_KEYWORD or tables:
+        return "" if isinstance(unit, Grammar) else f"{name!r} is a table and needs a grammar of shipid.physics.grammar"
+    if not isinstance(unit, str | Grammar):
+        return f"its parameter {name!r} has no unit: write `{parameter}`; a constant belongs outside the signature"
+    if isinstance(unit, str) and (remedy := unit_fault(unit)):
+        return f"the unit {unit!r} of its parameter {name!r} is not known: {remedy}"
+    default = argument.default
+    if default not in (argument.empty, None) and (isinstance(default, bool) or not isinstance(default, Real)):
+        return f"the default of its parameter {name!r} must be a number, not {default!r}"
+    return ""
+
+
+def term_signals(term: Term) -> tuple[str, ...]:
+    """Positional arguments that the functions of a term may have, beside the arrays that it sums over."""
+    own = [name for name in MOTION if name != "state" or term.states is not None]
+    return (*own, *GIVEN, *rows_of_role("command"), *rows_of_role("environment"))
+
+
+def term_states(key: str, block: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the additional states of a term; empty for a term without; ShipidError for what is no such names."""
+    function = TERMS[key].states
+    if function is None:
+        return ()
+    names = call_user_function(f"states of {key}", function, block)
+    if not isinstance(names, tuple | list) or not all(isinstance(name, str) for name in names) or not names:
+        raise ShipidError(
+            f"states of {key} must return names, such as ('x', 'y'), not {names!r}{definition_location(function)}"
+        )
+    return tuple(names)
+
+
+def call_user_function(where: str, function: Callable[..., Any], *signals: Any, **keywords: Any) -> Any:
+    """What a function of a term returns; ShipidError with its place for an error in one that a user wrote.
+
+    where : the function in words, the beginning of the line.
+    """
+    with locate_errors(where, function, "term"):
+        try:
+            return function(*signals, **keywords)
+        except RuntimeError as error:
+            if "truth value" not in str(error):
+                raise
+            words = "Python's `if`, `and`, `or`, `min` and `max` cannot decide by a symbol"
+            remedy = "write ca.if_else(condition, one, other), ca.fmin or ca.fmax"
+            raise ShipidError(f"{where}: {words}: {remedy}{error_location(error, function)}") from error
 
 
 @dataclass(frozen=True)
@@ -103,20 +238,11 @@ def upstream_signals(term: Term) -> tuple[str, ...]:
     return tuple(name for name in function_signals(term.function) if name in GIVEN)
 
 
-BEHIND = "behind"  # the key that names another component
-TABLE = "table"  # the structural key that names a file of columns; every other one is a whole number
-
-
 class VesselBlock(BaseModel):
     """Base model of a block of a vessel document: only declared keys, and `source`."""
 
     model_config = ConfigDict(extra="forbid", strict=True)  # strict: the document itself is used, not a converted copy
     source: str | None = Field(default=None, description="where the numbers come from")
-
-
-_CORIOLIS = Annotated[Literal["full", "mmg", "none"], Field(description="what the hull's derivatives do not hold")]
-_TURNING = Annotated[Literal["full", "none"], Field(description="whether the mass turns with the ship")]
-_Table = dict[str, Annotated[list[FiniteFloat], Field(min_length=4)]]
 
 
 def _number_type(parameter: Parameter) -> Any:
@@ -290,3 +416,75 @@ def equation_functions(document: Mapping[str, Any]) -> dict[str, tuple[Callable[
         for _, actuator in active_actuators(block):
             found[f"actuator.{actuator['kind']}"] = ACTUATORS[actuator["kind"]].functions
     return found
+
+
+def bind_block(path: str, block: Mapping[str, Any], declared: tuple[Parameter, ...]) -> Binding:
+    """Keyword -> dotted path, list or table of paths, or default value, for one physics function.
+
+    path, block : of the document. declared : parameters of the function.
+    """
+    result: Binding = {}
+    for parameter in declared:
+        name = parameter.name
+        if parameter.kind == "open":
+            closed = {other.name for other in declared}
+            numbers = [  # not `kind`, `off`, actuators
+                key for key, value in block.items() if isinstance(value, int | float) and not isinstance(value, bool)
+            ]
+            result.update({key: f"{path}.{key}" for key in numbers if key not in closed})
+        elif parameter.kind == "list":
+            result[name] = [f"{path}.{name}.{i}" for i in range(len(block[name]))]
+        elif parameter.kind == "table":
+            if name in block or not parameter.optional:
+                result[name] = {key: f"{path}.{name}.{key}" for key in block[name]}
+        elif name in block:
+            result[name] = f"{path}.{name}"
+        elif name in SHARED:
+            result[name] = f"{SHARED[name]}.{name}"
+        elif parameter.default is not None:
+            result[name] = parameter.default
+    return result
+
+
+def _equation_blocks(
+    document: Document,
+) -> Iterator[tuple[str, Mapping[str, Any], tuple[Parameter, ...], str | None]]:
+    """Dotted path, block and parameters of all that the equations use; of an actuator, too, the unit that it moves."""
+    yield "inertia", document["inertia"], function_parameters(rigid_body_entries), None
+    yield "added_mass", document.get("added_mass", {}), function_parameters(added_mass_entries), None
+    for path, key, block in term_blocks(document):
+        yield path, block, term_parameters(TERMS[key]), None
+        for command, actuator in active_actuators(block):
+            declared = function_parameters(ACTUATORS[actuator["kind"]].advance)
+            yield f"{path}.actuator.{command}", actuator, declared, SIGNALS[command].unit
+
+
+def bind_document(document: Document) -> dict[str, Binding]:
+    """Dotted path of every block that the equations use -> the binding of its function's keywords."""
+    return {path: bind_block(path, block, declared) for path, block, declared, _ in _equation_blocks(document)}
+
+
+def parameter_units(document: Document) -> dict[str, str]:
+    """Dotted path -> unit of every parameter, in the order of use."""
+    rows: list[tuple[str, str]] = []
+    for path, block, parameters, moved in _equation_blocks(document):
+        declared = {parameter.name: parameter.unit for parameter in parameters}
+        table = next((parameter.unit for parameter in parameters if parameter.kind == "open"), "")
+        for keyword, target in bind_block(path, block, parameters).items():
+            unit = declared.get(keyword, table)
+            if isinstance(target, str):
+                rows.append((target, unit.unit(keyword) if isinstance(unit, Grammar) else _resolve_unit(unit, moved)))
+            elif isinstance(target, list):
+                rows += [(entry, str(unit)) for entry in target]
+            elif isinstance(target, dict) and isinstance(unit, Grammar):
+                rows += [(entry, unit.unit(key)) for key, entry in target.items()]
+    return dict(rows)
+
+
+def _resolve_unit(unit: str, moved: str | None) -> str:
+    """The unit of a number; of one of an actuator that is `of the command`, with the unit of what is moved."""
+    if moved is None or not unit.endswith("of the command"):
+        return unit
+    if unit == "of the command":
+        return moved
+    return "1/s" if moved == "-" else f"{moved}^2" if moved.endswith("/s") else f"{moved}/s"

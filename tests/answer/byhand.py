@@ -71,13 +71,15 @@ def by_hand(
             "N_D": N_D,
             "seed": seed,
         }
-        row |= {"runs": N_D, "minutes": 1.0, "A": A, "A_90": A, "A_rms": A, "H": np.nan, "H_90": np.nan}
+        row |= {"runs": N_D, "minutes": 1.0, **dict.fromkeys(("A_end", "A_end_90", "A", "A_90", "A_rms"), A)}
+        row |= dict.fromkeys(("H_end", "H_end_90", "H", "H_90"), np.nan)
         row["trials"] = [{"value": (losses or {}).get(model, H), "state": "complete"}]
         row |= {"rms": np.nan, "status": "failed", "sentence": "no training converged"}
         if H is not None:
             row |= {"H": H, "rms": 1.1 * H, "status": "ok", "sentence": ""}
             row["H_90"] = (H_90 or {}).get((model, N_D, seed), 1.5 * H)
             curve = np.array((curves or {}).get((model, N_D, seed), [H] * STEPS))
+            row |= {"H_end": curve[-1], "H_end_90": 1.5 * curve[-1]}
             paths[row["cell"]] = np.stack([np.outer(curve, hard), np.zeros((STEPS, runs))], axis=-1)
         rows.append(row)
     straight = np.zeros((STEPS, runs, 2))

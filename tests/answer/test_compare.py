@@ -72,6 +72,8 @@ def test_paired_differences_by_hand(made: Made) -> None:
     comparison = compare_results([placed(one, "a"), placed(other, "b")]).errors.set_index(["family", "method", "N_D"])
     row = comparison.loc[("bad", "drawn", 10)]
     assert row[["first", "other", "difference"]].tolist() == pytest.approx([2.0, 1.0, -1.0])
+    assert row[["first_end", "other_end"]].tolist() == pytest.approx([2.0, 1.0])
+    assert row["first_end_90"] == pytest.approx(2.0 * np.quantile(np.linspace(0.9, 1.1, 8), 0.9))
     assert row["verdict"] == "lower"
     assert row["low"] < -1.0 < row["high"] < 0
     noise = 0.03 * 5**0.5  # of one seed each, and no other knowledge: 3 % of 2 m and of 1 m

@@ -32,7 +32,7 @@ def cells(
                     rows.append(
                         {"condition": "", "world": str(world), "foundation": one.model, "family": family,
                          "method": method, "N_D": 10, "seed": world, "status": "ok", "H": one.mean,
-                         "H_90": 2 * one.mean, "end": 1.5 * one.mean, "seconds": 3.0,
+                         "H_90": 2 * one.mean, "H_end": 1.5 * one.mean, "H_end_90": 3 * one.mean, "seconds": 3.0,
                          "trials": 4, "saw_test": False, "errors": one}
                     )  # fmt: skip
     return pd.DataFrame(rows)
@@ -85,7 +85,7 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     made = cells(np.random.default_rng(2), 1.0)
     worst = made.index[made.method.eq("other") & made.family.eq("moderate")][0]
     made.loc[worst, "status"] = "diverged"
-    made.loc[worst, ["H", "H_90", "end"]] = np.nan
+    made.loc[worst, ["H", "H_90", "H_end", "H_end_90"]] = np.nan
     made.at[worst, "errors"] = None
     one = row(method_table(made, "drawn"))
     assert (one.failed, one.cells, one.pairs) == (1, 4, 3)

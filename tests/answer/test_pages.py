@@ -81,7 +81,7 @@ def test_a_study_of_physics_alone_has_a_page_and_says_so(tmp_path: Path) -> None
     assert (cells["H"] == cells["A"]).all()
     answer = (folder / "answer.txt").read_text()
     assert answer.startswith("No result joins physics and data, so there is no conclusion. Mean errors ")
-    assert f"{cells['H'].min():.2f} m" in answer
+    assert f"{cells['H_end'].min():.2f} m" in answer
     assert "best in validation" not in answer
     assert (folder / "report.html").stat().st_size > 1e5
     content = report_content(read_results(folder))

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from shipid.hybrid.device import use_threads
-from shipid.study.sessions import machine
+from shipid.study.run import machine
 from tests.benchmarks.compare import RECORDED, TOLERANCE, Ratio, accepted, best, compare, read_recorded
 
 THREADS = {  # group, the module of that name -> threads that PyTorch may use

@@ -33,12 +33,13 @@ from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.metrics import coverage_by_run, coverage_share
 from shipid.predictor import limits_of
-from shipid.study.plan import Batch, model_label, read_plan, whole_unit
+from shipid.study.plan import Batch, model_label, read_plan
 from shipid.study.prepare import instants_of, obtain_runs, partition, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from tests.benchmarks import coverage
 from tests.benchmarks.worlds import World, world
+from tests.study.tiny import whole_unit
 
 Array = np.ndarray
 SHARES = (0.5, 0.8, 0.9, 0.95)

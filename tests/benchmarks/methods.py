@@ -14,9 +14,10 @@ import numpy as np
 from shipid.hybrid.method import Case, Method, Task
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.metrics import position_error, summarise_errors
-from shipid.study.plan import Batch, Plan, read_plan, whole_unit
+from shipid.study.plan import Batch, Plan, read_plan
 from shipid.study.prepare import PreparedStudy, instants_of, obtain_runs, physics_of, prepare
 from shipid.study.run import run_unit
+from tests.study.tiny import physics_errors, whole_unit
 
 DRAWN = PathDrawn()
 KEPT = Path(__file__).with_name("yardstick.json")  # `path-trained` on cells of worlds that no method was chosen on
@@ -54,7 +55,7 @@ def tune_cell(plan: Plan, prepared: PreparedStudy, cell: Cell, method: Method) -
     instants = instants_of(plan.study, vessel, prepared.data, prepared.test)
     paths = fit.corrector.predict(physics, instants, prepared.test_paths[cell.model])
     error = summarise_errors(position_error(paths, prepared.test.future))
-    alone = None if cell.model == "none" else prepared.accuracy(cell.model)["mean"]
+    alone = None if cell.model == "none" else physics_errors(prepared, cell.model)["mean"]
     row = {"world": cell.world, "N_D": cell.N_D, "model": cell.model, "A": alone, "H": error["mean"]}
     chosen = dict(fit.corrector.hyperparameters)
     return {**row, "H_90": error["p90"], "core_seconds": seconds, "chosen": chosen, "trials": fit.trials}

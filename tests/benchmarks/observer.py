@@ -18,7 +18,7 @@ from shipid.metrics import position_error
 from shipid.observer import MEASURED_MOTION, Estimates, Observer, estimates_at_windows, run_observer
 from shipid.simulation.excitation import aprbs_series
 from shipid.simulation.log import log_columns
-from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.units import DEGREE, RPM
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel

@@ -168,7 +168,7 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         | {"approach": "rest"},
     ),
     "simulate": (
-        "shipid.simulation.scripted:simulate_script",
+        "shipid.simulation.truth:simulate_script",
         f"simulate {SHIP} --manoeuvres runs.toml",
         {"vessel": is_ship, "name": "runs.toml"},
     ),

@@ -60,7 +60,9 @@ def test_run_report_resume_and_predict(study: Path, tiny_run: Path) -> None:
     folder = next(Path("results").iterdir())
     assert re.fullmatch(r"tiny-[0-9a-f]{8}", folder.name)
     assert "8 of 8 cells to do" in text
-    assert re.search(r"^\[8/8\] \S+: H \d+\.\d{3} m, H_90 \d+\.\d{3} m, ", text, re.MULTILINE)
+    metres = r"\d+\.\d{3} m, "
+    words = rf"^\[8/8\] \S+: at the horizon {metres}nine in ten below {metres}H {metres}"
+    assert re.search(words, text, re.MULTILINE)
     assert text.rstrip().endswith(f"report: {folder / 'report.html'}")
     answer = (folder / "answer.txt").read_text().splitlines()
     assert all(f"  {line}" in text for line in answer)

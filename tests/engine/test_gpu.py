@@ -12,12 +12,11 @@ import torch
 from shipid.engine import torch as engine
 from shipid.engine.integrate import Method
 from shipid.engine.rollout import rollout
-from shipid.study.plan import whole_unit
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.load import load_vessel
 from tests.drawn_ships import drawn_ship, extreme_inputs
-from tests.study.tiny import mixed_plan
+from tests.study.tiny import mixed_plan, whole_unit
 
 Draw = Callable[..., dict[str, dict[str, np.ndarray]]]
 on_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="PyTorch sees no GPU")

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import torch
 
-from shipid.engine.lowering import lower_function
 from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Method, rollout
-from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.engine.torch import lower_function
+from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, draw_members

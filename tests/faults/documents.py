@@ -14,13 +14,14 @@ from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
-from shipid.study.plan import plan_text, read_plan, whole_unit
+from shipid.study.plan import plan_text, read_plan
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.run import run_unit
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.faults.mutations import mutated
 from tests.faults.trials import Failure
+from tests.study.tiny import whole_unit
 
 BAD = Path(__file__).parents[1] / "bad"
 RUNNABLE = 2e5  # steps of a truth, or cells: a larger one is planned only

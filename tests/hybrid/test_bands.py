@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 
 from shipid.errors import DataError
 from shipid.hybrid.bands import (
@@ -93,6 +94,8 @@ def test_centres_of_the_same_run_are_passed_over() -> None:
         nearest_distances(point[None], centres[of_centre != mine])[0] for point, mine in zip(points, run, strict=True)
     ]
     np.testing.assert_allclose(nearest_distances(points, centres, run, of_centre), by_hand, rtol=1e-12)
+    nearest = cdist(points, centres).min(axis=1) / np.sqrt(3)
+    np.testing.assert_allclose(nearest_distances(points, centres), nearest, rtol=1e-12)
 
 
 def test_levels_between_those_of_the_table() -> None:

@@ -150,6 +150,8 @@ def test_journals_of_units_are_merged(tmp_path: Path) -> None:
             assert merged.count(cell) == 7
     merged.add({"c": rows(2, 5, first=4)}, SPACE)
     assert len(Journal(tmp_path / "all.log").rows("c")) == 6
+    with pytest.raises(ResultError, match="another journal holds a, too"):  # a copy
+        merge_journals([*files, files[0]], tmp_path / "twice.log")
 
 
 def test_who_may_not_write_any_more_writes_nothing(tmp_path: Path) -> None:

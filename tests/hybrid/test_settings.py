@@ -49,6 +49,7 @@ def test_trials_fill_their_ranges_by_the_logarithm():
     method = PathDrawn(trials=64, offset=1.5)
     points = list(method.points())
     assert len(points) == 64
+    mirrored = [point["mirror"] for point in points]
     for name, (low, high) in method.ranges().items():
         if name == "ridge":
             continue
@@ -57,6 +58,7 @@ def test_trials_fill_their_ranges_by_the_logarithm():
         assert np.log(values).mean() == pytest.approx(np.log([low, high]).mean(), abs=0.1)
         assert values.min() < low * (high / low) ** 0.1
         assert values.max() > low * (high / low) ** 0.9
+        assert abs(np.corrcoef(np.log(values), mirrored)[0, 1]) < 0.2  # else the mirror would be judged by the range
     assert {point["offset"] for point in points} == {1.5}
-    assert np.mean([point["mirror"] for point in points]) == pytest.approx(0.75, abs=0.05)
+    assert np.mean(mirrored) == pytest.approx(0.75, abs=0.05)
     assert points[:5] == list(PathDrawn(trials=5, offset=1.5).points())

@@ -8,8 +8,8 @@ import pandas as pd
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.identification.settings import Identify
-from shipid.simulation.gusts import Gusts, gust_series
 from shipid.simulation.log import log_columns
+from shipid.simulation.weather import Gusts, gust_series
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from shipid.vessel.template import FirstGuess, Particulars, first_guess

@@ -34,6 +34,13 @@ def test_a_rounded_clock_starts_anew_after_a_pause() -> None:
     np.testing.assert_allclose(np.delete(np.diff(even), 199), 0.1)
 
 
+def test_a_row_that_is_written_late_moves_no_other() -> None:
+    """By less than half a step; the instants were moved by half of it where rows were taken for lost."""
+    true = 0.1 * np.arange(200)
+    even, _ = even_clock(true + 0.03 * (np.arange(200) % 10 == 5), 0.1)
+    np.testing.assert_allclose(even, true, atol=1e-9)
+
+
 def test_a_clock_of_another_rate_is_refused() -> None:
     t = np.floor(np.arange(0.0, 60.0, 0.1) + 1e-9)
     with pytest.raises(DataError, match=r"log\.csv: row \d+, clock\.every: the time is .* from rows every 0\.2 s"):

@@ -59,6 +59,14 @@ def test_fixes_say_the_time_and_radar_targets_do_not(body: str, time: Any) -> No
     assert said.time() == time
 
 
+@pytest.mark.parametrize("time", ["240000", "126000", "120061", "-10000", "12-100"])
+def test_a_time_that_no_day_has_is_refused(time: str) -> None:
+    said = parse_sentence(sentence(f"GPGLL,{WHERE},{time},A")[1:], checked=True)
+    assert said is not None
+    with pytest.raises(ValueError, match="is no time of day"):
+        said.time()
+
+
 @pytest.mark.parametrize("seed", seeds(2, 5))
 def test_sentences_say_what_another_implementation_reads(seed: int) -> None:
     rng = np.random.default_rng(seed)

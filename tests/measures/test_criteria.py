@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from shipid.measures.criteria import first_overshoot_limit, judge_criteria, second_overshoot_limit
+from shipid.measures.criteria import (
+    Criterion,
+    criterion_rows,
+    first_overshoot_limit,
+    judge_criteria,
+    measure_rows,
+    second_overshoot_limit,
+)
 from shipid.measures.record import AT_REST, Measures
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, every
@@ -98,3 +107,30 @@ def test_a_measure_up_to_its_limit_is_met(
     """Of a ship of 200 m; the numbers are those of the resolution."""
     for value, met in ((most * (1 - 1e-9), True), (most * (1 + 1e-9), False)):
         assert judged(kind, 200.0, **{**changes, measure: value})[paragraph][2] is met
+
+
+def test_angles_are_in_degrees_and_distances_also_in_ship_lengths() -> None:
+    measures = Measures()
+    measures.add("", overshoot_1=(math.radians(12.0), "rad"))
+    measures.add("", advance=(150.0, "m"))
+    measures.add("the log ends before the fourth execute", period=(float("nan"), "s"))
+    angle, distance, period = measure_rows(measures, 50.0)
+    assert (angle["measure"], angle["unit"]) == ("overshoot 1", "deg")
+    assert angle["value"] == pytest.approx(12.0)
+    assert math.isnan(angle["lengths"])
+    assert (distance["value"], distance["lengths"], distance["unit"]) == (150.0, 3.0, "m")
+    assert period["note"] == "the log ends before the fourth execute"
+
+
+def test_without_a_ship_length_there_are_no_lengths() -> None:
+    measures = Measures()
+    measures.add("", advance=(150.0, "m"))
+    assert math.isnan(measure_rows(measures, None)[0]["lengths"])
+
+
+@pytest.mark.parametrize(("met", "verdict"), [(True, "met"), (False, "not met"), (None, "not judged")])
+def test_a_verdict_is_in_words(met: bool | None, verdict: str) -> None:
+    row = criterion_rows([Criterion("yaw", math.radians(9.0), math.radians(10.0), "rad", met, "why")])[0]
+    assert row["verdict"] == verdict
+    assert (row["value"], row["limit"]) == (pytest.approx(9.0), pytest.approx(10.0))
+    assert row["unit"] == "deg"

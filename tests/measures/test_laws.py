@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.measures.criteria import judge_criteria
+from shipid.measures.criteria import judge_criteria, measure_rows
 from shipid.measures.recognise import recognise_kinds
 from shipid.measures.record import Measures, Record
-from shipid.measures.rows import measure_rows
 from shipid.simulation.standard import standard_manoeuvres
 from shipid.units import DEGREE
 from tests.measures.made_records import RECORDS, every, rows

@@ -109,3 +109,6 @@ def test_a_helm_put_amidships_for_long_is_a_pull_out_too() -> None:
     assert recognise_kinds(run([(10.0, 20), (200.0, 0)], 250.0)) == (("turning", "pull-out"), "")
     assert recognise_kinds(run([(10.0, 20), (200.0, 0), (230.0, 10)], 300.0)) == (("turning",), "")
     assert recognise_kinds(run([(10.0, 20), (200.0, 0), (250.0, 10)], 300.0)) == (("turning", "pull-out"), "")
+    slow = [(10.0, 20), (200.0, 8), (220.0, 0)]  # the helm goes back in steps: the time counts from amidships
+    assert recognise_kinds(run([*slow, (245.0, 10)], 300.0)) == (("turning",), "")
+    assert recognise_kinds(run([*slow, (265.0, 10)], 300.0)) == (("turning", "pull-out"), "")

@@ -14,6 +14,7 @@ from shipid.physics.propeller import (
     controllable_wash,
     four_quadrant,
     four_quadrant_wash,
+    propeller_torque,
     propeller_wash,
     propeller_wrench,
     quadratic_propeller_wrench,
@@ -38,6 +39,15 @@ def washed(nu_r: list[float], n: float, **other: Any) -> np.ndarray:
 def test_thrust_by_hand() -> None:
     """J = 0.6 x 1.179 / (10.4 x 0.216) = 0.3149, K_T = 0.1927: 0.78 x 1000 x 10.4^2 x 0.216^4 x K_T = 35.4 N."""
     assert thrust(1.179, 10.4)[0] == pytest.approx(35.39, abs=0.02)
+
+
+@pytest.mark.parametrize("u", [1.179, -0.4])
+@pytest.mark.parametrize("n", [10.4, -8.0])
+def test_a_torque_by_the_polynomial_of_the_thrust_is_the_thrust_times_the_diameter(u: float, n: float) -> None:
+    """Q = K_Q rho n^2 D^5 and T = K_T rho n^2 D^4 by definition, of a screw astern in its sense too."""
+    numbers = {name: value for name, value in SCREW.items() if name != "K_T"} | {"K_Q": SCREW["K_T"], "rho": RHO}
+    torque = propeller_torque(ca.SX(np.array([u, 0, 0, 0, 0, 0])), ca.SX(n), **numbers)
+    assert float(ca.evalf(torque)) == pytest.approx(0.216 * thrust(u, n)[0] / 0.78, rel=1e-9)
 
 
 def test_race_is_momentum_theory() -> None:

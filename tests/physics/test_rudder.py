@@ -8,8 +8,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from shipid.physics.propeller import propeller_wash
 from shipid.physics.rudder import (
     coefficients_normal_force,
+    polynomial_normal_force,
     rudder_coefficients,
     rudder_derivatives,
     rudder_wrench,
@@ -76,6 +78,17 @@ def test_rudder_coefficients_by_hand() -> None:
     np.testing.assert_allclose(forces, [X, Y, 0, 0, 0, N], rtol=1e-9)
     shown = ca.evalf(coefficients_normal_force(*given, kappa=0.5, L_pp=L, rho=1000.0, **values))
     assert float(shown) == pytest.approx(-X * np.sin(delta) - Y * np.cos(delta))  # across the blade
+
+
+@pytest.mark.parametrize("u", [0.02, 2.0, -0.5])
+def test_a_screw_that_does_not_push_leaves_a_rudder_in_its_inflow(u: float) -> None:
+    """However much of the blade is in the slipstream, at the slowest speeds too."""
+    nu_r, n = ca.SX(np.array([u, 0.1, 0, 0, 0, 0])), ca.SX(1.0)
+    wake = {"w_P0": 0.0, "C_1": 2.0, "C_2_plus": 1.6, "C_2_minus": 1.1}
+    wash = propeller_wash(nu_r, n, x=-3.4, D_p=D_P, K_T={"1": ca.SX(0.0)}, **wake)
+    numbers = {"A_R": 0.05, "f_alpha": 2.7, "epsilon": 1.0, "v_R": {"v": -0.5}, "L_pp": L, "rho": 1000.0}
+    forces = [float(ca.evalf(polynomial_normal_force(nu_r, ca.SX(0.3), wash, k_x=k, **numbers))) for k in (0.0, 0.9)]
+    assert forces[1] == pytest.approx(forces[0], rel=1e-9)
 
 
 def side_force(delta: float, **other: float) -> float:

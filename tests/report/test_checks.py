@@ -2,7 +2,7 @@ import re
 
 import pandas as pd
 
-from shipid.report.checks import CheckContent, write_checks
+from shipid.report.logs import CheckContent, write_checks
 from shipid.report.wording import set_sentence
 from tests.report.test_page import NASTY, Page
 

@@ -83,3 +83,6 @@ def test_takeaway_names_the_worst_instant(simulation):
     mine = frame[(frame.model == "nominal") & (frame.N_D == 100)]
     worst = mine.loc[mine.error.idxmax()]
     assert f"in {worst.run} at t = {worst.t:g} s: {worst.error:.2f} m" in over_time(simulation).takeaway
+    alone = frame[(frame.model == "nominal") & (frame.source == "physics") & (frame.run == worst.run)]
+    alone = alone[alone.t == worst.t].error.iloc[0]
+    assert f"where its physics alone errs by {alone:.2f} m" in over_time(simulation).takeaway

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from shipid.report.glossary import MEANINGS, mark_short_names
+from shipid.report.page import MEANINGS, mark_short_names
 
 
 def plain(text: str) -> str:

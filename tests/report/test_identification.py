@@ -124,6 +124,7 @@ def test_tables_keep_the_order_and_say_why_numbers_are_missing() -> None:
     assert table is not None
     assert table.columns[-1] == "why missing"
     assert table.rows[1][-1].text == "before: no"
+    assert "Extrapolated: turning 35 reaches 20 deg of drift; the data reach 13." in table.takeaway
     rows = identification.estimates_table(content()).rows
     assert rows[1][0].text == "hull.N_r (with hull.N_v)"
     assert [row[6].text for row in rows] == ["1.00 … 1.20", "0.60 … 1.00", "none"]

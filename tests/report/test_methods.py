@@ -25,8 +25,8 @@ def frame(seed: int, conditions: tuple[str, ...] = ("calm", "rough"), failing: b
                     difference = 0.0 if method == "a" else H - 3
                     failed = {"c": 1 if failing else 0, "lost": 4}.get(method, 0)
                     rows.append(
-                        dict(zip(METHOD_COLUMNS, [condition, family, N_D, method, 4, failed, failed, H, 2 * H,
-                                 1.7 * H, 2.0, 8.0, "a",
+                        dict(zip(METHOD_COLUMNS, [condition, family, N_D, method, 4, failed, failed,
+                                 1.7 * H, 3 * H, H, 2 * H, 2.0, 8.0, "a",
                              4 - failed, difference, difference - 0.5, difference + 0.4, 9, 5, 2, difference - 0.1,
                              difference + 0.1, np.nan, np.nan], strict=True))
                     )  # fmt: skip
@@ -54,7 +54,9 @@ def test_the_sentences_name_the_least_error_among_methods_that_never_failed() ->
 def three(H: tuple[float, float, float], **more: list[object]) -> str:
     """The sentence of three methods at one amount of data, differences are to `a`."""
     rows = frame(1, ("",), failing=False)
-    rows = rows[rows.family.eq(WITH_PHYSICS) & rows.N_D.eq(3)].assign(H=H, difference=np.array(H) - H[0], **more)
+    rows = rows[rows.family.eq(WITH_PHYSICS) & rows.N_D.eq(3)].assign(
+        H_end=5.0, H=H, difference=np.array(H) - H[0], **more
+    )
     rows = rows.assign(low=rows.difference - 0.5, high=rows.difference + 0.5)
     (sentence,) = sentences_on_methods(rows)
     return sentence
@@ -62,15 +64,18 @@ def three(H: tuple[float, float, float], **more: list[object]) -> str:
 
 def test_methods_that_err_alike_are_named_together() -> None:
     assert three((2.0, 2.0 * (1 + 1e-15), 2.5)) == (
-        "With N_D = 3 a and b err alike, least over all cells with physics, 2.00 m "
-        "(c is next, its difference to a is 0.50 m [0.00, 1.00])."
+        "With N_D = 3 a and b err alike, least over all cells with physics, 5.00 m at the horizon, H 2.00 m "
+        "(c is next, its difference of H to a is 0.50 m [0.00, 1.00])."
     )
-    assert "b and c err alike, least over all cells with physics, 1.00 m (their difference to a is" in three((2, 1, 1))
+    assert (
+        "b and c err alike, least over all cells with physics, 5.00 m at the horizon, H 1.00 m (their difference"
+        in three((2, 1, 1))
+    )
 
 
 def test_a_method_that_lacks_a_cell_is_named() -> None:
     rivals = three((9.0, 2.0, 3.0), missing=[1, 0, 1], failed=[1, 0, 0])
-    assert "b errs least over all cells with physics, 2.00 m" in rivals
+    assert "b errs least over all cells with physics, 5.00 m at the horizon, H 2.00 m" in rivals
     assert ", without a result: a (1 of 4) (left out: c," in rivals
 
 

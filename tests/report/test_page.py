@@ -156,7 +156,7 @@ def test_a_failed_cell_says_so(full_scale, pages):
     _, _, parsed = pages[full_scale.name]
     (row,) = (text for _, text in parsed.all("tr") if "diverged: 4 % of the test windows left the sea" in text)
     assert row.split("\n")[1:3] == [f"bare hull {NASTY}", "6.40"]
-    assert row.count("–") == 3  # H, H_90, rms
+    assert row.count("–") == 5  # H_end, H_end_90, H, H_90, rms
     assert any("Not plotted: bare hull" in text for _, text in parsed.all("figcaption"))
 
 

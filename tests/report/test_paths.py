@@ -43,3 +43,15 @@ def test_a_diverged_path_becomes_gaps(full_scale):
     paths = {key: np.where(np.arange(16)[:, None] > 7, np.inf, path) for key, path in first.paths.items()}
     text = json.dumps(window_data(replace(full_scale, snapshots=[replace(first, paths=paths)])), allow_nan=False)
     assert "null" in text
+
+
+def test_the_page_begins_with_the_window_of_the_median_error(simulation):
+    figure = paths.glance_figure(simulation)
+    (drawn,) = figure.draw()
+    key = simulation.best, "cooperative", 100
+    errors = [float(np.linalg.norm(one.paths[key][-1] - one.truth[-1])) for one in simulation.snapshots]
+    shown = simulation.snapshots[int(np.argsort(errors, kind="stable")[len(errors) // 2])]
+    assert f"errs here by {np.median(errors):.2f} m" in figure.takeaway
+    true = next(trace for trace in drawn["data"] if trace["name"] == "true path")
+    np.testing.assert_allclose(true["y"], shown.truth[:, 0], rtol=1e-5)
+    assert paths.glance_figure(replace(simulation, snapshots=[])) is None

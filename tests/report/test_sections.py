@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 
 from shipid.answer.pages import REPORT_FRAMES
-from shipid.report import ReportContent, checks, identification, manoeuvre
+from shipid.report import ReportContent, identification, logs, motion
 from shipid.report.page import OF_EVERY_PAGE, Section, draw_sections, render_page
 from shipid.report.sections import SECTIONS
 from tests.documented import module
-from tests.report import test_checks, test_identification, test_manoeuvre
+from tests.report import test_checks, test_identification, test_motion
 
 PAGES = {
     "study": (SECTIONS, None),
-    "check": (checks.CHECK_PAGE, lambda: test_checks.content("log")),
+    "check": (logs.CHECK_PAGE, lambda: test_checks.content("log")),
     "identification": (identification.IDENTIFICATION_PAGE, test_identification.content),
-    "manoeuvre": (manoeuvre.MANOEUVRE_PAGE, lambda: test_manoeuvre.content("spiral")),
+    "manoeuvre": (motion.MANOEUVRE_PAGE, lambda: test_motion.content("spiral")),
 }
 
 

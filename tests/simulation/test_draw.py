@@ -10,9 +10,8 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DocumentError
-from shipid.simulation.draw import ManoeuvreDraw
 from shipid.simulation.manoeuvre import KINDS, Spiral, StepManoeuvre, Zigzag
-from shipid.simulation.truth import Truth, check_truth, draw_manoeuvres, simulate_truth
+from shipid.simulation.truth import ManoeuvreDraw, Truth, check_truth, draw_manoeuvres, simulate_truth
 from shipid.vessel.load import load_vessel
 from tests.conftest import LAG
 

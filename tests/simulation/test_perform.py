@@ -16,7 +16,7 @@ from shipid.simulation.manoeuvre import (
     Zigzag,
 )
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.sea import Sea, draw_components, wave_loads
+from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.units import DEGREE
 from shipid.vessel.load import load_vessel
 from tests.conftest import LAG

@@ -10,7 +10,7 @@ import pytest
 from shipid.errors import DocumentError
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres
-from shipid.simulation.scripted import simulate_script
+from shipid.simulation.truth import simulate_script
 from shipid.vessel.load import load_vessel
 
 SHIP = load_vessel("mariner")

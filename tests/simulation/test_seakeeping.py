@@ -14,8 +14,8 @@ import pytest
 from shipid.engine.native import find_compiler
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.physics.frames import skew_matrix
-from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.simulation.truth import Truth, simulate_truth
+from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from shipid.errors import DocumentError
-from shipid.simulation.sensors import Sensor, measure_record
+from shipid.simulation.truth import Sensor, measure_record
 
 STEP, ROWS = 0.05, 2001
 

@@ -11,8 +11,8 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError
-from shipid.simulation.sea import Sea, draw_components, wave_loads
 from shipid.simulation.truth import Truth, check_truth, simulate_truth
+from shipid.simulation.weather import Sea, draw_components, wave_loads
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
 from tests.conftest import PATCHED

@@ -25,7 +25,7 @@ from shipid.study.apply import predict_log
 from shipid.study.plan import Plan
 from shipid.study.prepare import prepare
 from shipid.vessel.load import load_vessel
-from tests.study.tiny import logged, run_here, tiny_plan
+from tests.study.tiny import logged, physics_errors, run_here, tiny_plan
 
 KNOWN = {"prediction.commands": "known"}
 
@@ -81,7 +81,7 @@ def test_right_physics_with_known_commands_misses_nothing(recorded: Callable[...
         kind: recorded(weaving(), split={"test": 2}, prediction={"ahead": 5.0, "commands": kind})
         for kind in ("held", "known")
     }
-    A = {kind: prepare(plan, dataset).accuracy("right")["mean"] for kind, (plan, dataset) in plans.items()}
+    A = {kind: physics_errors(prepare(plan, dataset), "right")["mean"] for kind, (plan, dataset) in plans.items()}
     assert A["known"] < 1e-9
     assert A["held"] > 0.01
 

@@ -17,15 +17,14 @@ from shipid.errors import DataError, DocumentError
 from shipid.identification import solve
 from shipid.observer import Observer, run_observer
 from shipid.predictor import Predictor
-from shipid.study import foundations, run, store
+from shipid.study import cells, run, store
 from shipid.study import prepare as preparing
-from shipid.study.cells import accuracy_of
-from shipid.study.foundations import predictions
-from shipid.study.plan import Plan, whole_unit
+from shipid.study.cells import accuracy_of, predictions
+from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, prepare
 from shipid.study.results import read_results
 from tests.study.test_commands import weaving
-from tests.study.tiny import run_here
+from tests.study.tiny import run_here, whole_unit
 
 PATHS = ["hull.derivatives.X_u|u|", "hull.derivatives.N_uv", "hull.derivatives.N_ur"]
 WEIGHTS = {"u": 0.01, "v": 0.01, "r": 0.001}
@@ -88,7 +87,7 @@ def test_what_cannot_be_fitted_says_what_it_was(
     def fails(*_: Any, **__: Any) -> Any:
         raise DataError("no")
 
-    monkeypatch.setattr(foundations, "chosen_observer", fails)
+    monkeypatch.setattr(cells, "chosen_observer", fails)
     monkeypatch.setattr(solve, "identify", fails)
     plan, dataset = study(recorded, [WRONG, family])
     prepared = prepare(plan, dataset)
@@ -217,7 +216,8 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
 def test_a_member_that_diverges_is_redrawn_once_for_it_and_its_identified_twin(recorded: Recorded) -> None:
     """Yaw damping of the wrong sign in nearly every draw; the identified family starts from the same member."""
     family = {"name": "wild", "base": "gunnerus-28.9", "seed": 2}
-    family["perturb"] = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_ur"], "factor": [-60.0, 3.0]}]
+    block = {"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_ur"], "factor": [-60.0, 3.0]}
+    family["perturb"] = [block | {"change_sign": True}]
     plan, dataset = study(recorded, [family, {"name": "tamed", "extends": "wild", "identify": IDENTIFY}])
     prepared = prepare(plan, dataset)
     variants = [one.variant for one in prepared.foundations if one.variant]

@@ -18,16 +18,18 @@ from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
+from shipid.logs.kinds import LOW_SPEED, RANDOM
 from shipid.predictor import Predictor
 from shipid.study import prepare as module
 from shipid.study.envelope import input_envelope
-from shipid.study.plan import Plan, read_plan, whole_unit
+from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import (
     PreparedStudy,
     all_windows,
     constant_motion,
     estimates_of,
     instants_of,
+    kinds_of_runs,
     obtain_runs,
     over_gaps,
     prepare,
@@ -38,7 +40,7 @@ from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import draw_variant, resolve_families
 from tests.study.test_commands import weaving
-from tests.study.tiny import logged, tiny_plan
+from tests.study.tiny import logged, physics_errors, tiny_plan, whole_unit
 
 SHIP = load_vessel("gunnerus-28.9")
 ONE_FAMILY = {"name": "right", "base": "gunnerus-28.9"}
@@ -98,8 +100,8 @@ def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     """A truth of the same equations, step and rule leaves A = 0: windows, frames and held commands add no error."""
     plan = tiny_plan(tmp_path, {"truth.step": 1.0, "truth.method": "euler"})
     prepared = prepare(plan, obtain_runs(plan))
-    assert prepared.accuracy("right")["rms"] < 1e-9
-    assert prepared.accuracy("wrong-1")["mean"] > 0.01
+    assert physics_errors(prepared, "right")["rms"] < 1e-9
+    assert physics_errors(prepared, "wrong-1")["mean"] > 0.01
     np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
 
 
@@ -116,7 +118,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(module, "window_memory", counted)
     family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
-    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0]}]
+    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0], "change_sign": True}]
     plan = tiny_plan(tmp_path, {"family": [family]})
     prepared = prepare(plan, obtain_runs(plan))
     rule = resolve_families(plan.study.family)[0]
@@ -141,7 +143,7 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr(module, "MOST_REDRAWS", 9)
     for factor, message in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 9 redraws")):
         family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
-        family["perturb"][0]["factor"] = factor  # type: ignore[index]
+        family["perturb"][0] |= {"factor": factor, "change_sign": True}  # type: ignore[index]
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
         with pytest.raises(DivergenceError, match=message) as caught:
             prepare(plan, obtain_runs(plan))
@@ -165,7 +167,7 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     for model in prepared.foundations[:-1]:
         assert model.variant is not None
         assert model.variant.counter == 0
-    accuracy = prepared.accuracy("brittle-1")
+    accuracy = physics_errors(prepared, "brittle-1")
     assert (accuracy["status"], accuracy["failed_share"]) == ("diverged", 0.5)
     assert np.isnan(accuracy["mean"])
     rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")}
@@ -327,7 +329,7 @@ def test_the_sea_trials_test_is_untouched(shared_data: Path, monkeypatch: pytest
         for train, validation in prepared.folds(batch, windows, plan.methods[0].method.validation):
             gaps = np.abs(windows.t[train][:, None] - windows.t[validation])
             assert gaps.min() > 15.0
-    assert prepared.accuracy("accurate")["mean"] < prepared.accuracy("inaccurate")["mean"]
+    assert physics_errors(prepared, "accurate")["mean"] < physics_errors(prepared, "inaccurate")["mean"]
 
 
 def test_a_test_run_that_is_a_copy_of_one_that_trains_is_named(
@@ -370,3 +372,32 @@ def test_a_note_says_that_rows_are_farther_apart_than_the_step(tiny: tuple[Plan,
     assert prepare(plan, rare).notes == (
         "rows are 5 s apart and the step is 1 s: path and motion between rows are interpolated",
     )
+
+
+T = np.arange(0.0, 200.0)
+
+
+def steps(levels: list[float]) -> np.ndarray:
+    return np.repeat(np.radians(levels), len(T) // len(levels))
+
+
+def test_the_mapping_wins_over_the_name_and_the_name_over_the_motion() -> None:
+    helm = steps([10, -10, 10, -10, 10, -10, 10, -10])
+    columns = {"psi": np.cumsum(-0.05 * helm), "r": -0.05 * helm, "u": 4.0, "port.n": 2.0, "port.alpha": helm}
+    runs = {"ZZ 1": columns, "berthing 1": columns, "run 3": columns}
+    log = logged(runs, T, manoeuvres={"ZZ 1": "turning"})
+    assert kinds_of_runs(log) == {"ZZ 1": "turning", "berthing 1": LOW_SPEED, "run 3": "zigzag"}
+
+
+def test_a_simulated_run_is_of_the_kind_that_was_drawn(tmp_path: Path) -> None:
+    """What its motion looks like is another question: turns of random length look like anything."""
+    blocks = [
+        {"kind": "zigzag", "n_rpm": 150.0},
+        {"kind": "turning", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
+        {"kind": "turning_circle", "n_rpm": 150.0},
+        {"kind": "excitation", "n_rpm": [100.0, 200.0], "angle_deg": 20.0, "signal": "aprbs"},
+        {"kind": "steps", "n_rpm": [100.0, 200.0], "alpha_deg": [-30.0, 30.0]},
+    ]
+    for block, kind in zip(blocks, ["zigzag", "turning", "turning", RANDOM, RANDOM], strict=True):
+        plan = tiny_plan(tmp_path, {"truth.manoeuvre": [block], "truth.manoeuvres": 10})
+        assert set(kinds_of_runs(obtain_runs(plan)).values()) == {kind}

@@ -10,7 +10,7 @@ from optuna.distributions import FloatDistribution
 from shipid.files import write_json
 from shipid.hybrid.journal import Journal
 from shipid.study import seals
-from shipid.study.progress import search_words
+from shipid.study.check import search_words
 from shipid.study.store import JOURNALS, part_folder, rows_file
 from tests.study.tiny import tiny_plan
 

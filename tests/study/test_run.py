@@ -30,15 +30,15 @@ from shipid.hybrid.search import trial_row
 from shipid.metrics import position_error, summarise_errors
 from shipid.physics import TERMS, Term
 from shipid.predictor import Predictor
-from shipid.study import run, seals, sessions, store
+from shipid.study import run, seals, store
 from shipid.study.check import check_folder
-from shipid.study.plan import Plan, whole_unit
+from shipid.study.plan import Plan
 from shipid.study.prepare import obtain_runs, prepare
 from shipid.study.results import read_results
 from shipid.study.run import run_study, run_unit
 from shipid.vessel.load import load_vessel
 from tests.documented import code
-from tests.study.tiny import events_here, make_run, mixed_plan, run_here, tiny_plan
+from tests.study.tiny import events_here, make_run, mixed_plan, run_here, tiny_plan, whole_unit
 
 
 class Silent:
@@ -87,7 +87,7 @@ def test_another_code_that_goes_on_is_noted(tmp_path: Path, monkeypatch: pytest.
         if event.kind == "cell":
             break
     words = "code 12345678"
-    monkeypatch.setattr(sessions, "code_digest", lambda: "12345678")
+    monkeypatch.setattr(run, "code_digest", lambda: "12345678")
     notes = [event.text for event in events_here(plan, folder) if event.kind == "note"]
     assert any("computed otherwise: shipid was" in note and words in note for note in notes)
     assert any(words in line for line in check_folder(folder).lines)

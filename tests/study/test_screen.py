@@ -76,7 +76,13 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
 
 
 def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
-    wild = [{"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"], "factor": [-3e4, 1.0]}]
+    wild = [
+        {
+            "parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"],
+            "factor": [-3e4, 1.0],
+            "change_sign": True,
+        }
+    ]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": wild}]
     meant = {"unusual": ["family.0.perturb.0.factor*"]}
     frame = screened(tiny_plan(tmp_path, {"family": family, **meant}), 6)

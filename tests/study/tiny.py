@@ -12,10 +12,12 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Dataset
+from shipid.metrics import ErrorSummary, position_error, summarise_errors
 from shipid.report import page
 from shipid.report.sections import SECTIONS
 from shipid.study import run, store
-from shipid.study.plan import Plan, Unit, build_plan, read_plan
+from shipid.study.plan import Batch, Plan, Unit, build_plan, read_plan
+from shipid.study.prepare import PreparedStudy
 
 TINY = Path(__file__).parents[1] / "bad" / "studies" / "plain.toml"
 
@@ -25,6 +27,16 @@ def tiny_plan(folder: Path, changes: Mapping[str, Any] | None = None) -> Plan:
     file = folder / "tiny.toml"
     file.write_text(TINY.read_text())
     return read_plan(file, changes)
+
+
+def whole_unit(plan: Plan, batch: Batch) -> Unit:
+    """All cells of a batch as one unit."""
+    return Unit(batch, tuple((name, way.name) for name, way in plan.pairs), batch.key)
+
+
+def physics_errors(prepared: PreparedStudy, foundation: str) -> ErrorSummary:
+    """Mean, 90th percentile and RMS error [m] of the physics alone on the test windows."""
+    return summarise_errors(position_error(prepared.test_paths[foundation], prepared.test.future))
 
 
 MIXED = [

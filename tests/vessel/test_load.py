@@ -60,6 +60,15 @@ def test_new_numbers_make_the_vessel_that_a_document_of_them_makes(vessel: Vesse
     assert (short.parameters, short.units, short.structure) == (whole.parameters, whole.units, whole.structure)
 
 
+def test_what_must_be_above_0_is_refused_at_0_in_a_copy_as_in_a_document() -> None:
+    vessel = load_vessel("gunnerus-28.9")
+    assert {"inertia.m", "constants.rho", "thruster.port.D_p"} <= vessel.above_zero
+    assert vessel.above_zero.isdisjoint({"hull.derivatives.Y_v", "thruster.port.y"})
+    for path in vessel.above_zero:
+        with pytest.raises(DocumentError, match=re.escape(path)):
+            vessel.with_values({path: 0.0})
+
+
 def test_patches_may_be_stacked(tmp_path: Path) -> None:
     (tmp_path / "lower.toml").write_text('base = "gunnerus-28.9"\n[set]\n"inertia.m" = 4e5\n"inertia.I_z" = 2e7\n')
     (tmp_path / "upper.toml").write_text('base = "./lower.toml"\nname = "upper"\n[set]\n"inertia.m" = 5e5\n')

@@ -71,6 +71,19 @@ def test_a_rudder_turns_a_ship_that_goes_astern_the_other_way(sign: int) -> None
     assert f"is 'rudder' positive to {'starboard' if sign > 0 else 'port'}?" in question.sentence
 
 
+def test_the_side_of_a_rudder_that_is_never_negative_is_asked_and_not_found() -> None:
+    state = chosen({"rudder [deg]": 40.0 - RUDDER})
+    assert described(state) == {"rudder.delta": ("rudder [deg]", "deg", 1)}
+    assert state.findings == []
+    assert "is never negative, but the ship turns to both sides" in state.questions[0].sentence
+
+
+@pytest.mark.parametrize(("unit", "full"), [("%", 100), ("per mille", 1000), ("p.u.", 1)])
+def test_a_rudder_in_a_share_is_asked_for_the_angle_of_the_whole(unit: str, full: int) -> None:
+    (question,) = chosen({f"rudder [{unit}]": full / 35.0 * RUDDER}).questions
+    assert question.sentence.endswith(f"of which angle? Write factor = (deg at {full}) / {full}")
+
+
 def test_the_sign_of_a_rudder_that_moves_nothing_is_not_known() -> None:
     (column,) = chosen({"rudder": RUDDER}, quiet=True).suggestions
     assert column.confidence <= 0.5

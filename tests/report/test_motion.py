@@ -9,12 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shipid.measures.criteria import judge_criteria
-from shipid.measures.rows import criterion_rows, measure_rows
+from shipid.measures.criteria import criterion_rows, judge_criteria, measure_rows
 from shipid.measures.spiral import helm_levels
-from shipid.report import manoeuvre
+from shipid.report import motion
 from shipid.report.figure import MOST_LINE_POINTS, even_places
-from shipid.report.manoeuvre import ManoeuvreContent, write_manoeuvre
+from shipid.report.motion import ManoeuvreContent, write_manoeuvre
 from shipid.report.paths import outline_at
 from shipid.simulation.standard import standard_manoeuvres
 from tests.measures.made_records import RECORDS, every
@@ -63,7 +62,7 @@ def test_the_answer_has_the_digits_of_the_table() -> None:
     helm = shown.measures["measure"].eq("neutral helm")
     shown = replace(shown, measures=shown.measures.assign(value=shown.measures["value"].mask(helm, -0.0248)))
     assert "Neutral helm: −0.025 deg" in shown.answer[0].text
-    assert "−0.025" in [row[1].text for row in manoeuvre.measures_table(shown).rows]
+    assert "−0.025" in [row[1].text for row in motion.measures_table(shown).rows]
     still = shown.measures.assign(value=shown.measures["value"].mask(helm, -1e-9))
     assert "Neutral helm: 0.00 deg" in replace(shown, measures=still).answer[0].text
 
@@ -73,17 +72,19 @@ def test_answer_counts_the_criteria_that_are_judged() -> None:
     assert shown.answer[1].text == "3 of 3 criteria of IMO MSC.137(76) are met."
     worse = shown.criteria.assign(verdict=["met", "not met", "not judged"])
     assert replace(shown, criteria=worse).answer[1].text == "1 of 2 criteria of IMO MSC.137(76) are met."
-    table = manoeuvre.criteria_table(replace(shown, criteria=worse))
+    for notes, words in ((["in ballast"] * 3, "met; in ballast."), (["in ballast", "", ""], "met.")):
+        assert replace(shown, criteria=shown.criteria.assign(note=notes)).answer[1].text.endswith(words)
+    table = motion.criteria_table(replace(shown, criteria=worse))
     assert table is not None
     assert [row[4].bad for row in table.rows] == [False, True, False]
 
 
 def test_a_missing_measure_says_why_in_its_row() -> None:
     shown = content("zigzag")
-    assert "why missing" not in manoeuvre.measures_table(shown).columns
+    assert "why missing" not in motion.measures_table(shown).columns
     spoiled = shown.measures.copy()
     spoiled.loc[spoiled["measure"] == "period", ["value", "note"]] = [np.nan, "too short"]
-    table = manoeuvre.measures_table(replace(shown, measures=spoiled))
+    table = motion.measures_table(replace(shown, measures=spoiled))
     row = next(row for row in table.rows if row[0].text == "period")
     assert (row[1].text, row[4].text, row[4].bad) == ("–", "too short", True)
     assert "period: not reached" in replace(shown, measures=spoiled).answer[0].text
@@ -100,7 +101,7 @@ def test_ships_are_drawn_to_scale_where_they_were() -> None:
 def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     shown = content(kind)
     shown = replace(shown, log=shown.log.assign(psi=shown.log["psi"] + 1.0, shaft=np.linspace(-1, 2, len(shown.log))))
-    panels = views(manoeuvre.histories_figure(shown))[""]
+    panels = views(motion.histories_figure(shown))[""]
     lines = {str(trace["name"]): np.asarray(trace["y"]) for panel in panels for trace in panel.data}
     log = shown.log.iloc[even_places(len(shown.log), MOST_LINE_POINTS)]
     expected = {"heading": np.degrees(log["psi"] - log["psi"].iloc[0]), "helm": np.degrees(log["helm"])}
@@ -108,7 +109,7 @@ def test_lines_are_in_the_units_of_their_axes(kind: str) -> None:
     for name, values in {**expected, "shaft": 60 * log["shaft"]}.items():
         np.testing.assert_allclose(lines[name], values, rtol=1e-5, atol=1e-5, err_msg=name)
     if kind == "spiral":
-        figure = manoeuvre.spiral_figure(shown)
+        figure = motion.spiral_figure(shown)
         assert figure is not None
         (trace,) = views(figure)[""][0].data
         for axis, column in (("x", "helm"), ("y", "rate")):

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from shipid.document import bundled_documents
+from tests.cli.running import ended, output_of
+
+
+@pytest.mark.parametrize("vessel", bundled_documents("models"))
+def test_what_is_shown_fits_100_columns(vessel: str, tmp_path: Path) -> None:
+    """Law over all bundled vessels, of `vessel show` and of `family show`; a path of a file is as long as it is."""
+    file = tmp_path / "f.toml"
+    output_of("family", "new", vessel, "--out", file, "--members", 3)
+    lines = [*output_of("vessel", "show", vessel).splitlines(), *output_of("family", "show", file).splitlines()]
+    assert max(len(line) for line in lines if not line.startswith(("file ", "/"))) <= 100
+
+
+def test_the_way_of_a_family(tmp_path: Path) -> None:
+    """Draft, show, roll out, lock, compare, verify; a changed lock is one line that says where."""
+    file, table, motions, html = (tmp_path / name for name in ("f.toml", "t.csv", "m.parquet", "s.html"))
+    output_of("family", "new", "gunnerus-28.9", "--out", file, "--members", 4)
+    assert "high: 4 of R/V Gunnerus" in output_of("family", "show", file)
+    output_of("family", "show", file, "--family", "high", "--csv", table)
+    assert pd.read_csv(table).shape == (4, 1 + 2 * 37)
+    more = ("--family", "high", "--csv", motions, "--html", html)
+    rolled = output_of("family", "rollout", file, "zigzag", 20, 20, *more)
+    assert "4 members after 266 s" in rolled
+    assert html.stat().st_size > 10_000
+    assert pd.read_parquet(motions)["member"].nunique() == 4
+    lock = tmp_path / "out" / "high.lock.toml"
+    assert str(lock) in output_of("family", "export", file, "--family", "high", "--out", tmp_path / "out")
+    assert "bit for bit" in output_of("family", "diff", file, lock, "--family", "high")
+    assert "as locked: digest" in output_of("family", "verify", lock)
+    lock.write_text(lock.read_text().replace("seed = 2", "seed = 3"))
+    code, _, error = ended("family", "verify", lock)
+    assert (code, error.count("\n"), "not as they were locked" in error) == (1, 1, True)
+    differences = json.loads(output_of("family", "diff", file, lock, "--family", "high", "--json"))
+    assert differences["rules"] == [{"what": "rules.seed", "one": 2, "other": 3}]
+    assert {row["members that differ"] for row in differences["numbers"]} == {4}
+    assert "choose one of nominal, moderate, high" in ended("family", "export", file, "--out", tmp_path)[2]

@@ -1,0 +1,191 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+import shipid
+from shipid.document import digest_document
+from shipid.errors import DocumentError, ShipidError
+from shipid.simulation.families import VesselFamily, compare_contents
+from shipid.study.plan import read_plan
+from shipid.vessel.perturb import Family, Perturbation, draw_members
+
+HULL = {"parameters": ["hull.derivatives.*"], "factor": [0.4, 1.6]}
+MASS = {"parameters": ["inertia.m", "added_mass.X_udot"], "factor": [0.8, 1.2], "together": True}
+SAMPLES = ("independent", "latin-hypercube", "sobol")
+DOCUMENT = """
+vessel = "gunnerus-28.9"
+[[family]]
+name = "low"
+members = 9
+seed = 4
+[[family.perturb]]
+parameters = ["hull.derivatives.*"]
+factor = [0.4, 1.6]
+[[family]]
+name = "high"
+extends = "low"
+members = 5
+sample = "sobol"
+[[family.perturb]]
+parameters = ["inertia.m"]
+bias = [-1e4, 1e4]
+"""
+
+
+def family(*perturb: dict[str, Any], **more: Any) -> VesselFamily:
+    given = {"name": "f", "base": "gunnerus-28.9", "members": 8, "seed": 3, "perturb": list(perturb)}
+    return VesselFamily(Family(**given | more), shipid.load_vessel("gunnerus-28.9"))
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> Path:
+    file = tmp_path / "families.toml"
+    file.write_text(DOCUMENT)
+    return file
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_a_member_is_the_same_in_any_process_and_order(sample: str) -> None:
+    """Law: digests are equal in another process, drawn backwards, one at a time, and with other blocks after."""
+    here = family(HULL, MASS, sample=sample)
+    code = (
+        "from tests.simulation.test_families import *\n"
+        f"print([digest_document(one.values) for one in family(HULL, MASS, sample={sample!r}).members])"
+    )
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    assert other.stdout.strip() == str([digest_document(one.values) for one in here.members])
+    for number in range(7, -1, -1):
+        assert draw_members(here.rules, here.base, numbers=[number])[0] == here.members[number]
+    longer = family(HULL, MASS, {"parameters": ["inertia.I_z"], "bias": [-1e5, 1e5]}, sample=sample)
+    for one, more in zip(here.members, longer.members, strict=True):
+        assert one.values.items() < more.values.items()
+
+
+@pytest.mark.parametrize("sample", ["independent", "sobol"])
+def test_more_members_change_none(sample: str) -> None:
+    few, many = family(HULL, sample=sample), family(HULL, sample=sample, members=21)
+    assert [one.values for one in few.members] == [one.values for one in many.members[:8]]
+    assert few.draw(4).table().ne(few.table()).all(axis=None)
+
+
+def test_designed_samples_fill_the_ranges() -> None:
+    """A Latin hypercube has one member in each eighth of every range; both designs fill the cube more evenly."""
+    drawn = {s: family(HULL, sample=s, members=64).table().xs("factor", axis=1, level=1) for s in SAMPLES}
+    units = {sample: (table.to_numpy()[:, :4] - 0.4) / 1.2 for sample, table in drawn.items()}
+    assert (np.sort(np.floor(64 * units["latin-hypercube"]), axis=0) == np.arange(64)[:, None]).all()
+    discrepancy = {sample: qmc.discrepancy(points) for sample, points in units.items()}
+    assert discrepancy["sobol"] < discrepancy["latin-hypercube"] < discrepancy["independent"]
+    with pytest.raises(DocumentError, match="no member 8: a sobol sample has 8"):
+        draw_members(family(HULL, sample="sobol").rules, shipid.load_vessel("gunnerus-28.9"), numbers=[8])
+
+
+@pytest.mark.parametrize(
+    ("rule", "low", "high"),
+    [({"range": [-3e4, -2e4]}, -3e4, -2e4), ({"bias": [-1e3, 1e3]}, None, None), ({"bias": 500.0}, None, None)],
+)
+def test_ranges_and_biases_keep_their_bounds(rule: dict[str, Any], low: float | None, high: float | None) -> None:
+    path = "hull.derivatives.Y_uv"
+    drawn = family({"parameters": [path], **rule}, members=50)
+    values, base = drawn.table()[path, "value"], drawn.base.parameters[path]
+    bias = np.broadcast_to(rule.get("bias", 0.0), 2)
+    assert values.between(low or base + bias[0], high or base + bias[1]).all()
+    assert values.nunique() == (1 if rule == {"bias": 500.0} else 50)
+
+
+def test_structure_changes_every_member_and_its_patch(tmp_path: Path) -> None:
+    file = tmp_path / "calm.toml"
+    file.write_text(DOCUMENT.replace('name = "low"', 'name = "low"\nstructure = {"wind.off" = true}'))
+    calm = shipid.read_family(file, "high")
+    assert not any(path.startswith("wind") for path in calm.base.parameters)
+    calm.export(tmp_path / "out")
+    again = shipid.load_vessel(tmp_path / "out" / "high-2.toml")
+    assert list(again.parameters.values()) == calm.members[1].parameters
+    assert again.structure == calm.base.structure
+    file.write_text(file.read_text().replace("wind.off", "wind.of"))
+    with pytest.raises(DocumentError, match=r"family\.low\.structure: wind\.of"):
+        shipid.read_families(file)
+
+
+def test_what_is_likely_a_mistake_is_refused_with_the_word_that_allows_it(document: Path) -> None:
+    block = {"parameters": ["inertia.m"], "factor": (-0.3, 0.3)}
+    with pytest.raises(DocumentError, match=r"\+-30 % is \[0.7, 1.3\]; change_sign = true"):
+        Perturbation(**block)
+    assert Perturbation(**block, change_sign=True).drawn
+    document.write_text(DOCUMENT.replace("[0.4, 1.6]", "0.4"))
+    with pytest.raises(DocumentError, match=r"the 9 members are equal: .* equal = true allows it"):
+        shipid.read_families(document)
+
+
+def test_a_table_has_a_row_a_member_and_two_columns_a_path() -> None:
+    drawn = family(HULL, {"set": {"inertia.x_G": 1.0}})
+    table = drawn.table()
+    assert table.shape == (8, 2 * 33)
+    for number, one in enumerate(drawn.members):
+        assert table.xs("value", axis=1, level=1).iloc[number].to_dict() == one.values
+        assert table.xs("factor", axis=1, level=1).iloc[number].dropna().to_dict() == one.factors
+
+
+@pytest.mark.parametrize(("name", "angles"), [("zigzag", (10, 10)), ("turning", 20)])
+def test_trajectories_are_those_of_the_manoeuvre(name: str, angles: Any) -> None:
+    """Law: the base in a family is the base alone; a member is the same in any family; one rollout holds all."""
+    alike = {"parameters": ["inertia.m"], "factor": [1.0, 1.0]}
+    alone = shipid.measure_standard(family(alike).base, name, angles, approach="helmsman").frame
+    path = family(alike, members=2).trajectories(name, angles)
+    for channel in ("north", "east", "psi", "u", "v", "r"):
+        np.testing.assert_allclose(path[channel][:, 1, 0], alone[channel].to_numpy(), atol=1e-8)
+    many, few = family(HULL, members=6), family(HULL, members=3)
+    np.testing.assert_allclose(
+        many.trajectories(name, angles).states[:, :3], few.trajectories(name, angles).states, atol=1e-8
+    )
+    orders = {"port.n": 2.0, "starboard.n": 2.0, "port.alpha": 0.1, "starboard.alpha": 0.1}
+    motion = few.rollout({"u": 2.0}, orders)
+    alone_too = VesselFamily(Family(name="one"), few.base.with_values(few.members[2].values)).rollout(
+        {"u": 2.0}, orders
+    )
+    np.testing.assert_allclose(motion.states[:, 2], alone_too.states[:, 0], atol=1e-9)
+
+
+def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: Path) -> None:
+    lock = shipid.read_family(document, "high").export(tmp_path / "out")
+    assert len(shipid.verify_lock(lock)) == 16
+    assert not compare_contents(*(shipid.read_family(file, "high").content() for file in (document, lock)))
+    text = lock.read_text()
+    for old, new, path in (
+        ("bias = [-10000.0", "bias = [-9000.0", "rules"),
+        ('"inertia.m" = [', '"inertia.m" = [1.0, ', "m.0"),
+    ):
+        lock.write_text(text.replace(old, new))
+        with pytest.raises(ShipidError, match=f"as they were locked: .*{path}"):
+            shipid.verify_lock(lock)
+    with pytest.raises(DocumentError, match=r"holds no \[lock\]"):
+        shipid.verify_lock(document)
+
+
+def test_a_member_that_diverges_is_locked_with_its_time() -> None:
+    wild = family({"parameters": ["hull.derivatives.*"], "factor": [-40.0, 40.0], "change_sign": True}, members=6)
+    path = wild.trajectories("zigzag", 20)
+    times = wild.lock()["diverges_at_s"]
+    assert len(times) == path.diverged.sum() > 0
+    assert all(0 < time < path.interval * len(path.states) for time in times.values())
+    lost = wild.motion_table(path).groupby("member")["u"].apply(lambda u: u.isna().all())
+    assert set(lost.index[lost]) == set(times)
+
+
+def test_a_study_takes_families_by_path_and_by_name(document: Path, tmp_path: Path) -> None:
+    """The study of blocks and that of the document are one: their digests, so their results, are equal."""
+    head = Path(read_plan("quick").file).read_text().partition("[[family]]")[0]
+    study, written = tmp_path / "study.toml", tmp_path / "written.toml"
+    study.write_text(f'families = "families.toml"\n{head}')
+    low = 'name = "low"\nbase = "gunnerus-28.9"'
+    written.write_text(head + DOCUMENT.replace('vessel = "gunnerus-28.9"', "").replace('name = "low"', low))
+    one, two = read_plan(study), read_plan(written)
+    assert one.digest == two.digest
+    values = [f.variant.values for f in one.foundations if f.variant]
+    assert values == [m.values for name in ("low", "high") for m in shipid.read_family(document, name).members]
