@@ -129,7 +129,7 @@ def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:
 
     Each run is begun from its unknowns as they are, from the median current of all runs, and from currents around 0.
     """
-    if not NUISANCES["current"].keys() <= set(problem.names):
+    if not NUISANCES["current"].keys() <= set(problem.names) or problem.common:
         return None
     places = [problem.names.index(name) for name in NUISANCES["current"]]
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS

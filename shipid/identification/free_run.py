@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -58,6 +59,16 @@ def check_length(settings: Identify, length: float) -> None:
     """Raise DataError for a length [s] of free runs that is shorter than two steps, or endless; 0 is valid."""
     if length and not LEAST_STEPS * settings.step <= length < np.inf:
         raise DataError(f"a free run of {length:g} s must hold two steps of {settings.step:g} s, or be 0", path="ahead")
+
+
+def with_current(
+    vessel: Vessel, settings: Identify, runs: Sequence[str], current: tuple[float, float]
+) -> tuple[Vessel, Identify]:
+    """Vessel and settings for free runs in one current, to north and to east [m/s]; what is set for a run stays."""
+    values = (math.hypot(*current), math.atan2(*current[::-1]))
+    known = {f"{run}.{ENVIRONMENT}.{name}": x for run in runs for name, x in zip(CURRENT, values, strict=True)}
+    sea = vessel if "current" in vessel.document else vessel.with_values({"current.kind": "uniform"})
+    return sea, settings.model_copy(update={"runs": known | run_overrides(settings, runs)})
 
 
 def simulate_free_runs(

@@ -29,7 +29,7 @@ from shipid.identification.antenna import antenna_fit
 from shipid.identification.bands import LONG, Measure, band_refusal, check_level, measure_bands
 from shipid.identification.curvature import curvature_warning
 from shipid.identification.fit import Progress
-from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs
+from shipid.identification.free_run import ALL, FreeRuns, check_length, missing_inputs, simulate_free_runs, with_current
 from shipid.identification.late_fit import late_fit
 from shipid.identification.plausible import implausibility
 from shipid.identification.profile import Profile, profile_factor, variance_ratio
@@ -46,7 +46,6 @@ from shipid.identification.statistics import (
     open_to_drift,
     pooled_autocorrelation,
 )
-from shipid.identification.stream import current_fit
 from shipid.identification.unstable import growth_warning, yaw_growth_rate
 from shipid.interrupts import hold_interrupts
 from shipid.simulation.measured import TRIALS, measure_standard
@@ -294,7 +293,14 @@ def run_identification(
         determined = [path for path in profiles if path in judged.free]
         curves = tuple(_profile(path, dataset, solution, judged) for path in determined)
         pair = {BEFORE: vessel, AFTER: vessel.with_values(solution.values)}
-        pairs = free(pair)
+        pairs = (
+            free(pair)
+            if not any(solution.common_current)
+            else {
+                name: _free_runs_in_current(pair, solution, dataset, each, settings, ahead)
+                for name, each in sets.items()
+            }
+        )
         _go_on(held)
         logs: dict[str, pd.DataFrame] = {}
         manoeuvres, refused = _compare_manoeuvres(pair, logs), ""
@@ -305,7 +311,7 @@ def run_identification(
             *shared,
             *solution.warnings,
             *filter(None, (_in_log(solution, dataset, judged),)),
-            *warn_of_unmeasured_inputs(vessel, dataset, fitted, settings),
+            *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
             *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER])),
@@ -349,6 +355,22 @@ def run_identification(
         )
 
 
+def _free_runs_in_current(
+    pair: Mapping[str, Vessel],
+    solution: Solution,
+    dataset: Dataset,
+    runs: Sequence[str],
+    settings: Identify,
+    ahead: float,
+) -> FreeRuns:
+    """Free runs of the base, and of the identified vessel in the current of all runs that was estimated with it."""
+    sea, known = with_current(pair[AFTER], settings, runs, solution.common_current)
+    before = simulate_free_runs({BEFORE: pair[BEFORE]}, dataset, runs, settings, ahead)
+    after = simulate_free_runs({AFTER: sea}, dataset, runs, known, ahead)
+    series = pd.concat([before.series, after.series[after.series["model"] == AFTER]], ignore_index=True)
+    return FreeRuns(series, pd.concat([before.errors, after.errors], ignore_index=True))
+
+
 def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
     """Digest of the document in the vessel's file, and the numbers that were changed since it was read."""
     try:
@@ -367,7 +389,7 @@ def _as_read(vessel: Vessel) -> tuple[str, dict[str, float]]:
 
 def _in_log(solution: Solution, dataset: Dataset, judged: Statistics) -> str:
     """A sentence on what the log lacks or has wrong, as the residuals show it: the first that is seen; else none."""
-    seen = (find(solution, dataset, judged) for find in (current_fit, antenna_fit, late_fit))
+    seen = (find(solution, dataset, judged) for find in (antenna_fit, late_fit))
     return next(filter(None, seen), "")
 
 
@@ -484,9 +506,9 @@ def _estimate_table(vessel: Vessel, solution: Solution, judged: Statistics) -> p
                 "path": path,
                 "name": name,
                 "with": ", ".join(group[1:]),
-                "unit": vessel.units[path],
-                "base": vessel.parameters[path],
-                "value": solution.values[path],
+                "unit": vessel.units.get(path, "m/s"),
+                "base": vessel.parameters.get(path, 0.0),
+                "value": scale * solution.factors[j],
                 "error": abs(scale) * judged.errors[j],
                 "low": low,
                 "high": high,
@@ -595,12 +617,13 @@ def _next_manoeuvres(
     """Ranked manoeuvres at the median speed of the fitted runs and at half, and a sentence on those that cannot be."""
     speed, limits = design.recorded_limits(vessel, dataset, runs)
     unknown, settings = free_factors(solution.vessel, solution.settings), solution.settings
+    own = sum(path in vessel.parameters for path in unknown.paths)  # no manoeuvre has the current
     motions = {name: width for name, width in settings.weights.items() if name not in settings.outputs}
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     try:
         choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), limits)
         contributions = design.information_where_possible(
-            vessel, choice, unknown.groups, scale=unknown.scale, weights=spread, horizon=settings.horizon,
+            vessel, choice, unknown.groups[:own], scale=unknown.scale[:own], weights=spread, horizon=settings.horizon,
             interval=settings.step,
         )  # fmt: skip
     except ShipidError as error:  # no shaft speed gives these speeds, or the ship has no length
@@ -609,7 +632,8 @@ def _next_manoeuvres(
     lacking = [one.title for one in choice if one.title not in possible]
     words = f"not among the manoeuvres to run next, for the identified ship cannot perform them: {'; '.join(lacking)}"
     prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
-    table = design.rank_candidates(contributions, unknown.paths, judged.information + np.diag(prior))
+    known = (judged.information + np.diag(prior))[:own, :own]
+    table = design.rank_candidates(contributions, unknown.paths[:own], known)
     return table, words if lacking else ""
 
 
@@ -625,7 +649,7 @@ def _profile(path: str, dataset: Dataset, solution: Solution, judged: Statistics
     held = {
         gone: (factor, factor)
         for gone, factor in zip(solution.paths, solution.factors, strict=True)
-        if gone in solution.dropped
+        if gone in solution.dropped and gone in solution.values
     }
 
     def refit(name: str, factor: float, start: Array) -> tuple[float, Array]:
@@ -750,7 +774,8 @@ def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, Fre
         warnings.append(f"at a bound, so without an interval: {join_names(bound)}; {others}")
     if "test" not in free:
         warnings.append("no run was held out: the accuracy on other runs is not known")
-    left_out = [name for name in solution.settings.widths if name != "initial_state"]  # a new run has none
+    known = {"initial_state", *(["current"] if solution.settings.current == "one" else [])}
+    left_out = [name for name in solution.settings.widths if name not in known]  # a new run has none
     without = f", which leave out {join_names(left_out)}," if left_out else ""
     for name, runs in free.items():
         every = runs.errors[runs.errors["run"] == ALL].set_index("model")

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Dataset, stretches_of_runs
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import find_compiler, refuse_compiling
 from shipid.errors import DataError, DocumentError, suggest_name
@@ -32,11 +32,8 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
-SIZES = {"u": 0.1, "v": 0.1, "w": 0.1, "north": 1.0, "east": 1.0, "down": 0.1, "psi": math.radians(1.0)} | {
-    **dict.fromkeys(("phi", "theta"), math.radians(1.0)),
-    **dict.fromkeys(("p", "q", "r"), math.radians(0.2)),
-}
-"""Typical error [SI] of a state that is not fitted: the scale of its correction in the solver."""
+MISSED = 0.02  # of speed, length and 1 rad: what a fitted model misses; 0.1 m/s and 0.2 deg/s at 5 m/s and 29 m
+NORMAL_MEDIAN = 0.6745  # of the absolute values of a standard normal variable
 # Steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling.
 COMPILE_FROM = 4e4
 CURRENT = ("V_c", "beta_c")  # channels that the nuisance of that name estimates
@@ -51,6 +48,7 @@ class Problem:
     values (nq,) and prior widths (nq,). start_width : of the initial states in standard deviations of the signals;
     None:
     they are not free. base : (R, P) parameters with the overrides of each run. deviations : (ny,) of the signals.
+    sizes : of `typical_errors`.
     """
 
     vessel: Vessel
@@ -65,6 +63,7 @@ class Problem:
     widths: Array
     start_width: float | None
     deviations: Array
+    sizes: Mapping[str, float]
 
     @cached_property
     def model(self) -> Variation:
@@ -73,9 +72,9 @@ class Problem:
 
     @cached_property
     def node_scale(self) -> Array:
-        """(nn,) scale of each initial state: the signal's standard deviation where it is fitted, else `SIZES`."""
+        """(nn,) scale of each initial state: the signal's standard deviation where it is fitted, else `sizes`."""
         deviation_of = dict(zip(self.layout.signals, self.deviations, strict=True))
-        return np.array([deviation_of.get(name, SIZES.get(name, 1.0)) for name in self.model.node])
+        return np.array([deviation_of.get(name, self.sizes.get(name, 1.0)) for name in self.model.node])
 
     @cached_property
     def whole(self) -> Predictions:
@@ -87,11 +86,27 @@ class Problem:
         """Number of factors."""
         return len(self.unknown.groups)
 
+    @cached_property
+    def common(self) -> list[int]:
+        """Places among the nuisances of those that are one for all runs: the last factors."""
+        return [self.names.index(path) for path in self.unknown.paths if path in self.names]
+
+    @property
+    def common_width(self) -> float:
+        """Width of the prior of what is one for all runs [SI]."""
+        return self.unknown.scale[-1][0]
+
+    def run_values(self, factors: Array, nuisances: Array) -> Array:
+        """Nuisances (R, nq) [SI] of factors (n,) and nuisances (R, nq) in prior widths."""
+        values = self.centres + self.widths * nuisances
+        values[:, self.common] += self.common_width * factors[len(self.layout.groups) :]
+        return values
+
     def fixed(self, factors: Array, nuisances: Array) -> Array:
         """(R, .) inputs that are constant along each run: factors, nuisances, base parameters, scales."""
-        scale = np.concatenate([*map(np.array, self.unknown.scale)])
-        count = len(self.runs)
-        return np.hstack([np.tile(factors, (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
+        count, own = len(self.runs), len(self.layout.groups)
+        scale = np.concatenate([*map(np.array, self.unknown.scale[:own])])
+        return np.hstack([np.tile(factors[:own], (count, 1)), nuisances, self.base, np.tile(scale, (count, 1))])
 
 
 def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> Problem:
@@ -100,6 +115,8 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
         raise DataError("no run to fit: name at least one", path="runs")
     if len(set(runs)) < len(runs):
         raise DataError("a run is named twice: name each once", path="runs")
+    sizes = typical_errors(vessel, dataset, runs)
+    settings = settings.with_sizes(sizes)
     widths = settings.widths
     if "current" in widths and "current" not in vessel.document:
         vessel = vessel.with_values({"current.kind": "uniform"})
@@ -110,6 +127,8 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
     _check_outputs(vessel, dataset, settings)
     overridden = resolve_overrides(settings, runs, vessel, model.environment, dataset.runs)
     scalars = {name: (centre, widths[key]) for key in widths for name, centre in NUISANCES[key].items()}
+    groups = tuple(group for group in unknown.groups if group[0] not in scalars)
+    scalars |= {path: (0.0, 0.0) for path in unknown.paths if path in scalars}  # one for all runs: a factor
     names = tuple(sorted(scalars, key=lambda name: name not in MOVING))
     lags = math.ceil(MOST_LATE * widths["latency"] / settings.step) if "latency" in widths else 0
     numbers = {run: {path: x for path, x in of.items() if path in vessel.parameters} for run, of in overridden.items()}
@@ -122,7 +141,7 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
         settings=settings,
         unknown=unknown,
         layout=FitLayout(
-            model, unknown.groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
+            model, groups, tuple(settings.signals), names, tuple(weather), lags, settings.step, settings.method
         ),
         segments=tuple(_with_weather(segment, weather, overridden[runs[segment.run]]) for segment in segments),
         base=np.array(
@@ -133,7 +152,30 @@ def build_problem(vessel: Vessel, dataset: Dataset, runs: Sequence[str], setting
         widths=np.array([scalars[name][1] for name in names]),
         start_width=widths.get("initial_state"),
         deviations=np.array(list(settings.signals.values())),
+        sizes=sizes,
     )
+
+
+def typical_errors(vessel: Vessel, dataset: Dataset, runs: Sequence[str]) -> dict[str, float]:
+    """State -> typical error [SI] of its prediction, from its own noise in the runs and the ship's speed U.
+
+    It is the root of noise^2 + (`MISSED` x)^2, x being U for u, v, w, U / L for p, q, r, L for a position and 1 for an
+    angle. The noise is white: second differences of the rows have 6 times its variance.
+    """
+    rows = dataset.select(runs)
+    speed = float(np.sqrt((rows.frame[["u", "v"]] ** 2).sum(axis=1).mean())) or 1.0
+    length = vessel.length or speed / (float(np.sqrt((rows.frame["r"] ** 2).mean())) or 1.0)
+    scale = dict.fromkeys(("u", "v", "w"), speed) | dict.fromkeys(("p", "q", "r"), speed / length)
+    scale |= dict.fromkeys(("north", "east", "down"), length) | dict.fromkeys(("psi", "phi", "theta"), 1.0)
+    stretches = [stretch for _, stretch in stretches_of_runs(rows)]
+
+    def noise(name: str) -> float:
+        if name not in rows.frame:
+            return 0.0
+        second = np.concatenate([np.diff(stretch[name].to_numpy(), 2) for stretch in stretches])
+        return float(np.median(np.abs(second))) / NORMAL_MEDIAN / 6**0.5 if len(second) else 0.0
+
+    return {name: math.hypot(noise(name), MISSED * size) for name, size in scale.items()}
 
 
 def _check_outputs(vessel: Vessel, dataset: Dataset, settings: Identify) -> None:
@@ -385,7 +427,7 @@ class ResidualPrediction:
     def named(self) -> dict[str, dict[str, float]]:
         """Run -> nuisance -> estimate [SI]; initial states as differences from the measured ones."""
         problem, result = self.problem, dict[str, dict[str, float]]()
-        values = problem.centres + problem.widths * self.nuisances
+        values = problem.run_values(self.factors, self.nuisances)
         for number, run in enumerate(problem.runs):
             result[run] = dict(zip(problem.names, values[number].tolist(), strict=True))
             places = (
@@ -407,7 +449,7 @@ def predict_residuals(
     away : (S, nn) initial states minus those of the log, in prior widths of `initial_state`; default: 0.
     """
     whole = problem.whole
-    q = problem.centres + problem.widths * nuisances
+    q = problem.run_values(factors, nuisances)
     measured, slope = whole.begin(q)
     width, begun = problem.start_width or 0.0, measured
     if problem.start_width is None:
@@ -417,22 +459,22 @@ def predict_residuals(
     if away.size:
         begun = measured + width * problem.node_scale * away
     evaluation = whole.evaluate(begun, factors, q)
-    num_nodes, n, num_signals = len(problem.model.node), problem.num_factors, len(problem.layout.signals)
+    num_nodes, n, num_signals = len(problem.model.node), len(problem.layout.groups), len(problem.layout.signals)
     keep = (whole.weight > 0).reshape(len(whole), -1)
     where, place = np.nonzero(keep)
     R = evaluation.R[keep]  # (m, nc)
     by_q, by_start = R[:, num_nodes + n :], R[:, :num_nodes]
     if by_q.size:
         with np.errstate(all="ignore"):
-            by_q = (by_q + np.einsum("mi,mij->mj", by_start, slope[where])) * problem.widths
+            by_q = by_q + np.einsum("mi,mij->mj", by_start, slope[where])
     return ResidualPrediction(
         problem=problem,
         factors=factors,
         nuisances=nuisances,
         away=away,
         r=evaluation.r[keep],
-        by_factor=R[:, num_nodes : num_nodes + n],
-        by_nuisance=by_q,
+        by_factor=np.hstack([R[:, num_nodes : num_nodes + n], problem.common_width * by_q[:, problem.common]]),
+        by_nuisance=by_q * problem.widths,
         by_start=by_start * (problem.node_scale * width) if away.size else by_start[:, :0],
         segment=where,
         run=whole.run[where],

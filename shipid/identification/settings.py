@@ -47,10 +47,13 @@ UNITS_OF_NUISANCES = {"thrust_scale": "1", "latency": "s", "heading_bias": "rad"
 """Scalar of a nuisance -> its unit."""
 MOVING = ("current_north", "current_east", "thrust_scale", "latency")
 """Scalars that change the motion; the others change only the measurement."""
-WIDE = {"initial_state": 1.0, "current": 0.3, "thrust_scale": 0.1, "latency": 1.0, "lever_arm": 5.0} | {
+WIDE = {"initial_state": 1.0, "current": 5.0, "thrust_scale": 0.1, "latency": 1.0, "lever_arm": 10.0} | {
     "heading_bias": math.radians(3.0),
-    "velocity_bias": 0.1,
+    "velocity_bias": 1.0,
 }
+"""Nuisance -> width where the settings name none; of a current and velocity_bias in typical errors of u, of a lever
+arm in those of a position (`shipid.identification.residuals.typical_errors`)."""
+WIDTH_UNITS = {"current": "u", "velocity_bias": "u", "lever_arm": "north"}
 
 
 class Identify(CheckedModel, BaseModel):
@@ -82,10 +85,16 @@ class Identify(CheckedModel, BaseModel):
         description="held: a command counts from its row to the next; between: an order to an actuator changes in the "
         "middle between two rows, any other command evenly",
     )
-    weights: Annotated[dict[str, Positive], Field(min_length=1)] = {"u": 0.1, "v": 0.1, "r": math.radians(0.2)}
+    weights: dict[str, Positive] = Field(
+        default={}, description="standard deviations; default: u, v, r by the noise of the log and the ship's speed"
+    )
     loss: Literal["squared", "huber"] = "squared"
     threshold: Positive = Field(default=2.0, description="standard deviations beyond which huber counts linearly")
     nuisance: dict[str, Positive] | list[str] = Field(default=[], description="per-run unknowns, with prior widths")
+    current: Literal["chosen", "none", "one", "by run"] = Field(
+        default="chosen",
+        description="current of the runs: none, one of all, one by run; chosen: what the residuals show",
+    )
     runs: dict[str, Any] = Field(default={}, description='"<run>.<path>" -> value for that run alone')
     start: Literal["growing", "inverse", "base"] = Field(
         default="growing",
@@ -134,7 +143,20 @@ class Identify(CheckedModel, BaseModel):
     def widths(self) -> dict[str, float]:
         """Nuisance -> standard deviation of its prior, in the order of `NUISANCES`."""
         given = self.nuisance if isinstance(self.nuisance, Mapping) else {name: WIDE[name] for name in self.nuisance}
-        return {name: given[name] for name in NUISANCES if name in given}
+        given = {"current": WIDE["current"], **given} if self.current in ("one", "by run") else given
+        return {
+            name: given[name] for name in NUISANCES if name in given and (name, self.current) != ("current", "none")
+        }
+
+    def with_sizes(self, sizes: Mapping[str, float]) -> Identify:
+        """Settings with numbers for the weights and widths that they do not name; sizes : of `typical_errors`."""
+        named = self.nuisance if isinstance(self.nuisance, Mapping) else {}
+        widths = {
+            name: width * (1.0 if name in named else sizes.get(WIDTH_UNITS.get(name, ""), 1.0))
+            for name, width in self.widths.items()
+        }
+        weights = self.weights or {name: sizes[name] for name in ("u", "v", "r")}
+        return self.model_copy(update={"weights": weights, "nuisance": widths})
 
     @property
     def signals(self) -> dict[str, float]:
@@ -161,7 +183,8 @@ def weighted_columns(name: str) -> tuple[str, ...]:
 class Unknowns:
     """The n factors to estimate.
 
-    groups : paths that share each factor; the first is the name of the factor.
+    groups : paths that share each factor; the first is the name of the factor. With one current of all runs the last
+    two are its components.
     scale : for each group, the value of each of its paths at factor 1.
     centre : (n,) factor of the base vessel: 1, or 0 where the base value is 0.
     low, high : (n,) bounds. low is 0 where the vessel's checks refuse the other sign, `POSITIVE` where also 0.
@@ -181,11 +204,12 @@ class Unknowns:
         return tuple(group[0] for group in self.groups)
 
     def values(self, factors: Sequence[float] | Array) -> dict[str, float]:
-        """Path -> parameter value [SI] for given factors (n,)."""
+        """Path -> parameter value [SI] for given factors (n,); a current is no parameter."""
         return {
             path: float(scale * factor)
             for group, scales, factor in zip(self.groups, self.scale, factors, strict=True)
             for path, scale in zip(group, scales, strict=True)
+            if path not in NUISANCES["current"]
         }
 
 
@@ -250,6 +274,12 @@ def free_factors(vessel: Vessel, settings: Identify) -> Unknowns:
     for pattern, width in settings.prior.items():
         for path in reached(pattern, "prior", place):
             prior[place[path]] = width
+    if settings.current == "one":  # two more factors, of the width of its prior
+        groups += [(name,) for name in NUISANCES["current"]]
+        scales += 2 * [(settings.widths["current"],)]
+        centre, low, high, prior = (
+            np.append(x, 2 * [more]) for x, more in ((centre, 0.0), (low, -np.inf), (high, np.inf), (prior, 1.0))
+        )
     return Unknowns(tuple(groups), tuple(scales), centre, low, high, prior)
 
 

@@ -13,12 +13,13 @@ from shipid.arguments import as_float_array, as_names, check_class, check_functi
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.identification.covariance import invert_information
-from shipid.identification.fit import Point, Progress, Result, evaluate_factors, initial_point, search_factors
+from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_factors, initial_point, search_factors
 from shipid.identification.late import COARSE, row_interval
-from shipid.identification.residuals import Problem, build_problem, predict_residuals
-from shipid.identification.settings import BLOCK, Identify, weighted_columns
+from shipid.identification.residuals import Problem, build_problem, predict_residuals, typical_errors
+from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_columns
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
 from shipid.identification.statistics import LinearFit, residual_whiteness
+from shipid.identification.stream import LEAST_RUNS, estimate_currents
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -81,6 +82,14 @@ class Solution:
     warnings: tuple[str, ...] = ()
 
     @property
+    def common_current(self) -> tuple[float, float]:
+        """Current of all runs, to north and to east [m/s]; 0 where none was estimated, or another one by run."""
+        if self.settings.current != "one":
+            return 0.0, 0.0
+        north, east = (self.nuisances[self.runs[0]][name] for name in NUISANCES["current"])
+        return north, east
+
+    @property
     def identified(self) -> Vessel:
         """The vessel with the estimated values; DocumentError if its checks refuse them (status `refused`)."""
         return self.vessel.with_values(self.values)
@@ -112,7 +121,7 @@ def identify(
     check_function_or_none("progress", progress)
     runs = as_names("runs", () if runs is None else runs, DataError)
     plain = settings.model_copy(update={"discount": False})
-    solution = _fit_dropping_factors(vessel, dataset, runs, plain, start, progress)
+    solution = _fit_choosing_current(vessel, dataset, runs, plain, start, progress)
     if not settings.discount:
         return solution
     for _ in range(DISCOUNTS):
@@ -168,6 +177,44 @@ def _discount_residuals(solution: Solution) -> tuple[Identify, dict[str, float]]
         "nuisance": widths,
     }
     return settings.model_copy(update=update), {name: one.effective for name, one in seen.items()}
+
+
+def _fit_choosing_current(
+    vessel: Vessel,
+    dataset: Dataset,
+    runs: Sequence[str],
+    settings: Identify,
+    start: Mapping[str, float] | Solution | None,
+    progress: Progress | None,
+) -> Solution:
+    """The fit with the current of the settings, or with the one of least criterion after a fit without current."""
+    wanted = "current" in settings.widths
+    if settings.current != "chosen" or (wanted and len(runs) < LEAST_RUNS):
+        return _fit_dropping_factors(vessel, dataset, runs, settings, start, progress)
+    without = settings.model_copy(update={"current": "none"})
+    solution = _fit_dropping_factors(vessel, dataset, runs, without, start, progress)
+    streams = estimate_currents(solution, dataset) if solution.status == "ok" else []
+    best = min(streams[wanted:], key=lambda one: one.criterion, default=None)
+    if best is None and wanted:
+        asked = settings.model_copy(update={"current": "by run"})
+        return _fit_dropping_factors(vessel, dataset, runs, asked, start, progress)
+    if best is None or best.kind == "none":
+        return solution
+    chosen = settings.model_copy(update={"current": best.kind}).with_sizes(typical_errors(vessel, dataset, runs))
+    begin = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
+    if best.kind == "one":
+        begin |= dict(zip(NUISANCES["current"], (best.currents[0] / chosen.widths["current"]).tolist(), strict=True))
+    again = _fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress)
+    if again.status != "ok" and not wanted:
+        return solution
+    said = () if wanted else (best.sentence("wind" in vessel.document),)
+    return replace(
+        again,
+        warnings=(*again.warnings, *said),
+        objective_start=solution.objective_start,
+        iterations=solution.iterations + again.iterations,
+        seconds=solution.seconds + again.seconds,
+    )
 
 
 def _fit_dropping_factors(
@@ -268,7 +315,7 @@ def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | 
 def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
     """Initial factors (n,) within the bounds: those in `start`, the others of the base vessel."""
     unknown = problem.unknown
-    factors = unknown.centre.copy()
+    factors = unknown.centre + np.array([BEGIN.get(path, 0.0) for path in unknown.paths])
     for path, factor in start.items():
         if path not in unknown.paths:
             message = f"{path!r} is not free in the fit: {suggest_name(path, unknown.paths)}"

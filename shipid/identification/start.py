@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError
-from shipid.identification.fit import Progress, Result, initial_point, search_factors
+from shipid.identification.fit import BEGIN, Progress, Result, initial_point, search_factors
 from shipid.identification.inverse import inverse_dynamics
 from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.segments import ShootingSegment
@@ -77,13 +77,15 @@ def by_inverse_dynamics(problem: Problem, dataset: Dataset) -> Array:
         run: {key.removeprefix(head): value for key, value in values.items() if key.startswith(head)}
         for run, values in given.items()
     }
+    groups = problem.layout.groups
     estimate = inverse_dynamics(
         problem.vessel,
         dataset,
         problem.runs,
-        unknown.groups,
-        scale=unknown.scale,
-        prior=unknown.prior,
+        groups,
+        scale=unknown.scale[: len(groups)],
+        prior=unknown.prior[: len(groups)],
         environment=weather,
     )
-    return np.asarray(np.clip(estimate.factors, unknown.low, unknown.high))
+    factors = np.append(estimate.factors, [BEGIN[path] for path in unknown.paths[len(groups) :]])
+    return np.asarray(np.clip(factors, unknown.low, unknown.high))

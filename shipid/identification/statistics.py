@@ -163,7 +163,8 @@ class Statistics:
     """Uncertainty of the n factors; infinite for factors that the data do not determine.
 
     chosen : form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 % intervals.
-    alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST`.
+    alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST` and neither the
+    interval without the priors nor the one with them holds 0, no effect.
     sentences : the result in words, one for each factor. correlations : (n, n). free : paths of the factors that are
     neither held nor at a bound. combinations : sets of these that the data do not distinguish.
     """
@@ -193,8 +194,9 @@ class Statistics:
 def fit_statistics(fit: LinearFit) -> Statistics:
     """Covariances, 95 % intervals and identifiability of a fit, linear at the estimate.
 
-    A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values; collinearity
-    explains a wider one. The profile likelihood (`shipid.identification.profile`) shows whether that is finite.
+    A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values, and excludes no
+    effect (0) with and without the priors; collinearity explains a wider one. The profile likelihood
+    (`shipid.identification.profile`) shows whether that is finite.
     """
     free = _free_places(fit)
     if not len(free):
@@ -209,7 +211,7 @@ def fit_statistics(fit: LinearFit) -> Statistics:
     best = covariances[chosen]
     half = np.where(basis.unseen & ~basis.held, np.inf, best.half_widths)
     errors = np.where(basis.unseen & ~basis.held, np.inf, best.errors)
-    alone = _half_widths_without_priors(inner, half)
+    by_data, alone = _estimates_without_priors(inner, half)
     together = collinear_sets(inner.jacobian, inner.paths)
     n = len(fit.paths)
     full = {
@@ -217,7 +219,7 @@ def fit_statistics(fit: LinearFit) -> Statistics:
         for name, values in {"errors": errors, "half": half, "alone": alone}.items()
     }
     identifiable = np.zeros(n, dtype=bool)
-    identifiable[free] = alone <= WIDEST
+    identifiable[free] = (alone <= WIDEST) & (np.abs(by_data) > alone) & (np.abs(inner.factors) > half)
     correlations = np.eye(n)
     scale = np.where(best.errors > 0, best.errors, 1.0)
     correlations[np.ix_(free, free)] = best.matrix / np.outer(scale, scale)
@@ -644,12 +646,15 @@ def _by_data_alone(fit: LinearFit) -> LinearFit:
     return replace(fit, factors=fit.factors + step, residuals=left, prior_widths=None)
 
 
-def _half_widths_without_priors(fit: LinearFit, half: Array) -> Array:
-    """Half-widths (n,) without priors, by the form of that fit; half : (n,) those with them. Every factor is free."""
+def _estimates_without_priors(fit: LinearFit, half: Array) -> tuple[Array, Array]:
+    """Factors (n,) and half-widths (n,) without priors, by the form of that fit; half : (n,) those with them.
+
+    Every factor is free.
+    """
     if not np.isfinite(_interval_half_widths(fit)).any():
-        return half
+        return fit.factors, half
     seen = fit_statistics(_by_data_alone(fit))
-    return np.asarray((seen.high - seen.low) / 2)
+    return seen.fit.factors, np.asarray((seen.high - seen.low) / 2)
 
 
 def _width_inflation(fit: LinearFit, free: Index) -> Array:
@@ -686,6 +691,7 @@ def _factor_sentences(
             sentences.append(f"{name} is not identified: {together.sentence()}")
         elif np.isfinite(alone[j]):
             why = "hardly excited" if alone[j] > WIDEST * shared[j] else "others do a part of the same"
+            why = why if alone[j] > WIDEST else "its interval holds 0, no effect"
             sentences.append(
                 f"{name} is not identified: +-{significant_digits(100 * alone[j], 2)} % of {of_what}, {why}"
             )

@@ -66,7 +66,7 @@ def structures_table(content: StructuresContent) -> PageTable:
         "95 % interval [m]": "between",
         "test runs [m]": "test",
         "not worse": "equal",
-        "why missing": "note",
+        "why left out": "note",
     }
     equal = frame["equal"].map({True: "yes", False: "no"})
     shown = with_cells(frame.assign(r=DEGREES * frame["r"], equal=equal), between=between)

@@ -77,11 +77,12 @@ class StructureComparison:
         [m] of runs that the fit has not seen.
     table : `structure`, `numbers`, means over runs `u`, `v`, `r`, `position`; `test`, that of the position on the test
         runs; `more`, `low`, `high`: difference of the position to the chosen one with its interval; `equal`: whether
-        it is not shown to be worse, corrected for how many there are (Holm); `note`.
+        it is not shown to be worse, corrected for how many there are (Holm), and says something; `note`.
     fits : structure -> the fit to all runs; structures that could not be fitted are missing.
     manoeuvres : `manoeuvre`, `measure`, `unit`, `structure`, `value`, `low`, `high`, `note`.
     spread : `manoeuvre`, `measure`, `unit`, `least`, `greatest` over the structures that are equally good, `spread`
         and `width`, the greatest width of the interval within one of them.
+    uninformative : structure -> why it is left out of the spread: a length of a manoeuvre whose interval holds 0.
     beyond : sentences on manoeuvres that go farther than the data.
     groups : errors by side, helm and speed of the chosen structure on runs that the fit has not seen.
     uneven : sentences on sides.
@@ -100,6 +101,7 @@ class StructureComparison:
     fits: Mapping[str, FittedStructure]
     manoeuvres: pd.DataFrame
     spread: pd.DataFrame
+    uninformative: Mapping[str, str]
     beyond: tuple[str, ...]
     groups: pd.DataFrame
     uneven: tuple[str, ...]
@@ -118,8 +120,9 @@ class StructureComparison:
             notes.append(f"{len(self.runs)} runs give no interval of the differences, {FEWEST_RUNS} would")
         elif others:
             notes.append(f"not shown to be worse: {', '.join(others)}")
-        elif self.table["low"].notna().any():
+        elif self.table["low"].notna().any() and not self.uninformative:
             notes.append("all others that could be judged are shown to be worse")
+        notes += [f"left out of the spread: {name}, {why}" for name, why in self.uninformative.items()]
         wide = [row for row in self.spread.to_dict("records") if row["spread"] > row["width"]]
         if wide:
             worst = max(wide, key=lambda row: float(row["spread"] / max(abs(row["least"]), abs(row["greatest"]))))
@@ -216,6 +219,9 @@ def compare_structures(
     report("standard manoeuvres")
     reach = data_reach(vessel, dataset, fitted)
     manoeuvres, far = _manoeuvre_table(fits, chosen, reach, equal, level)
+    silent = uninformative_structures(manoeuvres)
+    for name in silent.keys() - {chosen}:
+        table.loc[table["structure"] == name, ["equal", "note"]] = False, silent[name]
     groups = by_group(series[chosen], chosen, fits[chosen].vessel, dataset)
     return StructureComparison(
         vessel=vessel,
@@ -234,7 +240,8 @@ def compare_structures(
         chosen=chosen,
         fits=fits,
         manoeuvres=manoeuvres,
-        spread=_spread_of_measures(manoeuvres, equal),
+        spread=_spread_of_measures(manoeuvres, [name for name in equal if name not in silent]),
+        uninformative=silent,
         beyond=far,
         groups=groups,
         uneven=uneven_side_warnings(groups),
@@ -442,6 +449,16 @@ def _measures_of_trial(title: str, known: dict[str, dict[str, MeasuredManoeuvre]
         return _compared_values(known[one.digest][title])
 
     return measure
+
+
+def uninformative_structures(manoeuvres: pd.DataFrame) -> dict[str, str]:
+    """Structure -> a sentence on the first length of a standard manoeuvre [m] that it gives an interval with 0 for."""
+    lengths = manoeuvres[(manoeuvres["unit"] == "m") & (manoeuvres["low"] <= 0) & (manoeuvres["high"] >= 0)]
+    return {
+        str(row["structure"]): f"whose {row['measure']} of {row['manoeuvre']} says nothing: "
+        f"{row['low']:.3g} to {row['high']:.3g} m"
+        for row in lengths.drop_duplicates("structure").to_dict("records")
+    }
 
 
 def _spread_of_measures(manoeuvres: pd.DataFrame, equal: Sequence[str]) -> pd.DataFrame:

@@ -47,6 +47,7 @@ SETTINGS = Identify(
     weights={"u": 0.02, "v": 0.01, "r": 0.1 * DEGREE},
     nuisance={"initial_state": 0.5},
     start="base",
+    current="none",
 )
 
 

@@ -25,7 +25,6 @@ MASS, YAW = "inertia.m", "hull.derivatives.N_ur"
     ("given", "message"),
     [
         ({"weights": {"speed": 0.1}}, "weights.speed is no valid name"),
-        ({"weights": {}}, "weights: must be a table of 1 or more entries .it has 0"),
         ({"weights": {"r": [0.01]}}, "weights.r: must be a number"),
         ({"weights": {"propeller": {"thrust": [500]}}}, "weights: must be a number"),
         ({"nuisance": ["wind"]}, "nuisance.wind is no valid name"),

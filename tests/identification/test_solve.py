@@ -71,7 +71,7 @@ def test_a_step_longer_than_the_interval_of_the_log_is_a_warning_of_the_solution
     """As the command says it; before, who called from Python did not learn of it."""
     dataset = trials(SHIP, runs=2, steps=30)
     assert identify(SHIP, dataset, dataset.runs, settings()).warnings == ()
-    (warning,) = identify(SHIP, dataset, dataset.runs, settings(step=2.0)).warnings
+    (warning,) = identify(SHIP, dataset, dataset.runs, settings(step=2.0, current="none")).warnings
     assert warning.startswith("rows of the log are 1 s apart and commands are held over steps of 2 s: faster")
 
 
@@ -116,12 +116,11 @@ def test_bounds_hold_and_are_flagged() -> None:
 def test_a_prior_pulls_as_linear_theory_says() -> None:
     truth = SHIP.with_values({path: 1.002 * SHIP.parameters[path] for path in FEW})
     dataset = trials(truth, runs=2, steps=30)
-    free = identify(SHIP, dataset, dataset.runs, settings(weights={"u": 0.1, "v": 0.1, "r": 0.003}))
+    declared = {"weights": {"u": 0.1, "v": 0.1, "r": 0.003}, "current": "none"}
+    free = identify(SHIP, dataset, dataset.runs, settings(**declared))
     information = free.jacobian.T @ free.jacobian
     width = 1 / np.sqrt(np.diag(information)).mean()
-    solution = identify(
-        SHIP, dataset, dataset.runs, settings(weights={"u": 0.1, "v": 0.1, "r": 0.003}, prior={"hull.*": width})
-    )
+    solution = identify(SHIP, dataset, dataset.runs, settings(**declared, prior={"hull.*": width}))
     expected = 1 + np.linalg.solve(information + np.eye(4) / width**2, information @ np.full(4, 0.002))
     assert np.allclose(solution.prior_widths, width)
     assert np.allclose(solution.factors - 1, expected - 1, rtol=0.02, atol=1e-6)
@@ -165,7 +164,7 @@ def test_each_run_finds_its_current_whatever_the_valleys() -> None:
     dataset = astern(vessel, 7000)
     solution = identify(vessel, dataset, dataset.runs, wanted)
     assert solution.status == "ok"
-    np.testing.assert_allclose(solution.factors, 1.0, atol=0.05)
+    np.testing.assert_allclose(solution.factors[:2], 1.0, atol=0.05)
     assert solution.objective < 1.2 * len(solution.residuals)
     for run in (solution.nuisances[name] for name in dataset.runs):
         assert run["current_north"] == pytest.approx(0.5 * np.cos(1.3), abs=0.1)
@@ -401,7 +400,7 @@ def test_runs_too_short_for_inverse_dynamics_are_fitted_from_another_start() -> 
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"runs_wanted": ["M07"]}, "there is no run 'M07'"),
+        ({"runs_wanted": ["M07"]}, "no run is named M07"),
         ({"runs_wanted": []}, "no run to fit"),
         ({"runs_wanted": ["M01", "M01"]}, "named twice"),
         ({"horizon": 100.0}, "no unbroken stretch of 50 s"),

@@ -402,3 +402,15 @@ def test_a_prior_that_the_data_contradict_is_told(width: float, true: float, con
     assert list(told) == (["hull.p1"] if contrary else [])
     if contrary:
         assert told["hull.p1"][:2] == pytest.approx((width, alone[0]))
+
+
+def test_what_may_have_no_effect_is_not_identified() -> None:
+    """A factor of 0.66 [-0.015, 1.33] was called identified."""
+    fit = one()
+    small = replace(fit, factors=np.where(np.arange(len(fit.factors)) == 0, 1e-3, fit.factors))
+    before, after = fit_statistics(fit), fit_statistics(small)
+    assert before.identifiable[0]
+    assert not after.identifiable[0]
+    assert after.low[0] < 0 < after.high[0]
+    assert "its interval holds 0, no effect" in after.sentences[0]
+    assert (after.identifiable[1:] == before.identifiable[1:]).all()

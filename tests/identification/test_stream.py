@@ -1,8 +1,6 @@
-"""Laws of currents that no log has: another one in each run is named with the remedy; sound logs are not blamed."""
+"""Laws of currents that no log has: none, one of all runs, or one by run is estimated, as the residuals show."""
 
 from __future__ import annotations
-
-import re
 
 import numpy as np
 import pytest
@@ -10,8 +8,7 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.identification.settings import Identify
 from shipid.identification.solve import Solution, identify
-from shipid.identification.statistics import LinearFit, fit_statistics
-from shipid.identification.stream import current_fit, estimate_currents
+from shipid.identification.stream import estimate_currents
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, noisy, trials
 
@@ -42,58 +39,52 @@ def fitted(log: Dataset, **more: object) -> Solution:
     return solution
 
 
-def sentence(solution: Solution, log: Dataset) -> str:
-    return current_fit(solution, log, fit_statistics(LinearFit.of(solution)))
+def estimated(solution: Solution) -> np.ndarray:
+    """(R, 2) currents of the runs [m/s]."""
+    return np.array([[run["current_north"], run["current_east"]] for run in solution.nuisances.values()])
 
 
 @pytest.mark.parametrize(("seed", "more"), [(2, {"horizon": 45})])
-def test_another_current_in_each_run_is_named_with_the_nuisance_that_estimates_it(seed: int, more: dict) -> None:
-    """For a vessel without a current term nothing named it, and intervals were far from the truth."""
-    log, currents = log_of(seed, drawn(seed)), drawn(seed)
-    solution = fitted(log, **more)
-    seen = estimate_currents(solution, log)
-    assert seen is not None
-    assert seen.size == pytest.approx(np.sqrt(np.mean(np.sum(currents**2, axis=1))), rel=0.35)
-    assert re.search(
-        r"another current in each run, 0\.\d+ m/s, .* with --nuisance current=0\.\d", sentence(solution, log)
-    )
-    mended = fitted(log, nuisance={"current": 0.3})
-    assert np.abs(mended.factors - 1).max() < 0.3 * np.abs(solution.factors - 1).max()
-    assert sentence(mended, log) == ""
+def test_another_current_in_each_run_is_estimated_by_run(seed: int, more: dict) -> None:
+    """For a vessel without a current term the numbers made up for it, and intervals were far from the truth."""
+    log = log_of(seed, drawn(seed))
+    solution, without = fitted(log, **more), fitted(log, current="none", **more)
+    assert solution.settings.current == "by run"
+    np.testing.assert_allclose(estimated(solution), drawn(seed), atol=0.05)
+    assert np.abs(solution.factors - 1).max() < 0.3 * np.abs(without.factors - 1).max()
+    assert "another current in each run, 0." in " ".join(solution.warnings)
+    assert solution.common_current == (0.0, 0.0)
 
 
-def test_one_current_of_all_runs_is_not_called_another_one_in_each() -> None:
-    log = log_of(1, np.tile([0.3, 0.2], (6, 1)))
-    said = sentence(fitted(log), log)
-    assert re.search(
-        r"those of a current, about the same in all runs, 0\.3\d m/s, .* with --nuisance current=0\.4", said
-    )
-    assert "another current" not in said
+@pytest.mark.parametrize("more", [{}, {"nuisance": {"current": 0.3}}])
+def test_one_current_of_all_runs_is_a_number_with_an_interval(more: dict) -> None:
+    solution = fitted(log_of(1, np.tile([0.3, 0.2], (6, 1))), **more)
+    assert solution.settings.current == "one"
+    assert solution.common_current == pytest.approx((0.3, 0.2), abs=0.02)
+    assert solution.paths[-2:] == ("current_north", "current_east")
+    assert solution.values.keys() <= SHIP.parameters.keys()
+    assert ("one current of all runs, 0.3" in " ".join(solution.warnings)) is (not more)
 
 
 def test_wind_that_the_log_lacks_is_named_for_a_vessel_that_feels_it() -> None:
     seed = 1
     windy = trials(SHIP, steps=90, seed=seed, weather={"V_w": np.full(6, 12.0), "beta_w": np.full(6, 1.0)})
     log = noisy(changed(windy, V_w=np.zeros(len(windy.frame)), beta_w=np.zeros(len(windy.frame))), NOISE, seed)
-    assert "away, or of wind that the log lacks: estimates" in sentence(fitted(log), log)
+    assert "or of wind that the log lacks" in " ".join(fitted(log).warnings)
     ship = Vessel({key: block for key, block in SHIP.document.items() if key != "wind"}, SHIP.file)
     log = log_of(seed, drawn(seed))
     solution = identify(ship, log, log.runs, Identify(parameters=FEW, weights=NOISE, horizon=0, start="base"))
-    assert "another current in each run" in sentence(solution, log)
-    assert "wind" not in sentence(solution, log)
+    said = " ".join(solution.warnings)
+    assert "another current in each run" in said
+    assert "wind" not in said
 
 
-def test_logs_without_a_current_are_not_blamed() -> None:
+def test_logs_without_a_current_are_given_none() -> None:
     sound = log_of(1)
-    assert sentence(fitted(sound), sound) == ""
-    wrong = {path: 1.3 * SHIP.parameters[path] for path in SHIP.parameters if "derivatives.X_" in path}
+    assert fitted(sound).settings.current == "none"
     late = changed(sound, **{name: np.roll(sound.frame[name].to_numpy(), 2) for name in sound.commands})
-    for vessel, log in ((SHIP.with_values(wrong), sound), (SHIP, late)):
-        solution = identify(vessel, log, log.runs, Identify(parameters=FEW, weights=NOISE, horizon=0, start="base"))
-        seen = estimate_currents(solution, log)
-        assert seen is not None
-        assert seen.explained < 0.1
-        assert sentence(solution, log) == ""
+    solution = fitted(late, current="none")
+    assert all(one.explained < 0.2 for one in estimate_currents(solution, late))
 
 
 def test_a_current_that_is_set_is_not_looked_for() -> None:
@@ -103,6 +94,6 @@ def test_a_current_that_is_set_is_not_looked_for() -> None:
     known |= {f"{run}.environment.beta_c": float(b) for run, b in zip(log.runs, beta_c, strict=True)}
     vessel = SHIP.with_values({"current.kind": "uniform"})
     settings = Identify(parameters=FEW, weights=NOISE, horizon=0, start="base", runs=known)
-    assert estimate_currents(identify(vessel, log, log.runs, settings), log) is None
+    assert not estimate_currents(identify(vessel, log, log.runs, settings), log)
     alone = log.select(log.runs[:1])
-    assert estimate_currents(fitted(alone), alone) is None
+    assert not estimate_currents(fitted(alone), alone)

@@ -28,6 +28,7 @@ from shipid.study.structures import (
     _with_mean,
     compare_structures,
     structures_content,
+    uninformative_structures,
     with_actuators_on,
     write_chosen_structure,
 )
@@ -197,3 +198,16 @@ def test_the_truth_is_never_shown_to_be_worse(truth: str) -> None:
     names = ["mmg", "modulus", "cubic"]
     ranked = compare_structures(SHIP, data_of(truth), SETTINGS, names, ahead=20.0, folds=2, level=None)
     assert bool(ranked.table.set_index("structure")["equal"][truth])
+
+
+def test_a_length_that_may_be_nothing_says_nothing() -> None:
+    rows = [
+        ("a", "tactical diameter", "m", 95.0, -133.0, 323.0),
+        ("a", "advance", "m", 90.0, 80.0, 100.0),
+        ("b", "tactical diameter", "m", 95.0, 90.0, 100.0),
+        ("b", "overshoot 1", "deg", 0.2, -0.1, 0.5),
+        ("c", "advance", "m", 95.0, np.nan, np.nan),
+    ]
+    columns = ["structure", "measure", "unit", "value", "low", "high"]
+    frame = pd.DataFrame(rows, columns=columns).assign(manoeuvre="turning 35")
+    assert uninformative_structures(frame) == {"a": "whose tactical diameter of turning 35 says nothing: -133 to 323 m"}
