@@ -171,7 +171,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     interval = max(step, seen.step, _round_number_below(2.5 * float(seen.runs["duration"].sum()) / MOST_STUDY_WINDOWS))
     families = _families_of_vessels(vessels, dataset.runs)
     fixed = [
-        Choice("question", f"How well can {first.name} be predicted {ahead:g} s ahead, with how many runs?"),
+        Choice("question", f"How well can the path of {first.name} be predicted, with how many runs?"),
         Choice("description", _log_in_words(seen, dataset), "what the log holds"),
         Choice("data.dataset", _path_from_study(str(data), out), f"commands {', '.join(dataset.commands) or 'none'}"),
         true_path,
@@ -347,7 +347,7 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     past, ship_time = _past_of_method(method), length / service
     duration = float(f"{ahead + INSTANTS_A_MANOEUVRE * step:.6g}")
     fine = min(_round_number_below(ship_time / STEPS_A_LENGTH), step / 10)
-    question = f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict {ahead:g} s?"
+    question = f"How good must a model of {vessel.name} be, and how many manoeuvres, to predict its path?"
     fixed = [
         Choice("question", question),
         Choice("description", f"simulated: {vessel.name} as it is makes the truth, and degraded models predict it"),
