@@ -94,6 +94,7 @@ def _judged(vessel: Vessel, data: Dataset, horizon: float) -> Statistics | None:
         horizon=horizon,
         nuisance=["initial_state"],
         start="base",
+        current="none",
     )
     begin = dict(zip(paths, (1 + 0.2 * np.sin(np.arange(len(paths)))).tolist(), strict=True))
     solution = identify(vessel, data, data.runs, settings, start=begin)

@@ -36,7 +36,7 @@ def run() -> dict[str, Any]:
     vessel = load_vessel("gunnerus-28.9")
     data, settings = (
         _noisy(vessel, RUNS),
-        Identify(parameters=["hull.derivatives.*"], weights=NOISE, horizon=0, start="base"),
+        Identify(parameters=["hull.derivatives.*"], weights=NOISE, horizon=0, start="base", current="none"),
     )
     fit = build_problem(vessel, data, data.runs, settings)
     begin = 1 + 0.2 * np.sin(np.arange(fit.num_factors))
