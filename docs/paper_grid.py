@@ -23,7 +23,7 @@ from shipid.study.store import read_rows, shard_folder
 from shipid.version import __version__
 
 FILE = Path(__file__).parent / "records" / "paper-grid.csv"
-COLUMNS = ["model", "N_D", "A", "H", "H_90", "seconds", "version"]
+COLUMNS = ["model", "N_D", "A", "H", "H_90", "H_end", "seconds", "version"]
 FIRST = (10, 30, 100)
 """Amounts of data that are computed to the end before the others begin."""
 
@@ -70,7 +70,7 @@ def main() -> None:
         for event in run_study(plan, given.run, shard=shard, workers=1):
             print(event.text or event.row.get("cell", ""), file=sys.stderr)
         place = shard_folder(given.run, shard)
-        row = read_rows(place).assign(version=__version__)
+        row = read_rows(place).rename(columns={"foundation": "model"}).assign(version=__version__)
         row[COLUMNS].to_csv(FILE, mode="a", header=False, index=False)
         shutil.rmtree(place)
     print(table_of_errors(pd.read_csv(FILE)))
