@@ -7,6 +7,7 @@ of time; see `shipid.hybrid.recurrent`, whose search, training and mirror it sha
 from __future__ import annotations
 
 import warnings
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -143,9 +144,9 @@ class NetworkMethod(Recurrent):
     problem: ClassVar[type[LearningProblem]] = NetworkProblem
     corrector: ClassVar[type[Any]] = NetworkCorrector
 
+    @abstractmethod
     def network(self, point: Point, past: int, now: int, outputs: int) -> torch.nn.Module:
         """Return a module whose `forward(past, now)` takes (P + 1, S, past) and (S, now), and gives (S, outputs).
 
         point : what the trial suggested.
         """
-        raise NotImplementedError(f"network({point}, {past}, {now}, {outputs})")

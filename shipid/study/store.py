@@ -154,7 +154,7 @@ def _is_without_results(folder: Path) -> bool:
     """Whether a run ended before its first cell: each file in its folder can be made again from a study."""
     made = {STUDY, VESSELS, PROVENANCE, FOUNDATIONS, DATASET, TEST, ENVELOPE}
     files = [place for place in folder.rglob("*") if not place.is_dir()]
-    return not (folder / "shards").exists() and all(
+    return not (folder / SHARDS).exists() and all(
         place.name in made or place.parent.name == seals.FOLDER or place.suffix == ".lock" for place in files
     )
 

@@ -76,3 +76,12 @@ def test_a_search_that_was_interrupted_goes_on_with_the_same_trials(tmp_path: Pa
     resumed, whole = trials(12, Journal(tmp_path / "t.log")), trials(12, None)
     assert [row["params"] for row in resumed] == [row["params"] for row in whole]
     assert Gated().varied() == ("units", "learning_rate")
+
+
+def test_a_method_that_builds_no_network_says_so_at_once() -> None:
+    class Unwritten(NetworkMethod):
+        def suggest(self, trial: Any) -> None:
+            trial.suggest_int("units", 3, 9)
+
+    with pytest.raises(TypeError, match=r"Unwritten.*network"):
+        Unwritten()  # type: ignore[abstract]
