@@ -12,7 +12,8 @@ from shipid.document import short_names
 from shipid.identification.covariance import invert_information
 from shipid.identification.late_fit import OUTSIDE
 from shipid.identification.settings import free_factors
-from shipid.identification.solve import Solution, by_log, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import by_log, identify
 from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
 from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
 from shipid.units import join_names, percent_text, significant_digits

@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 from shipid.document import short_names
 from shipid.errors import DataError, ShipidError
 from shipid.identification.settings import free_factors
-from shipid.identification.solve import Solution
+from shipid.identification.solution import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import join_names, significant_digits
 from shipid.vessel.load import Vessel

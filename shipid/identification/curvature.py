@@ -23,7 +23,7 @@ from shipid.document import short_names
 from shipid.identification.covariance import invert_information
 from shipid.identification.fit import local_linearisation
 from shipid.identification.residuals import build_problem
-from shipid.identification.solve import Solution
+from shipid.identification.solution import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import join_names
 

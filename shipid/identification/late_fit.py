@@ -13,7 +13,8 @@ from shipid.document import short_names
 from shipid.identification.covariance import invert_information
 from shipid.identification.late import COARSE, row_interval
 from shipid.identification.settings import free_factors
-from shipid.identification.solve import Solution, by_log
+from shipid.identification.solution import Solution
+from shipid.identification.solve import by_log
 from shipid.identification.statistics import Statistics
 from shipid.units import significant_digits
 from shipid.vessel.dynamics import vessel_dynamics

@@ -36,7 +36,8 @@ from shipid.identification.profile import Profile, profile_factor, variance_rati
 from shipid.identification.reach import data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import BLOCK, Identify, free_factors, resolve_overrides, run_overrides
 from shipid.identification.sides import by_group, uneven_side_warnings
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import (
     LinearFit,
     Statistics,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_f
 from shipid.identification.late import COARSE, row_interval
 from shipid.identification.residuals import Problem, build_problem, predict_residuals, typical_errors
 from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_columns
+from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
 from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.identification.stream import LEAST_RUNS, estimate_currents
@@ -29,70 +30,6 @@ FAR = 0.05  # of the time in which a ship goes her length: between rows so far a
 NEAR = 1e-6  # of a factor: so close to a bound it is at the bound
 ORDER = {"growing": ("growing", "inverse"), "inverse": ("inverse", "growing"), "base": ("straight", "growing")}
 """Setting `start` -> kinds of initial factors, tried in this order until the search converges."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Result of a fit: estimates, residuals, Jacobian, and the status of the solver.
-
-    paths, factors : name and estimate (n,) of each factor; the name of a tied group is its first path.
-    values : path -> value [SI] of every parameter that a factor acts on, tied ones included.
-    nuisances : run -> name -> estimate [SI] of the unknowns of that run.
-    residuals : (m,) predicted less measured over the declared standard deviation, nuisances projected out; by run, then
-    time. With huber those of `Prediction.marginal`.
-    jacobian : (m, n) d residual / d factor with the nuisances projected out: J^T J is the Fisher information.
-    prior_widths : (n,) standard deviations of the factors' priors; inf: none. centre : (n,) their means.
-    clusters, signals, times : (m,) index of the run, column and time [s] of each residual.
-    spent : (m,) share of each residual that the nuisances have taken.
-    objective_start, objective : sum of squares at the start, from the measured states, and at the end.
-    status : `ok`, `refused` (values that the vessel's checks refuse), `not converged`, `diverged` or `stopped`.
-    sentence : the status with its reason and a remedy. warnings : what the fit cannot see, one sentence each.
-    at_bound : (n,) whether the estimate is at a bound. held : (n,) factors that are not free. dropped : their paths.
-    effective : signal -> independent residuals that its residuals were counted as, where `discount` is on.
-    within : signal -> share of its residuals up to the threshold of huber; 1 with the squared loss.
-    """
-
-    vessel: Vessel
-    runs: tuple[str, ...]
-    settings: Identify
-    paths: tuple[str, ...]
-    factors: Array
-    values: Mapping[str, float]
-    nuisances: Mapping[str, Mapping[str, float]]
-    residuals: Array
-    jacobian: Array
-    prior_widths: Array
-    centre: Array
-    clusters: NDArray[np.intp]
-    signals: tuple[str, ...]
-    times: Array
-    spent: Array
-    objective_start: float
-    objective: float
-    iterations: int
-    seconds: float
-    status: str
-    sentence: str
-    at_bound: NDArray[np.bool_]
-    held: NDArray[np.bool_]
-    point: Point = field(repr=False)
-    dropped: tuple[str, ...] = ()
-    effective: Mapping[str, float] = field(default_factory=dict)
-    within: Mapping[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def common_current(self) -> tuple[float, float]:
-        """Current of all runs, to north and to east [m/s]; 0 where none was estimated, or another one by run."""
-        if self.settings.current != "one":
-            return 0.0, 0.0
-        north, east = (self.nuisances[self.runs[0]][name] for name in NUISANCES["current"])
-        return north, east
-
-    @property
-    def identified(self) -> Vessel:
-        """The vessel with the estimated values; DocumentError if its checks refuse them (status `refused`)."""
-        return self.vessel.with_values(self.values)
 
 
 def identify(

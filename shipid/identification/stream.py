@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from shipid.identification.covariance import invert_information
 from shipid.identification.free_run import with_current
 from shipid.identification.residuals import CURRENT, build_problem, predict_residuals, typical_errors
 from shipid.identification.settings import ENVIRONMENT, run_overrides
+from shipid.identification.solution import Solution
 from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.units import percent_text, significant_digits
 
@@ -49,7 +50,7 @@ class Stream:
         )
 
 
-def estimate_currents(solution: Any, dataset: Dataset) -> list[Stream]:
+def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
     """No current, one of all runs and one by run, each after one step of Gauss-Newton with the factors.
 
     solution : of `identify`, without currents. Empty where currents are known or cannot be computed. Residuals count as
@@ -83,13 +84,13 @@ def estimate_currents(solution: Any, dataset: Dataset) -> list[Stream]:
     return result
 
 
-def _is_set(solution: Any) -> bool:
+def _is_set(solution: Solution) -> bool:
     """Whether the settings have the current of a run; no log has one."""
     given = run_overrides(solution.settings, solution.runs)
     return any(key.endswith(f".{ENVIRONMENT}.{name}") for key in given for name in CURRENT)
 
 
-def _current_slopes(solution: Any, dataset: Dataset) -> Array | None:
+def _current_slopes(solution: Solution, dataset: Dataset) -> Array | None:
     """(m, 2) d residual / d current of its run, to north and to east [s/m]; None where a prediction diverges."""
     point = solution.point
     before = build_problem(solution.vessel, dataset, solution.runs, solution.settings).model.node
@@ -111,7 +112,7 @@ def _current_slopes(solution: Any, dataset: Dataset) -> Array | None:
     return np.asarray(with_changes.marginal(solution.settings.linear_from, solution.within)[1][:, -2:])
 
 
-def _gauss_newton_step(solution: Any, added: Array) -> tuple[Array, Array]:
+def _gauss_newton_step(solution: Solution, added: Array) -> tuple[Array, Array]:
     """One step of Gauss-Newton in further unknowns (m, k) beside the factors: (k,), and the residuals (m,) left."""
     free = ~(solution.held | solution.at_bound)
     J = np.hstack([solution.jacobian[:, free], added])

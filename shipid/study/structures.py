@@ -38,7 +38,8 @@ from shipid.identification.outcome import (
 from shipid.identification.reach import Reach, data_reach, extrapolation_sentence, of_log
 from shipid.identification.settings import Identify
 from shipid.identification.sides import by_group, uneven_side_warnings
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import LEVEL, LinearFit, Statistics, fit_statistics
 from shipid.identification.structures import PRESENT, STRUCTURES, check_structures, exchange_structure
 from shipid.report.structures import StructuresContent

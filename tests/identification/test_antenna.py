@@ -10,7 +10,8 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.identification.antenna import antenna_fit, locate_antenna
 from shipid.identification.settings import Identify
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, trials

@@ -13,7 +13,8 @@ from shipid.errors import DataError, ShipidError
 from shipid.identification.bands import band_refusal, measure_bands, principal_axes, short_horizon
 from shipid.identification.outcome import run_identification
 from shipid.identification.settings import Identify
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.test_outcome import FEW, NOISE

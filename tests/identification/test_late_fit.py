@@ -12,7 +12,8 @@ import pytest
 from shipid.data.dataset import Dataset
 from shipid.identification.late_fit import command_lateness, late_fit
 from shipid.identification.settings import Identify
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres

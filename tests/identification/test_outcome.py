@@ -31,7 +31,8 @@ from shipid.identification.outcome import (
     write_patch,
 )
 from shipid.identification.settings import Identify, free_factors
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, noisy, trials

@@ -15,7 +15,8 @@ from shipid.errors import DocumentError, ShipidError
 from shipid.identification.fit import initial_point, search_factors
 from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.settings import Identify
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, fit_statistics
 from shipid.simulation.manoeuvre import Zigzag
 from shipid.simulation.perform import perform_manoeuvres

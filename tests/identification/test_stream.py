@@ -7,7 +7,8 @@ import pytest
 
 from shipid.data.dataset import Dataset
 from shipid.identification.settings import Identify
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.stream import estimate_currents
 from shipid.vessel.load import Vessel, load_vessel
 from tests.identification.trials import changed, noisy, trials

@@ -15,7 +15,8 @@ from shipid.data.dataset import Dataset
 from shipid.errors import DataError, ShipidError
 from shipid.identification.outcome import COMPARED
 from shipid.identification.settings import Identify
-from shipid.identification.solve import Solution, identify
+from shipid.identification.solution import Solution
+from shipid.identification.solve import identify
 from shipid.identification.structures import exchange_structure
 from shipid.report.structures import write_structures
 from shipid.simulation.manoeuvre import Zigzag
