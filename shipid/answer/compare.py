@@ -146,9 +146,13 @@ def _compare_with_first(first: Results, other: Results, called: Mapping[str, str
         rows.append(
             {
                 **{key: " ~ ".join(dict.fromkeys(part[[key, f"{key} there"]].iloc[0])) for key in ("family", "method")},
-                **{"N_D": int(part["N_D"].iloc[0]), "cells": len(part)},
-                **(means | means_there),
-                **{"difference": difference.mean, "low": difference.low, "high": difference.high},
+                "N_D": int(part["N_D"].iloc[0]),
+                "cells": len(part),
+                **means,
+                **means_there,
+                "difference": difference.mean,
+                "low": difference.low,
+                "high": difference.high,
                 "verdict": IDENTICAL if same else "",
                 **{f"coverage_{side}": part[f"coverage_{side}"].mean() for side in sides},
             }

@@ -79,8 +79,12 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
         names = ("foundation", "family", "method", "N_D", "seed", "status", *PREDICTION_ERRORS)
         kept = {
             **{name: row[name] for name in names},
-            **{"condition": condition, "world": world, "errors": None},
-            **{"seconds": row["seconds"], "trials": len(row["trials"]), "saw_test": row["family"] in saw},
+            "condition": condition,
+            "world": world,
+            "errors": None,
+            "seconds": row["seconds"],
+            "trials": len(row["trials"]),
+            "saw_test": row["family"] in saw,
         }
         if (cell := row["cell"]) in results.paths:
             learns = learns_from_runs(results.plan, row["family"], row["method"])
@@ -127,11 +131,17 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
             good, errors = mine[mine["status"] == "ok"], by_method[str(method)]
             rows.append(
                 {
-                    **{"condition": condition, "family": family, "N_D": N_D, "method": method},
-                    **{"cells": len(mine), "failed": len(mine) - len(good), "missing": every_cell - len(good)},
+                    "condition": condition,
+                    "family": family,
+                    "N_D": N_D,
+                    "method": method,
+                    "cells": len(mine),
+                    "failed": len(mine) - len(good),
+                    "missing": every_cell - len(good),
                     **{name: good[name].astype(float).mean() for name in PREDICTION_ERRORS},
                     **{name: mine[name].astype(float).mean() for name in ("seconds", "trials")},
-                    **{"reference": reference, **_difference_row(errors, by_method.get(reference, {}))},
+                    "reference": reference,
+                    **_difference_row(errors, by_method.get(reference, {})),
                 }
             )
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)

@@ -216,7 +216,7 @@ def believable_errors(results: Results) -> Array:
     missed = (test.future - plain).swapaxes(0, 1)
     law = rows @ np.linalg.lstsq(rows, missed.reshape(len(test), -1), rcond=1e-9)[0]
     fitted = plain + law.reshape(missed.shape).swapaxes(0, 1)
-    known = [*results.physics.values(), *map(results.paths.__getitem__, results.paths), fitted]
+    known = [*results.physics.values(), *results.paths.values(), fitted]
     return np.asarray(np.nanmin([_errors_at_steps(path, test) for path in known], axis=0))
 
 
