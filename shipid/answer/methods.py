@@ -63,6 +63,9 @@ def score(
     rivals = read_predictions(file, results)
     if (doubt := next((one.doubt for one in rivals if one.doubt), "")) and not anyway:
         raise DataError(f"{doubt}; if it is meant so, --anyway scores it as doubtful", file=file)
+    known = {(one.label, one.N_D, one.seed) for one in kept_predictions(results, but=file.stem)}
+    if twice := next((one.label for one in rivals if (one.label, one.N_D, one.seed) in known), ""):
+        raise DataError(f"{twice!r} is scored already, from another table: name it otherwise", file=file, path="model")
     keep_predictions(file, results.folder)
     cells, names = method_cells(results), {way.name for way in results.plan.methods}
     return {one.label: method_table(cells[cells["method"].isin({*names, one.label})], one.label) for one in rivals}
@@ -104,7 +107,7 @@ def _rival_cells(results: Results, one: RivalPrediction, cells: pd.DataFrame) ->
     mine = CellErrors(one.label, results.by_run(error_of_windows(error)), results.windows, False, world)
     cells = cells.drop_duplicates(["foundation", "N_D", "seed"])
     for name, value in (("N_D", one.N_D), ("seed", one.seed)):
-        cells = cells[cells[name].eq(value)] if value in set(cells[name]) else cells
+        cells = cells if value == -1 else cells[cells[name].eq(value)]
     numbers = {column: known[name] for column, name in PREDICTION_ERRORS.items()}
     numbers |= dict.fromkeys(("seconds", "trials"), np.nan)
     return cells.assign(

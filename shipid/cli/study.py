@@ -211,8 +211,9 @@ def study_windows(
     device: Device = "cpu",
 ) -> None:
     """Write the windows of a study for a method of your own: what is known, what the physics says, what it misses."""
+    folder = check_output(out / "windows.parquet", option="--out").parent
     cut = shipid.windows(study, N_D=N_D, seed=seed, with_truth=with_truth, device=device)
-    for file in cut.write(check_output(out / "windows.parquet", option="--out").parent):
+    for file in cut.write(folder):
         typer.echo(f"{file} ({file.stat().st_size / 1000:.0f} kB)")
 
 

@@ -7,6 +7,7 @@ lowers the error at the first step and over the whole horizon, and does not do s
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -58,14 +59,20 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
         frame = pd.read_parquet(file)
         frame = frame.astype({name: float for name in (*KEYS[1:], *PLACES) if name in frame})
     except (OSError, ValueError) as error:
-        raise DataError(f"cannot be read as Parquet ({error})", file=file) from None
+        raise DataError(f"is no table that `DataFrame.to_parquet` wrote ({error})", file=file) from None
     for name in (*KEYS, *PLACES):
         if name not in frame:
             raise DataError(f"lacks this column; it has {', '.join(map(str, frame))}", file=file, path=name)
     rivals: list[RivalPrediction] = []
     blind = is_blind(file, frame, results.folder)
-    groups = {"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame}
-    for (model, N_D, seed), part in pd.DataFrame(groups).groupby(["model", "N_D", "seed"], sort=False):
+    groups = pd.DataFrame({"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame})
+    for name, offered in (("N_D", results.plan.study.grid.N_D), ("seed", results.plan.study.grid.seeds)):
+        if odd := [value for value in pd.unique(groups[name]) if value not in {-1, *offered}]:
+            fault = f"{odd[0]} is not of the study: give one of {', '.join(map(str, offered))}, or -1 for any"
+            raise DataError(fault, file=file, path=name)
+    if groups["model"].isna().any() or not len(groups):
+        raise DataError("a name is missing, or every row: give each step of each window", file=file, path="model")
+    for (model, N_D, seed), part in groups.groupby(["model", "N_D", "seed"], sort=False):
         places = _ordered_places(part, results.test, file)
         doubt, known = doubt_of_places(places, results), {way.name for way in results.plan.methods}
         marks = {"not blind": not blind, "doubtful": bool(doubt), "given": str(model) in known}
@@ -81,9 +88,13 @@ def is_blind(file: Path, frame: pd.DataFrame, folder: Path) -> bool:
     What can say so: the folder of the run; a table of windows beside the predictions; and the predictions themselves,
     to which a frame of `StudyWindows` passes it on.
     """
-    frames = [frame, *(pd.read_parquet(one, columns=["run"]) for one in file.parent.glob("windows.parquet"))]
-    given = any("shipid" in one.attrs and one.attrs["shipid"]["with_truth"] for one in frames)
-    return not given and not (folder / TRUTH_RECORD).is_file()
+    notes = [frame.attrs.get("shipid")]
+    kept = file.parent == folder / SCORES  # it says what was so when it was scored
+    for beside in () if kept else file.parent.glob("windows.parquet"):
+        with suppress(OSError, ValueError):
+            notes.append(pd.read_parquet(beside).attrs.get("shipid"))
+    given = any(isinstance(note, dict) and note.get("with_truth") for note in notes)
+    return not given and (kept or not (folder / TRUTH_RECORD).is_file())
 
 
 def _ordered_places(frame: pd.DataFrame, test: Windows, file: Path) -> Array:
@@ -221,14 +232,16 @@ def believable_errors(results: Results) -> Array:
 
 
 def keep_predictions(file: Path, folder: Path) -> None:
-    """Keep a table of predictions in the folder of a run, under its name, and whether it was blind."""
+    """Keep a table of predictions in the folder of a run, under its name, and whether it was blind.
+
+    One of this name that was kept before is replaced.
+    """
     frame = pd.read_parquet(file)
     frame.attrs["shipid"] = {"with_truth": not is_blind(file, frame, folder)}
-    write_table(folder / SCORES / file.name, frame)
+    write_table(folder / SCORES / f"{file.stem}.parquet", frame)
 
 
-def kept_predictions(results: Results) -> list[RivalPrediction]:
-    """The predictions that the folder of a run keeps; errors as of `read_predictions`."""
-    return [
-        one for file in sorted((results.folder / SCORES).glob("*.parquet")) for one in read_predictions(file, results)
-    ]
+def kept_predictions(results: Results, but: str = "") -> list[RivalPrediction]:
+    """The predictions that the folder of a run keeps, but those of one table; errors as of `read_predictions`."""
+    files = [file for file in sorted((results.folder / SCORES).glob("*.parquet")) if file.stem != but]
+    return [one for file in files for one in read_predictions(file, results)]

@@ -124,7 +124,10 @@ def windows(
 
     ShipidError for a study of several parts, and for an amount or a seed that the grid does not have.
     """
-    folder = Path(study) if not isinstance(study, Plan) and (Path(study) / store.STUDY).is_file() else None
+    place = (
+        Path() if isinstance(study, Plan) else Path(study).parent if Path(study).name == store.STUDY else Path(study)
+    )
+    folder = place if not isinstance(study, Plan) and (place / store.PROVENANCE).is_file() else None
     plan = study if isinstance(study, Plan) else read_plan(Path(study)) if folder is None else store.stored_plan(folder)
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
@@ -134,8 +137,6 @@ def windows(
     check_choice("seed", str(batch.seed), map(str, grid.seeds))
     stored = folder is not None and (folder / store.DATASET).is_file()
     dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
-    if with_truth and folder is not None:
-        write_json(folder / TRUTH_RECORD, {"with_truth": True})
     prepared = prepare(plan, dataset, device)
     runs, known = prepared.runs(batch), plan.study.prediction.known
     train = prepared.pool.select(np.isin(prepared.pool.run, runs))
@@ -148,6 +149,8 @@ def windows(
         name: np.ascontiguousarray(np.concatenate([one.paths, one.test_paths], axis=1))
         for name, one in predictions(prepared, runs, device).items()
     }
+    if with_truth and folder is not None:
+        write_json(folder / TRUTH_RECORD, {"with_truth": True})
     return StudyWindows(cut, keys, folds, paths, with_truth)
 
 

@@ -105,6 +105,11 @@ def test_each_fault_is_named(tmp_path: Path, results: Results, fault: str) -> No
         (lambda t: t.assign(ahead=t["ahead"] - 1.0), "ahead 0 s"),
         (lambda t: t.assign(east="x"), "could not convert string to float"),
         (lambda t: t.assign(east=np.nan), "north or east: a place is no number"),
+        (lambda t: t.assign(N_D=999), "N_D: 999 is not of the study: give one of 4, or -1 for any"),
+        (lambda t: t.assign(N_D="all"), "N_D: all is not of the study"),
+        (lambda t: t.assign(seed=np.nan), "seed: nan is not of the study"),
+        (lambda t: t.assign(model=None), "model: a name is missing"),
+        (lambda t: t[:0], "model: a name is missing, or every row"),
     ],
 )
 def test_faults_of_rows_are_one_line(tmp_path: Path, results: Results, change: Any, words: str) -> None:
@@ -126,6 +131,10 @@ def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blin
     with without_figures():
         assert f"rival: at the horizon {cell['H_end']:.4g} m" in output_of("study", "score", results.folder, file)
     # the tables carry it, also beside the predictions, and the folder of the run remembers it
+    with pytest.raises(DataError, match="'rival' is scored already, from another table"):
+        shipid.score(
+            results.folder, written(tmp_path / "other.pq", results, results.paths[cell["cell"]], model="rival")
+        )
     out = windows(results.plan, with_truth=True)
     passed = written(tmp_path / "passed.parquet", results, out.physics["wrong-1"][:, out.keys["split"] == "test"])
     out.write(tmp_path / "beside")
@@ -134,3 +143,5 @@ def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blin
     assert read_predictions(beside, results)[0].label == "mine (not blind)"
     output_of("study", "windows", results.folder, "--with-truth", "--out", tmp_path / "out")
     assert read_predictions(passed, results)[0].label == "passed (not blind)"
+    (kept,) = (results.folder / "scores").glob("*")
+    assert (kept.name, read_predictions(kept, results)[0].label) == ("rival.parquet", "rival")  # it was blind
