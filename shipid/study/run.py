@@ -115,6 +115,7 @@ def prepare_study(plan: Plan, folder: str | os.PathLike[str], *, device: str = "
             begun = session_on(device, own_code(plan))
             store.note_session(folder, begun)
             yield from _prepare_folder(plan, folder, folder, begun)
+            make_folder(folder / store.SHARDS)
     yield Event("end", text=str(folder))
 
 

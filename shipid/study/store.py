@@ -94,13 +94,11 @@ def open_folder(folder: Path, plan: Plan) -> Iterator[None]:
     try:
         make_folder(folder.parent)
         sweep_temporary(folder.parent)
+        if (folder / STUDY).exists() and provenance(folder)["digest"] != plan.digest:
+            _remove_without_results(folder)
         if not (folder / STUDY).exists():
             if os.path.realpath(folder) == os.getcwd():  # it is made anew, under the feet of this process
                 raise ResultError("is the working folder: name a new one by --out, such as --out run", file=folder)
-            _make(folder, plan)
-        elif provenance(folder)["digest"] != plan.digest and _is_without_results(folder):
-            with sole_writer(folder), temporary_folder(folder.parent) as above:
-                os.rename(os.path.realpath(folder), above / folder.name)
             _make(folder, plan)
     except OSError as error:
         raise ResultError(f"cannot be made ({error.strerror}): choose another --out", file=folder) from None
@@ -150,13 +148,19 @@ def _make(folder: Path, plan: Plan) -> None:
                 raise
 
 
-def _is_without_results(folder: Path) -> bool:
-    """Whether a run ended before its first cell: each file in its folder can be made again from a study."""
+def _remove_without_results(folder: Path) -> None:
+    """Remove the folder of a run that ended before its first cell: each of its files can be made again from a study.
+
+    One that waits for its shards stays, and so does the working folder.
+    """
     made = {STUDY, VESSELS, PROVENANCE, FOUNDATIONS, DATASET, TEST, ENVELOPE}
-    files = [place for place in folder.rglob("*") if not place.is_dir()]
-    return not (folder / SHARDS).exists() and all(
-        place.name in made or place.parent.name == seals.FOLDER or place.suffix == ".lock" for place in files
-    )
+    with sole_writer(folder):
+        files = [place for place in folder.rglob("*") if not place.is_dir()]
+        mine = (file.name in made or file.parent.name == seals.FOLDER or file.suffix == ".lock" for file in files)
+        if (folder / SHARDS).exists() or os.path.realpath(folder) == os.getcwd() or not all(mine):
+            return
+        with temporary_folder(folder.parent) as above:
+            os.rename(os.path.realpath(folder), above / folder.name)
 
 
 def _write_plan(folder: Path, plan: Plan) -> None:

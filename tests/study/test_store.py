@@ -33,9 +33,13 @@ def test_a_folder_opens_again_for_the_same_study_alone(tmp_path: Path) -> None:
     assert store.stored_plan(tmp_path / "run").digest == plan.digest
     make_run(tmp_path / "run", other)  # a run that ended before its first cell does not stand in the way
     assert store.stored_plan(tmp_path / "run").digest == other.digest
-    (tmp_path / "run" / "notes.txt").write_text("of the user")
-    with pytest.raises(ResultError, match="another study"):
-        make_run(tmp_path / "run", plan)
+    for mark in (tmp_path / "run" / store.SHARDS, tmp_path / "run" / "notes"):  # it waits for shards; a user's own
+        mark.mkdir()
+        (mark / "any.txt").write_text("")
+        with pytest.raises(ResultError, match="another study"):
+            make_run(tmp_path / "run", plan)
+        shutil.rmtree(mark)
+    make_run(tmp_path / "run", plan)
 
 
 def test_the_working_folder_holds_no_new_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
