@@ -55,19 +55,20 @@ def _end_error(window: WindowSnapshot, key: PathKey) -> float:
 
 def glance_figure(content: ReportContent) -> PageFigure | None:
     """A test window as the best model, or another, predicts it with the most data: that with the median error."""
-    known = [key for window in content.snapshots for key in window.paths if key[1] == "cooperative"]
+    styles = close_styles(content)
+    known = [key for one in content.snapshots for key in one.paths if key[1] == "cooperative" and key[0] in styles]
     if not known:
         return None
     key = max(known, key=lambda one: (one[0] == content.best, one[2]))
     windows = sorted((one for one in content.snapshots if key in one.paths), key=lambda one: _end_error(one, key))
-    window = windows[len(windows) // 2]
-    name, style = line_look(content, key[0], key[1])["name"], close_styles(content)[key[0]]
+    window = windows[(len(windows) - 1) // 2]
+    name, style = line_look(content, key[0], key[1])["name"], styles[key[0]]
     bands = [Chip("band", "its band", style.colour, width=9)] * (key in window.bands)
     return PageFigure(
         id="glance",
         title="A prediction, and what happened",
         takeaway=f"At the horizon {in_words(key[0])} with {counted_text(key[2], 'run')} errs here by "
-        f"{metres_text(_end_error(window, key))}, the median of {counted_text(len(windows), 'test window')}.",
+        f"{metres_text(_end_error(window, key))}, the middle one of {len(windows)} windows on this page.",
         how=f"{window.run} from t = {window.t:g} s, in the axes of the ship at that instant (11). The outline is to "
         "scale, at the start and where the ship truly was at the end.",
         alternative="The true path of one test window, the predicted path and its band.",

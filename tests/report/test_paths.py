@@ -46,12 +46,17 @@ def test_a_diverged_path_becomes_gaps(full_scale):
 
 
 def test_the_page_begins_with_the_window_of_the_median_error(simulation):
-    figure = paths.glance_figure(simulation)
+    key, windows = (simulation.best, "cooperative", 100), simulation.snapshots[:7]
+    errors = np.random.default_rng(0).permutation(7) + 1.0
+    windows = [
+        replace(one, paths={key: one.truth + np.array([error, 0.0])})
+        for one, error in zip(windows, errors, strict=True)
+    ]
+    figure = paths.glance_figure(replace(simulation, snapshots=windows))
+    assert "errs here by 4.00 m" in figure.takeaway
     (drawn,) = figure.draw()
-    key = simulation.best, "cooperative", 100
-    errors = [float(np.linalg.norm(one.paths[key][-1] - one.truth[-1])) for one in simulation.snapshots]
-    shown = simulation.snapshots[int(np.argsort(errors, kind="stable")[len(errors) // 2])]
-    assert f"errs here by {np.median(errors):.2f} m" in figure.takeaway
     true = next(trace for trace in drawn["data"] if trace["name"] == "true path")
-    np.testing.assert_allclose(true["y"], shown.truth[:, 0], rtol=1e-5)
+    np.testing.assert_allclose(true["y"], windows[int(np.flatnonzero(errors == 4)[0])].truth[:, 0], rtol=1e-5)
     assert paths.glance_figure(replace(simulation, snapshots=[])) is None
+    unseen = [replace(one, paths={("of no close-up", *key[1:]): one.truth}) for one in windows]
+    assert paths.glance_figure(replace(simulation, snapshots=unseen)) is None
