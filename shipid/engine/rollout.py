@@ -135,10 +135,10 @@ def _check_channel_names(what: str, given: object, names: Sequence[str], vessel:
 
 def _warn_of_units(names: Sequence[str], commands: Array) -> None:
     """Warn of a command (T, channel, S) beyond what is plausible: it was probably meant in another unit than SI."""
-    for name, values in zip(names, np.abs(commands).max(axis=(0, 2), initial=0.0), strict=True):
-        row = signal_row(name)
-        if row is not None and row.plausible is not None and values > row.plausible:
-            log.warning("command %s reaches %.4g %s: was %s meant?", name, values, row.unit, row.read_in)
+    for name, values in zip(names, commands.swapaxes(0, 1), strict=True):
+        row, largest = signal_row(name), max(values.max(), -values.min())
+        if row is not None and row.plausible is not None and largest > row.plausible:
+            log.warning("command %s reaches %.4g %s: was %s meant?", name, largest, row.unit, row.read_in)
 
 
 @dataclass(frozen=True)
