@@ -117,7 +117,8 @@ def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
         title="Methods on the same cells",
         takeaway="".join(sentences_on_methods(frame)[:1]) or "No method has physics to improve.",
         how="Methods are in the order of their mean H with physics, or without where they have none. "
-        "All methods see the same windows, folds and known quantities. Left: H (15) of each family. Right: H less "
+        "All methods of the study see the same windows, folds and known quantities. Left: H (15) of each family. "
+        "Right: H less "
         f"that of {reference} over the cells in which both have a result, mean over members, seeds and "
         f"{counted_text(worlds, 'world')}; the 95 % interval comes from a bootstrap over test runs, each drawn with "
         "all its windows and cells, or Student's where that is wider, with what another training would give; with "
@@ -203,7 +204,10 @@ def methods_table(content: ReportContent | MethodsContent) -> PageTable:
     paired = {name: [_paired_cell(row, name) for row in records] for name in ("over_runs", "better_runs", "by_world")}
     shown = with_cells(frame.assign(family=frame.family.map(model_text)), without=failed, **paired)
     shown = shown.drop(columns="condition") if frame.condition.nunique() < 2 else shown
-    counts = frame.loc[frame.family.ne(ALL_WITH_PHYSICS), ["failed", "cells"]].sum()
+    own = frame.family.ne(ALL_WITH_PHYSICS) & (
+        frame.seconds.notna() | frame.failed.gt(0)
+    )  # those of others cost nothing
+    counts = frame.loc[own, ["failed", "cells"]].sum()
     bad, every = int(counts["failed"]), counted_text(int(counts["cells"]), "cell")
     takeaway = "Core-seconds and errors are means over the cells of a row; differences are to "
     takeaway += f"{frame.reference.iloc[0]}. "
