@@ -21,7 +21,7 @@ import tomlkit
 from shipid import document as documents
 from shipid.arguments import check_choice, check_mapping, check_whole_number, whole_steps
 from shipid.engine.rollout import SPEED_LIMIT, Trajectories, rollout
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.files import make_folder, write_set
 from shipid.simulation.approach import Controls
 from shipid.simulation.perform import rollout_inputs
@@ -148,12 +148,17 @@ class VesselFamily:
         return {"digest": documents.digest_document(result)} | result
 
     def export(self, folder: str | Path) -> Path:
-        """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock."""
-        make_folder(Path(folder))
+        """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock.
+
+        DataError, and nothing is written, where one of these files exists.
+        """
         base, lock = str(self.rules.base), Path(folder) / f"{self.rules.name}.lock.toml"
         base = os.path.relpath(self.base.file, folder) if base.endswith(".toml") else base
-        content = {"vessel": base, "family": [self.content()["rules"]], "lock": self.lock()}
         patches = {Path(folder) / f"{one.name}.toml": replace(one, base=base).document() for one in self.members}
+        if taken := [file for file in (lock, *patches) if file.exists()]:
+            raise DataError("exists already and is not written over: name another folder", file=taken[0])
+        content = {"vessel": base, "family": [self.content()["rules"]], "lock": self.lock()}
+        make_folder(Path(folder))
         write_set({lock: tomlkit.dumps(content)} | patches)
         return lock
 

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 import shipid
 from shipid.document import digest_document
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.simulation.families import VesselFamily, compare_contents
 from shipid.study.plan import read_plan
 from shipid.vessel.perturb import Family, Perturbation, draw_members
@@ -166,6 +166,24 @@ def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: P
             shipid.verify_lock(lock)
     with pytest.raises(DocumentError, match=r"holds no \[lock\]"):
         shipid.verify_lock(document)
+
+
+@pytest.mark.parametrize("taken", ["low.lock.toml", "low-1.toml", "low-9.toml"])
+def test_an_export_writes_over_nothing(document: Path, tmp_path: Path, taken: str) -> None:
+    """Law: whichever file of the set exists, it is named, it stays as it is, and no other is written."""
+    place = tmp_path / "out" / taken
+    place.parent.mkdir()
+    place.write_text("mine")
+    with pytest.raises(DataError, match=f"{taken}.*not written over: name another folder"):
+        shipid.read_family(document, "low").export(place.parent)
+    assert [file.read_text() for file in place.parent.iterdir()] == ["mine"]
+
+
+def test_a_family_called_as_its_own_document_replaces_it_not(document: Path) -> None:
+    document.write_text(DOCUMENT.partition("[[family]]")[0] + '[[family]]\nname = "families"\n')
+    with pytest.raises(DataError, match=r"families\.toml.*not written over"):
+        shipid.read_family(document).export(document.parent)
+    assert shipid.read_family(document).rules.name == "families"
 
 
 def test_a_member_that_diverges_is_locked_with_its_time() -> None:
