@@ -32,7 +32,8 @@ from shipid.vessel.perturb import Family, FamilyDocument, Variant, change_struct
 
 LOCK_TRIAL: tuple[str, tuple[float, float]] = ("zigzag", (20.0, 20.0))
 """Manoeuvre in which a lock looks for members that diverge; angles in deg."""
-RULE_KEYS = {"name", "members", "seed", "sample", "equal", "structure", "perturb"}
+UNLOCKED_KEYS = {"base", "extends", "description"}
+"""Keys of a family that its lock leaves out: the base is locked by its digest, what is extended is written out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +131,7 @@ class VesselFamily:
     def content(self) -> documents.Document:
         """Digest of the base, rules without words, and path -> values of the members in their order."""
         values = {path: [one.values[path] for one in self.members] for path in self.members[0].values}
-        rules = self.rules.model_dump(mode="json", include=RULE_KEYS, exclude_defaults=True)
+        rules = self.rules.model_dump(mode="json", exclude=UNLOCKED_KEYS, exclude_defaults=True)
         return {"base": self.base.digest, "rules": rules, "values": values}
 
     def lock(self) -> documents.Document:

@@ -168,6 +168,24 @@ def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: P
         shipid.verify_lock(document)
 
 
+@pytest.mark.parametrize(
+    ("key", "one", "other"),
+    [
+        ("identify", {"parameters": ["inertia.m"]}, {"parameters": ["inertia.I_z"]}),
+        ("observer", {"disturbance_time": 30.0}, {"disturbance_time": 60.0}),
+        ("seen", ["trial-1"], ["trial-2"]),
+    ],
+)
+def test_a_lock_holds_all_that_a_family_does(key: str, one: Any, other: Any, tmp_path: Path) -> None:
+    """Law: two families that differ in a key alone have other digests and contents; a lock is read as it was."""
+    plain, first, second = (family(members=1, **more) for more in ({}, {key: one}, {key: other}))
+    assert len({drawn.lock()["digest"] for drawn in (plain, first, second)}) == 3
+    assert all(path.startswith(f"rules.{key}") for path in compare_contents(first.content(), second.content()))
+    lock = first.export(tmp_path / "out")
+    assert shipid.read_family(lock).content() == first.content()
+    assert shipid.verify_lock(lock) == first.lock()["digest"]
+
+
 @pytest.mark.parametrize("taken", ["low.lock.toml", "low-1.toml", "low-9.toml"])
 def test_an_export_writes_over_nothing(document: Path, tmp_path: Path, taken: str) -> None:
     """Law: whichever file of the set exists, it is named, it stays as it is, and no other is written."""
