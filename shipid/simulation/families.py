@@ -226,12 +226,17 @@ def compare_contents(one: Any, other: Any) -> dict[str, tuple[Any, Any]]:
 def verify_lock(file: str | Path) -> str:
     """Draw and simulate the family of a lock again; return the digest of the lock.
 
-    ShipidError with the first values that are others now; DocumentError for a file that is no lock, or has no base.
+    Patches of members that lie beside the lock are compared too; one that is absent is not missed. ShipidError with the
+    first values that are others now; DocumentError for a file that is no lock, or has no base.
     """
     stored = read_family_document(Path(file))[1].get("lock")
     if stored is None:
         raise DocumentError("holds no [lock]: `shipid family export` writes one", file=file)
-    if changes := compare_contents(stored, read_family(Path(file)).lock()):
-        first = "; ".join(f"{path} {then} in the lock, {now} now" for path, (then, now) in [*changes.items()][:3])
+    family, folder = read_family(Path(file)), Path(file).parent
+    patches = {f"{one.name}.toml": one.document() for one in family.members if (folder / f"{one.name}.toml").is_file()}
+    then = stored | {name: documents.read_document(folder / name) for name in patches}
+    now = family.lock() | {name: documents.parse_toml(text) for name, text in patches.items()}
+    if changes := compare_contents(then, now):
+        first = "; ".join(f"{path} {old} in the file, {new} now" for path, (old, new) in [*changes.items()][:3])
         raise ShipidError(f"{len(changes)} entries are not as they were locked: {first}", path=str(file))
     return str(stored["digest"])

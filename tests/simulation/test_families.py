@@ -186,6 +186,22 @@ def test_a_lock_holds_all_that_a_family_does(key: str, one: Any, other: Any, tmp
     assert shipid.verify_lock(lock) == first.lock()["digest"]
 
 
+def test_a_patch_beside_a_lock_is_verified_with_it(document: Path, tmp_path: Path) -> None:
+    """A number or the digest of a base that somebody changed is named; a patch that was taken away is not missed."""
+    lock = shipid.read_family(document, "high").export(tmp_path / "out")
+    patch = lock.with_name("high-3.toml")
+    text, again = patch.read_text(), shipid.load_vessel(patch).parameters["inertia.m"]
+    for old, new, path in (
+        (f'"inertia.m" = {again!r}', '"inertia.m" = 4e5', r"set\.inertia\.m 400000\.0 in the file"),
+        ('base_digest = "', 'base_digest = "0', "base_digest"),
+    ):
+        patch.write_text(text.replace(old, new))
+        with pytest.raises(ShipidError, match=rf"1 entries are not as they were locked: high-3\.toml\.{path}"):
+            shipid.verify_lock(lock)
+    patch.unlink()
+    assert len(shipid.verify_lock(lock)) == 16
+
+
 @pytest.mark.parametrize("taken", ["low.lock.toml", "low-1.toml", "low-9.toml"])
 def test_an_export_writes_over_nothing(document: Path, tmp_path: Path, taken: str) -> None:
     """Law: whichever file of the set exists, it is named, it stays as it is, and no other is written."""
