@@ -189,7 +189,8 @@ def expand_families(document: documents.Document, file: Path) -> documents.Docum
     if not isinstance(named, str):
         return document
     source, content = read_family_document(named, file.parent)
-    family = [*content["family"], *document.get("family", [])]
+    own = document.get("family", [])  # what is no list is left to the schema
+    family = [*content["family"], *own] if isinstance(own, list) else own
     for block in content["family"]:
         if block.get("base", "").endswith(".toml") and (source.parent / block["base"]).is_file():
             block["base"] = (Path(named).parent / block["base"]).as_posix()
