@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -153,17 +154,25 @@ def test_trajectories_are_those_of_the_manoeuvre(name: str, angles: Any) -> None
 
 
 def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: Path) -> None:
+    """Law: whatever is changed in a lock, one line names it."""
+    document.write_text(DOCUMENT.replace("[0.4, 1.6]", "[-40.0, 40.0]\nchange_sign = true"))
     lock = shipid.read_family(document, "high").export(tmp_path / "out")
     assert len(shipid.verify_lock(lock)) == 16
     assert not compare_contents(*(shipid.read_family(file, "high").content() for file in (document, lock)))
     text = lock.read_text()
     for old, new, path in (
-        ("bias = [-10000.0", "bias = [-9000.0", "rules"),
-        ('"inertia.m" = [', '"inertia.m" = [1.0, ', "m.0"),
+        (r"bias = \[-10000.0", "bias = [-9000.0", "rules"),
+        (r'"inertia.m" = \[', '"inertia.m" = [1.0, ', r"m\.0"),
+        ('trial = "zigzag', 'trial = "turning', "trial turning"),
+        (r"(diverges_at_s\]\n\S+ = )\S+", r"\g<1>0.5", r"diverges_at_s\.high-\d 0\.5 in the file"),
+        ("\nbase = ", "\nbase = '0' # ", "base 0 in the file"),
+        ("\ndigest = ", "\ndigest = '0' # ", "digest 0 in the file"),
     ):
-        lock.write_text(text.replace(old, new))
-        with pytest.raises(ShipidError, match=f"as they were locked: .*{path}"):
+        lock.write_text(re.sub(old, new, text, count=1))
+        assert lock.read_text() != text
+        with pytest.raises(ShipidError, match=f"as they were locked: .*{path}") as caught:
             shipid.verify_lock(lock)
+        assert "\n" not in str(caught.value)
     with pytest.raises(DocumentError, match=r"holds no \[lock\]"):
         shipid.verify_lock(document)
 
