@@ -150,7 +150,7 @@ def factors(source: Source | VesselFamily, *, dark: bool = False) -> go.Figure:
     if isinstance(source, VesselFamily):
         if not any(one.factors for one in source.members):
             raise ShipidError(
-                f"family {source.rules.name!r} has no factors: it changes no number, or only ones that are 0 in the base",
+                f"family {source.rules.name!r} has no factors: it changes no number that is not 0 in its base",
                 path="figures",
             )
         return draw_alone(family_figure(pd.DataFrame(source.table().xs("factor", axis=1, level=1))), dark=dark)
