@@ -148,6 +148,11 @@ def factors(source: Source | VesselFamily, *, dark: bool = False) -> go.Figure:
     from shipid.simulation.families import VesselFamily
 
     if isinstance(source, VesselFamily):
+        if not any(one.factors for one in source.members):
+            raise ShipidError(
+                f"family {source.rules.name!r} has no factors: it changes no number that is not 0 in its base",
+                path="figures",
+            )
         return draw_alone(family_figure(pd.DataFrame(source.table().xs("factor", axis=1, level=1))), dark=dark)
     return _draw("factors", content_of(source), dark=dark)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from pathlib import Path
-from typing import Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,8 @@ from shipid.report import ReportContent
 from shipid.report.figure import page_colours
 from shipid.simulation.families import VesselFamily, read_family
 from shipid.study.results import read_results
+from shipid.vessel.load import load_vessel
+from shipid.vessel.perturb import Family
 from tests.report import test_checks, test_identification, test_motion
 
 OTHERS = {
@@ -59,6 +61,14 @@ def test_the_factors_of_a_family_have_a_row_a_number_and_a_dot_a_member() -> Non
     drawn = figures.factors(read_family("quick", "moderate"))
     assert sum(len(trace.x) for trace in drawn.data if trace.x[0] is not None) == 3 * 32
     assert len(drawn.layout.yaxis.ticktext) == 32
+
+
+@pytest.mark.parametrize("rules", [[], [{"set": {"inertia.x_G": 1.0}}]])
+def test_a_family_that_has_no_factors_is_refused(rules: list[dict[str, Any]]) -> None:
+    """One without rules, and one whose only number is 0 in the base."""
+    base = load_vessel("gunnerus-28.9")
+    with pytest.raises(ShipidError, match="family 'f' has no factors"):
+        figures.factors(VesselFamily(Family(name="f", perturb=rules), base))
 
 
 @pytest.mark.parametrize("name", figures.__all__)

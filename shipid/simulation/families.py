@@ -21,7 +21,7 @@ import tomlkit
 from shipid import document as documents
 from shipid.arguments import check_choice, check_mapping, check_whole_number, whole_steps
 from shipid.engine.rollout import SPEED_LIMIT, Trajectories, rollout
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.files import make_folder, write_set
 from shipid.simulation.approach import Controls
 from shipid.simulation.perform import rollout_inputs
@@ -32,7 +32,8 @@ from shipid.vessel.perturb import Family, FamilyDocument, Variant, change_struct
 
 LOCK_TRIAL: tuple[str, tuple[float, float]] = ("zigzag", (20.0, 20.0))
 """Manoeuvre in which a lock looks for members that diverge; angles in deg."""
-RULE_KEYS = {"name", "members", "seed", "sample", "equal", "structure", "perturb"}
+UNLOCKED_KEYS = {"base", "extends", "description"}
+"""Keys of a family that its lock leaves out: the base is locked by its digest, what is extended is written out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +131,7 @@ class VesselFamily:
     def content(self) -> documents.Document:
         """Digest of the base, rules without words, and path -> values of the members in their order."""
         values = {path: [one.values[path] for one in self.members] for path in self.members[0].values}
-        rules = self.rules.model_dump(mode="json", include=RULE_KEYS, exclude_defaults=True)
+        rules = self.rules.model_dump(mode="json", exclude=UNLOCKED_KEYS, exclude_defaults=True)
         return {"base": self.base.digest, "rules": rules, "values": values}
 
     def lock(self) -> documents.Document:
@@ -148,12 +149,17 @@ class VesselFamily:
         return {"digest": documents.digest_document(result)} | result
 
     def export(self, folder: str | Path) -> Path:
-        """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock."""
-        make_folder(Path(folder))
+        """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock.
+
+        DataError, and nothing is written, where one of these files exists.
+        """
         base, lock = str(self.rules.base), Path(folder) / f"{self.rules.name}.lock.toml"
         base = os.path.relpath(self.base.file, folder) if base.endswith(".toml") else base
-        content = {"vessel": base, "family": [self.content()["rules"]], "lock": self.lock()}
         patches = {Path(folder) / f"{one.name}.toml": replace(one, base=base).document() for one in self.members}
+        if taken := [file for file in (lock, *patches) if file.exists()]:
+            raise DataError("exists already and is not written over: name another folder", file=taken[0])
+        content = {"vessel": base, "family": [self.content()["rules"]], "lock": self.lock()}
+        make_folder(Path(folder))
         write_set({lock: tomlkit.dumps(content)} | patches)
         return lock
 
@@ -183,7 +189,8 @@ def expand_families(document: documents.Document, file: Path) -> documents.Docum
     if not isinstance(named, str):
         return document
     source, content = read_family_document(named, file.parent)
-    family = [*content["family"], *document.get("family", [])]
+    own = document.get("family", [])  # what is no list is left to the schema
+    family = [*content["family"], *own] if isinstance(own, list) else own
     for block in content["family"]:
         if block.get("base", "").endswith(".toml") and (source.parent / block["base"]).is_file():
             block["base"] = (Path(named).parent / block["base"]).as_posix()
@@ -220,12 +227,17 @@ def compare_contents(one: Any, other: Any) -> dict[str, tuple[Any, Any]]:
 def verify_lock(file: str | Path) -> str:
     """Draw and simulate the family of a lock again; return the digest of the lock.
 
-    ShipidError with the first values that are others now; DocumentError for a file that is no lock, or has no base.
+    Patches of members that lie beside the lock are compared too; one that is absent is not missed. ShipidError with the
+    first values that are others now; DocumentError for a file that is no lock, or has no base.
     """
     stored = read_family_document(Path(file))[1].get("lock")
     if stored is None:
         raise DocumentError("holds no [lock]: `shipid family export` writes one", file=file)
-    if changes := compare_contents(stored, read_family(Path(file)).lock()):
-        first = "; ".join(f"{path} {then} in the lock, {now} now" for path, (then, now) in [*changes.items()][:3])
+    family, folder = read_family(Path(file)), Path(file).parent
+    patches = {f"{one.name}.toml": one.document() for one in family.members if (folder / f"{one.name}.toml").is_file()}
+    then = stored | {name: documents.read_document(folder / name) for name in patches}
+    now = family.lock() | {name: documents.parse_toml(text) for name, text in patches.items()}
+    if changes := compare_contents(then, now):
+        first = "; ".join(f"{path} {old} in the file, {new} now" for path, (old, new) in [*changes.items()][:3])
         raise ShipidError(f"{len(changes)} entries are not as they were locked: {first}", path=str(file))
     return str(stored["digest"])

@@ -1,7 +1,8 @@
 """Families of perturbed vessels: a variant is a named patch on a base vessel with a given digest.
 
 Each independent draw comes from hash(seed, family, member, path, counter), so that adding a member, a parameter or a
-family never changes another draw.
+family never changes another draw. A Latin hypercube changes whole with the number of members. A Sobol sample keeps its
+members where more are added, changes with the parameters before, and is balanced where they are a power of 2.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ from scipy.stats import qmc
 
 import shipid
 from shipid.document import digest_document
-from shipid.errors import DocumentError, ShipidError
+from shipid.errors import DataError, DocumentError, ShipidError
 from shipid.simulation.families import VesselFamily, compare_contents
 from shipid.study.plan import read_plan
 from shipid.vessel.perturb import Family, Perturbation, draw_members
@@ -153,19 +154,79 @@ def test_trajectories_are_those_of_the_manoeuvre(name: str, angles: Any) -> None
 
 
 def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: Path) -> None:
+    """Law: whatever is changed in a lock, one line names it."""
+    document.write_text(DOCUMENT.replace("[0.4, 1.6]", "[-40.0, 40.0]\nchange_sign = true"))
     lock = shipid.read_family(document, "high").export(tmp_path / "out")
     assert len(shipid.verify_lock(lock)) == 16
     assert not compare_contents(*(shipid.read_family(file, "high").content() for file in (document, lock)))
     text = lock.read_text()
     for old, new, path in (
-        ("bias = [-10000.0", "bias = [-9000.0", "rules"),
-        ('"inertia.m" = [', '"inertia.m" = [1.0, ', "m.0"),
+        (r"bias = \[-10000.0", "bias = [-9000.0", "rules"),
+        (r'"inertia.m" = \[', '"inertia.m" = [1.0, ', r"m\.0"),
+        ('trial = "zigzag', 'trial = "turning', "trial turning"),
+        (r"(diverges_at_s\]\n\S+ = )\S+", r"\g<1>0.5", r"diverges_at_s\.high-\d 0\.5 in the file"),
+        ("\nbase = ", "\nbase = '0' # ", "base 0 in the file"),
+        ("\ndigest = ", "\ndigest = '0' # ", "digest 0 in the file"),
     ):
-        lock.write_text(text.replace(old, new))
-        with pytest.raises(ShipidError, match=f"as they were locked: .*{path}"):
+        lock.write_text(re.sub(old, new, text, count=1))
+        assert lock.read_text() != text
+        with pytest.raises(ShipidError, match=f"as they were locked: .*{path}") as caught:
             shipid.verify_lock(lock)
+        assert "\n" not in str(caught.value)
     with pytest.raises(DocumentError, match=r"holds no \[lock\]"):
         shipid.verify_lock(document)
+
+
+@pytest.mark.parametrize(
+    ("key", "one", "other"),
+    [
+        ("identify", {"parameters": ["inertia.m"]}, {"parameters": ["inertia.I_z"]}),
+        ("observer", {"disturbance_time": 30.0}, {"disturbance_time": 60.0}),
+        ("seen", ["trial-1"], ["trial-2"]),
+    ],
+)
+def test_a_lock_holds_all_that_a_family_does(key: str, one: Any, other: Any, tmp_path: Path) -> None:
+    """Law: two families that differ in a key alone have other digests and contents; a lock is read as it was."""
+    plain, first, second = (family(members=1, **more) for more in ({}, {key: one}, {key: other}))
+    assert len({drawn.lock()["digest"] for drawn in (plain, first, second)}) == 3
+    assert all(path.startswith(f"rules.{key}") for path in compare_contents(first.content(), second.content()))
+    lock = first.export(tmp_path / "out")
+    assert shipid.read_family(lock).content() == first.content()
+    assert shipid.verify_lock(lock) == first.lock()["digest"]
+
+
+def test_a_patch_beside_a_lock_is_verified_with_it(document: Path, tmp_path: Path) -> None:
+    """A number or the digest of a base that somebody changed is named; a patch that was taken away is not missed."""
+    lock = shipid.read_family(document, "high").export(tmp_path / "out")
+    patch = lock.with_name("high-3.toml")
+    text, again = patch.read_text(), shipid.load_vessel(patch).parameters["inertia.m"]
+    for old, new, path in (
+        (f'"inertia.m" = {again!r}', '"inertia.m" = 4e5', r"set\.inertia\.m 400000\.0 in the file"),
+        ('base_digest = "', 'base_digest = "0', "base_digest"),
+    ):
+        patch.write_text(text.replace(old, new))
+        with pytest.raises(ShipidError, match=rf"1 entries are not as they were locked: high-3\.toml\.{path}"):
+            shipid.verify_lock(lock)
+    patch.unlink()
+    assert len(shipid.verify_lock(lock)) == 16
+
+
+@pytest.mark.parametrize("taken", ["low.lock.toml", "low-1.toml", "low-9.toml"])
+def test_an_export_writes_over_nothing(document: Path, tmp_path: Path, taken: str) -> None:
+    """Law: whichever file of the set exists, it is named, it stays as it is, and no other is written."""
+    place = tmp_path / "out" / taken
+    place.parent.mkdir()
+    place.write_text("mine")
+    with pytest.raises(DataError, match=f"{taken}.*not written over: name another folder"):
+        shipid.read_family(document, "low").export(place.parent)
+    assert [file.read_text() for file in place.parent.iterdir()] == ["mine"]
+
+
+def test_a_family_called_as_its_own_document_replaces_it_not(document: Path) -> None:
+    document.write_text(DOCUMENT.partition("[[family]]")[0] + '[[family]]\nname = "families"\n')
+    with pytest.raises(DataError, match=r"families\.toml.*not written over"):
+        shipid.read_family(document).export(document.parent)
+    assert shipid.read_family(document).rules.name == "families"
 
 
 def test_a_member_that_diverges_is_locked_with_its_time() -> None:

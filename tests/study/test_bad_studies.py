@@ -50,6 +50,7 @@ BROKEN = {
     "family-called-like-a-member": ("family", "two models are called 'wrong-1'"),
     "two-families-of-one-name": ("family.1.name", "two families are called 'right'"),
     "family-with-a-slash": ("family.a/b.name", "'a/b'"),
+    "family-beside-families": ("family", "5: must be a list"),
     "no-families": ("family", "must be a list of 1 or more entries (it has 0)"),
     "more-data-than-runs": ("grid.N_D", "12 manoeuvres less 4 test runs leave 8"),
     "empty-grid": ("grid.N_D", "must be a list of 1 or more entries (it has 0)"),
