@@ -188,6 +188,8 @@ def expand_families(document: documents.Document, file: Path) -> documents.Docum
     named = document.get("families")
     if not isinstance(named, str):
         return document
+    if "families" in documents.read_document(documents.find_document(named, "studies", file.parent)):
+        raise DocumentError(f"{named} takes its families from elsewhere itself: name that", file=file, path="families")
     source, content = read_family_document(named, file.parent)
     own = document.get("family", [])  # what is no list is left to the schema
     family = [*content["family"], *own] if isinstance(own, list) else own

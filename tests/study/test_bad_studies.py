@@ -51,6 +51,7 @@ BROKEN = {
     "two-families-of-one-name": ("family.1.name", "two families are called 'right'"),
     "family-with-a-slash": ("family.a/b.name", "'a/b'"),
     "family-beside-families": ("family", "5: must be a list"),
+    "families-of-itself": ("families", "families-of-itself.toml takes its families from elsewhere itself: name that"),
     "no-families": ("family", "must be a list of 1 or more entries (it has 0)"),
     "more-data-than-runs": ("grid.N_D", "12 manoeuvres less 4 test runs leave 8"),
     "empty-grid": ("grid.N_D", "must be a list of 1 or more entries (it has 0)"),
