@@ -203,8 +203,10 @@ class _Trainer:
         if best is None or number != best.row["number"]:
             first = number - number % at_once
             if first not in self._again:
-                again = {
-                    (name, row["number"]): row["params"] for name in rows for row in rows[name][first : first + at_once]
+                again = {  # in the order of the first training, so that stacks hold the same members
+                    (name, place): rows[name][place]["params"]
+                    for place in range(first, min(first + at_once, len(rows[key])))
+                    for name in rows
                 }
                 self._again[first] = self.train(again)
             best = self._again[first][key, number]

@@ -78,7 +78,7 @@ def task_in(here: World, kind: str, journal: Journal | None) -> Task:
 
 
 CUT = [(kind, 1 + len(kind) % 2, {}) for kind in SEARCHING]
-RACE = {"at_once": 4, "epochs": 64, "mirror": True, "groups": (0.5, 4.0)}
+RACE = {"at_once": 4, "epochs": 64, "units": (4, 32), "mirror": True, "groups": (0.5, 4.0)}
 
 
 @pytest.mark.parametrize(
