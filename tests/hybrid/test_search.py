@@ -78,12 +78,12 @@ def task_in(here: World, kind: str, journal: Journal | None) -> Task:
 
 
 CUT = [(kind, 1 + len(kind) % 2, {}) for kind in SEARCHING]
-RACE = {"at_once": 4, "epochs": 64, "units": (4, 32), "mirror": True, "groups": (0.5, 4.0)}
+RACE = {"at_once": 4, "epochs": 64, "mirror": True, "groups": (0.5, 4.0)}
 
 
 @pytest.mark.parametrize(
     ("kind", "after", "more"),
-    [*CUT, ("path-trained", 12, {}), *(("path-trained", after, RACE) for after in (6, 13))],
+    [*CUT, ("path-trained", 12, {}), *(("path-trained", after, RACE) for after in (6, 13, 14))],
 )
 def test_a_search_that_was_interrupted_ends_with_the_same_digits(
     kind: str, after: int, more: dict[str, Any], here: World, tmp_path
