@@ -21,7 +21,7 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_
 from shipid.hybrid.features import Inputs, choose_features, input_group
 from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
 from shipid.hybrid.method import Array, FitResult, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.search import Search, SearchMethod, best_trials, seed_of, trial_row
+from shipid.hybrid.search import Search, SearchMethod, best_trials, seed_of, setting_at_share, trial_row
 from shipid.hybrid.training import Layers, Learner, Length, StackTraining
 from shipid.hybrid.units import VaryingInputs
 
@@ -45,14 +45,16 @@ def tune_gradient(
     """
     trainer, search = _Trainer(task, method, inputs, length, mirror), Search(task, task.cases, method)
     space = method.space()
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
     if search.done != search.count:  # a round that was interrupted begins again
         search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
     studies = {key: optuna.create_study(direction="minimize") for key in search.rows}
     for key, study in studies.items():
         study.add_trials([frozen_trial(row, space) for row in search.rows[key]])
     best: dict[str, _TrialOutcome] = {}  # of the trials that were trained here
-    fixed = {name: getattr(method, name) for name in method.SEARCHED}
+    fixed = {  # what `suggest` leaves out is in the middle
+        name: setting_at_share(method, name, 0.5) if name in method.ranges() else getattr(method, name)
+        for name in method.SEARCHED
+    }
     for first, _ in search.left(count()):
         numbers = range(first, min(first + at_once, search.count or first + at_once))
         trials: dict[Trial, optuna.Trial] = {}
@@ -203,8 +205,10 @@ class _Trainer:
         if best is None or number != best.row["number"]:
             first = number - number % at_once
             if first not in self._again:
-                again = {
-                    (name, row["number"]): row["params"] for name in rows for row in rows[name][first : first + at_once]
+                again = {  # in the order of the first training, so that stacks hold the same members
+                    (name, place): rows[name][place]["params"]
+                    for place in range(first, min(first + at_once, len(rows[key])))
+                    for name in rows
                 }
                 self._again[first] = self.train(again)
             best = self._again[first][key, number]

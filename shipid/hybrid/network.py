@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 from torch.func import functional_call
 
+from shipid.errors import ResultError
 from shipid.hybrid.method import Array
 from shipid.hybrid.methods import METHODS, method_kind
 from shipid.hybrid.recurrent import (
@@ -35,7 +36,7 @@ from shipid.hybrid.training import Length, train_reader
 
 @dataclass(frozen=True)
 class TrainedModule(GatedNetwork):
-    """The network of one fold: its weights, and how it is built again.
+    """The network of one fold: its parameters and buffers of the best epoch, and how it is built again.
 
     kind, settings : of its method, the settings as JSON. point : of its trial.
     """
@@ -45,12 +46,20 @@ class TrainedModule(GatedNetwork):
     point: Mapping[str, float]
 
     def module(self) -> torch.nn.Module:
-        """Build the network in double precision, ready to predict."""
+        """Build the network in double precision, ready to predict.
+
+        ResultError where it has other parameters or buffers than in training.
+        """
         method: Any = METHODS[self.kind].model_validate_json(self.settings)
         built: torch.nn.Module = method.network(
             self.point, len(self.reader.past.names), len(self.reader.now.names), 2 * self.basis.shape[1]
         )
-        built.load_state_dict({name: torch.as_tensor(layer) for name, layer in self.layers.items()}, strict=False)
+        own = dict([*built.named_parameters(), *built.named_buffers()])
+        shapes = [{(name, tuple(one.shape)) for name, one in held.items()} for held in (own, self.layers)]
+        if self.layers and (other := sorted({name for name, _ in shapes[0] ^ shapes[1]})):
+            raise ResultError(f"`network` builds {', '.join(other)} otherwise than in training", path=self.kind)
+        for name, layer in self.layers.items():
+            own[name].data = torch.tensor(layer)
         return built.double().eval()
 
     def _outputs(self, seen: Sequences) -> Array:
@@ -123,14 +132,19 @@ class NetworkProblem(RecurrentProblem):
         with torch.random.fork_rng():
             torch.manual_seed(seed)
             module = network.module().float()
+            learned = {name: layer for name, layer in module.named_parameters() if layer.requires_grad}
             layers, epochs = train_reader(
                 parts,
                 lambda layers, *seen: functional_call(module.train(torch.is_grad_enabled()), dict(layers), seen),
-                torch.nn.utils.parameters_to_vector(module.parameters()).detach()[None].clone(),
-                {name: tuple(layer.shape) for name, layer in module.named_parameters()},
+                torch.nn.utils.parameters_to_vector(learned.values()).detach()[None].clone(),
+                {name: tuple(layer.shape) for name, layer in learned.items()},
                 (rate, method.weight_decay),
                 Length(method.epochs, method.batch, method.patience),
                 torch.Generator().manual_seed(seed),
+                lambda: {
+                    name: held.numpy(force=True).copy()
+                    for name, held in (*module.named_parameters(), *module.named_buffers())
+                },
             )
         return replace(network, layers=layers), epochs
 

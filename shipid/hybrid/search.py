@@ -89,11 +89,12 @@ class SearchMethod(Method):
 
     def space(self) -> dict[str, Any]:
         """Return where each hyperparameter that differs between trials is searched, as Optuna's distributions."""
-        from optuna import create_study  # slow to import
+        import optuna  # slow to import
         from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
         if self.suggest is not None:
-            trial = create_study().ask()
+            trial = optuna.create_study().ask()
             self.suggest(trial)
             return trial.distributions
         space: dict[str, Any] = {}

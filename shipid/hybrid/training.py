@@ -364,11 +364,13 @@ def train_reader(
     rates: tuple[float, float],
     length: Length,
     generator: torch.Generator,
+    held: Callable[[], dict[str, Array]] = dict,
 ) -> tuple[dict[str, Array], int]:
     """Train what reads past and present on the first part, stop by the second; layers by name, number of epochs.
 
     network : (layers, past, now) -> outputs. weights : (1, P), changed in place. shapes : of the layers in them.
     rates : of learning, and of decay. generator : of the batches.
+    held : what else the network predicts with, by name, as it is now; that of the best epoch is kept beside the layers.
     """
     layers = {name: layer.requires_grad_() for name, layer in _layers_by_name(weights, shapes).items()}
     (seen, outputs), watched = (
@@ -388,10 +390,11 @@ def train_reader(
         loss=lambda rows: _mirrored_loss(reader, [(past[:, rows], now[rows]) for past, now in seen], outputs[rows]),
         watched=lambda: _mirrored_loss(reader, *watched),
     )
+    kept = held()
     with threadpool_limits(1):
         for _ in epochs:
-            pass
-    kept = {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
+            kept = kept if best.waited[0] else held()
+    kept |= {name: layer.double().numpy() for name, layer in _layers_by_name(best.kept, shapes).items()}
     return kept, int(best.epochs[0])
 
 

@@ -83,7 +83,7 @@ RACE = {"at_once": 4, "epochs": 64, "mirror": True, "groups": (0.5, 4.0)}
 
 @pytest.mark.parametrize(
     ("kind", "after", "more"),
-    [*CUT, ("path-trained", 12, {}), *(("path-trained", after, RACE) for after in (6, 13))],
+    [*CUT, ("path-trained", 12, {}), *(("path-trained", after, RACE) for after in (6, 13, 14))],
 )
 def test_a_search_that_was_interrupted_ends_with_the_same_digits(
     kind: str, after: int, more: dict[str, Any], here: World, tmp_path
