@@ -327,7 +327,7 @@ def run_identification(
         warnings += _implausible_estimates(vessel, pair[AFTER], solution.values)
         outputs = _compare_outputs(pair, dataset, fitted)
         warnings += tuple(_unused_output_warnings(outputs, settings))
-        groups = _errors_by_group(pair[AFTER], dataset, tested or fitted, settings)
+        groups = _errors_by_group(pair[AFTER], solution, dataset, tested or fitted, settings)
         warnings += uneven_side_warnings(groups)
         ranked = None
         if programme:
@@ -418,7 +418,12 @@ def _no_estimate_reason(solution: Solution) -> str:
     return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
 
 
-def _errors_by_group(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
+def _errors_by_group(
+    vessel: Vessel, solution: Solution, dataset: Dataset, runs: Sequence[str], settings: Identify
+) -> pd.DataFrame:
+    """Errors by side, helm and speed, in the current of all runs that was estimated with the vessel."""
+    if any(solution.common_current):
+        vessel, settings = with_current(vessel, settings, runs, solution.common_current)
     series = simulate_free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
     return by_group(series, AFTER, vessel, dataset)
 
@@ -633,7 +638,8 @@ def _next_manoeuvres(
     lacking = [one.title for one in choice if one.title not in possible]
     words = f"not among the manoeuvres to run next, for the identified ship cannot perform them: {'; '.join(lacking)}"
     prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
-    known = (judged.information + np.diag(prior))[:own, :own]
+    whole = judged.information + np.diag(prior)  # what the current takes away is not known of the others
+    known = whole[:own, :own] - whole[:own, own:] @ np.linalg.solve(whole[own:, own:], whole[own:, :own])
     table = design.rank_candidates(contributions, unknown.paths[:own], known)
     return table, words if lacking else ""
 
