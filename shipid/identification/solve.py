@@ -67,7 +67,9 @@ def identify(
         discounted, effective = _discount_residuals(solution)
         before = solution
         solution = replace(
-            _fit_dropping_factors(vessel, dataset, runs, discounted, solution, progress), effective=effective
+            _fit_dropping_factors(vessel, dataset, runs, discounted, before, progress),
+            effective=effective,
+            warnings=before.warnings,
         )
         solution = replace(solution, seconds=solution.seconds + before.seconds)
     problem = build_problem(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
@@ -130,6 +132,8 @@ def _fit_choosing_current(
         return _fit_dropping_factors(vessel, dataset, runs, settings, start, progress)
     without = settings.model_copy(update={"current": "none"})
     solution = _fit_dropping_factors(vessel, dataset, runs, without, start, progress)
+    if solution.status == "stopped":
+        return solution
     streams = estimate_currents(solution, dataset) if solution.status == "ok" else []
     best = min(streams[wanted:], key=lambda one: one.criterion, default=None)
     if best is None and wanted:
@@ -142,8 +146,9 @@ def _fit_choosing_current(
     if best.kind == "one":
         begin |= dict(zip(NUISANCES["current"], (best.currents[0] / chosen.widths["current"]).tolist(), strict=True))
     again = _fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress)
-    if again.status != "ok" and not wanted:
-        return solution
+    if again.status not in ("ok", "stopped") and not wanted:
+        failed = f"residuals look like those of a current, but the fit with it fails: {again.sentence}"
+        return replace(solution, warnings=(*solution.warnings, failed))
     said = () if wanted else (best.sentence("wind" in vessel.document),)
     return replace(
         again,
@@ -245,7 +250,10 @@ def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | 
     """Initial factors within the bounds, and where nuisances and initial states begin."""
     if not isinstance(start, Solution):
         return _initial_factors(problem, start or {}), initial_point(problem)
-    factors = _initial_factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+    begin = dict(zip(start.paths, start.factors.tolist(), strict=True))
+    for path in NUISANCES["current"].keys() - set(problem.unknown.paths):  # that fit may have chosen another kind
+        begin.pop(path, None)
+    factors = _initial_factors(problem, begin)
     return factors, start.point if _same_shapes(start.point, initial_point(problem)) else initial_point(problem)
 
 
