@@ -20,7 +20,7 @@ from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_
 from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
 from shipid.identification.statistics import LinearFit, residual_whiteness
-from shipid.identification.stream import LEAST_RUNS, estimate_currents
+from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents, start_by_run
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -126,7 +126,11 @@ def _fit_choosing_current(
     start: Mapping[str, float] | Solution | None,
     progress: Progress | None,
 ) -> Solution:
-    """The fit with the current of the settings, or with the one of least criterion after a fit without current."""
+    """The fit with the current of the settings, or with the one of least criterion after a fit without current.
+
+    Currents by run are judged once more, about a fit with one of all runs: far from no current the motion is not linear
+    in it, and currents by run seem to make up for that, or are lost in it.
+    """
     wanted = "current" in settings.widths
     if settings.current != "chosen" or (wanted and len(runs) < LEAST_RUNS):
         return _fit_dropping_factors(vessel, dataset, runs, settings, start, progress)
@@ -135,27 +139,36 @@ def _fit_choosing_current(
     if solution.status == "stopped":
         return solution
     streams = estimate_currents(solution, dataset) if solution.status == "ok" else []
-    best = min(streams[wanted:], key=lambda one: one.criterion, default=None)
-    if best is None and wanted:
-        asked = settings.model_copy(update={"current": "by run"})
-        return _fit_dropping_factors(vessel, dataset, runs, asked, start, progress)
-    if best is None or best.kind == "none":
+    kind = min(streams[wanted:], key=lambda one: one.criterion).kind if streams else "by run" if wanted else "none"
+    if kind == "none":
         return solution
-    chosen = settings.model_copy(update={"current": best.kind}).with_sizes(typical_errors(vessel, dataset, runs))
-    begin = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
-    if best.kind == "one":
-        begin |= dict(zip(NUISANCES["current"], (best.currents[0] / chosen.widths["current"]).tolist(), strict=True))
+    chosen = settings.model_copy(update={"current": "one"}).with_sizes(typical_errors(vessel, dataset, runs))
+    by_run = chosen.model_copy(update={"current": "by run"})
+    if not streams:
+        return _fit_dropping_factors(vessel, dataset, runs, by_run, start, progress)
+    current = streams[1].currents[0] / chosen.widths["current"]
+    unknowns = [*solution.factors.tolist(), *current.tolist()]
+    begin = dict(zip((*solution.paths, *NUISANCES["current"]), unknowns, strict=True))
     again = _fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress)
+    fits = [solution, again]
+    closer = estimate_currents(again, dataset) if again.status == "ok" else []
+    by_run_fits = kind == "by run" and again.status != "stopped"
+    if closer:
+        by_run_fits = closer[1].criterion < closer[0].criterion
+    if by_run_fits:
+        beside = start_by_run(again, closer[1].currents) if closer else solution
+        again = _fit_dropping_factors(vessel, dataset, runs, by_run, beside, progress)
+        fits.append(again)
     if again.status not in ("ok", "stopped") and not wanted:
         failed = f"residuals look like those of a current, but the fit with it fails: {again.sentence}"
         return replace(solution, warnings=(*solution.warnings, failed))
-    said = () if wanted else (best.sentence("wind" in vessel.document),)
+    said = () if wanted else (current_sentence(solution, again),)
     return replace(
         again,
         warnings=(*again.warnings, *said),
         objective_start=solution.objective_start,
-        iterations=solution.iterations + again.iterations,
-        seconds=solution.seconds + again.seconds,
+        iterations=sum(one.iterations for one in fits),
+        seconds=sum(one.seconds for one in fits),
     )
 
 

@@ -72,6 +72,24 @@ def test_one_current_of_all_runs_is_a_number_with_an_interval(more: dict) -> Non
     assert ("one current of all runs, 0.3" in " ".join(solution.warnings)) is (not more)
 
 
+@pytest.mark.parametrize(("seed", "runs"), [(0, 4), (1, 4), (2, 4), (3, 6)])
+def test_one_current_of_all_runs_is_not_taken_for_others_by_run(seed: int, runs: int) -> None:
+    """In 3 to 5 of 10 logs it was: the motion is not linear in half a metre per second."""
+    log = log_of(seed, np.tile([0.5, 0.4], (6, 1)))
+    solution = identify(SHIP, log, log.runs[:runs], Identify(parameters=FEW))
+    assert solution.settings.current == "one"
+    assert solution.common_current == pytest.approx((0.5, 0.4), abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_currents_that_scatter_about_a_strong_one_are_estimated_by_run(seed: int) -> None:
+    currents = np.array([2.0, 0.4]) + drawn(seed)
+    log = log_of(seed, currents)
+    solution = identify(SHIP, log, log.runs, Identify(parameters=FEW))
+    assert solution.settings.current == "by run"
+    np.testing.assert_allclose(estimated(solution), currents, atol=0.05)
+
+
 def test_wind_that_the_log_lacks_is_named_for_a_vessel_that_feels_it() -> None:
     seed = 1
     windy = trials(SHIP, steps=90, seed=seed, weather={"V_w": np.full(6, 12.0), "beta_w": np.full(6, 1.0)})
@@ -90,7 +108,7 @@ def test_logs_without_a_current_are_given_none() -> None:
     assert fitted(sound).settings.current == "none"
     late = changed(sound, **{name: np.roll(sound.frame[name].to_numpy(), 2) for name in sound.commands})
     solution = fitted(late, current="none")
-    assert all(one.explained < 0.2 for one in estimate_currents(solution, late))
+    assert all(np.abs(one.currents).max() < 0.1 for one in estimate_currents(solution, late))
 
 
 def test_a_current_that_is_set_is_not_looked_for() -> None:
