@@ -20,7 +20,7 @@ from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_
 from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
 from shipid.identification.statistics import LinearFit, residual_whiteness
-from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents, start_by_run
+from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -65,13 +65,9 @@ def identify(
         if solution.status != "ok":
             break
         discounted, effective = _discount_residuals(solution)
-        before = solution
-        solution = replace(
-            _fit_dropping_factors(vessel, dataset, runs, discounted, before, progress),
-            effective=effective,
-            warnings=before.warnings,
-        )
-        solution = replace(solution, seconds=solution.seconds + before.seconds)
+        again = _fit_dropping_factors(vessel, dataset, runs, discounted, solution, progress)
+        seconds = solution.seconds + again.seconds
+        solution = replace(again, effective=effective, warnings=solution.warnings, seconds=seconds)
     problem = build_problem(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
     return replace(solution, objective_start=evaluate_factors(problem, *_initial_unknowns(problem, start)).objective)
 
@@ -136,28 +132,22 @@ def _fit_choosing_current(
         return _fit_dropping_factors(vessel, dataset, runs, settings, start, progress)
     without = settings.model_copy(update={"current": "none"})
     solution = _fit_dropping_factors(vessel, dataset, runs, without, start, progress)
-    if solution.status == "stopped":
-        return solution
     streams = estimate_currents(solution, dataset) if solution.status == "ok" else []
-    kind = min(streams[wanted:], key=lambda one: one.criterion).kind if streams else "by run" if wanted else "none"
-    if kind == "none":
+    by_run = settings.model_copy(update={"current": "by run"})
+    if not streams:
+        asked = wanted and solution.status != "stopped"
+        return _fit_dropping_factors(vessel, dataset, runs, by_run, start, progress) if asked else solution
+    if min(streams[wanted:], key=lambda one: one.criterion).kind == "none":
         return solution
     chosen = settings.model_copy(update={"current": "one"}).with_sizes(typical_errors(vessel, dataset, runs))
-    by_run = chosen.model_copy(update={"current": "by run"})
-    if not streams:
-        return _fit_dropping_factors(vessel, dataset, runs, by_run, start, progress)
-    current = streams[1].currents[0] / chosen.widths["current"]
-    unknowns = [*solution.factors.tolist(), *current.tolist()]
-    begin = dict(zip((*solution.paths, *NUISANCES["current"]), unknowns, strict=True))
+    own = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
+    current = (streams[1].currents[0] / chosen.widths["current"]).tolist()
+    begin = own | dict(zip(NUISANCES["current"], current, strict=True))
     again = _fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress)
     fits = [solution, again]
-    closer = estimate_currents(again, dataset) if again.status == "ok" else []
-    by_run_fits = kind == "by run" and again.status != "stopped"
-    if closer:
-        by_run_fits = closer[1].criterion < closer[0].criterion
-    if by_run_fits:
-        beside = start_by_run(again, closer[1].currents) if closer else solution
-        again = _fit_dropping_factors(vessel, dataset, runs, by_run, beside, progress)
+    closer = (estimate_currents(again, dataset) if again.status == "ok" else []) or streams[1:]
+    if again.status != "stopped" and closer[1].criterion < closer[0].criterion:
+        again = _fit_dropping_factors(vessel, dataset, runs, by_run, own, progress)
         fits.append(again)
     if again.status not in ("ok", "stopped") and not wanted:
         failed = f"residuals look like those of a current, but the fit with it fails: {again.sentence}"
@@ -263,10 +253,9 @@ def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | 
     """Initial factors within the bounds, and where nuisances and initial states begin."""
     if not isinstance(start, Solution):
         return _initial_factors(problem, start or {}), initial_point(problem)
-    begin = dict(zip(start.paths, start.factors.tolist(), strict=True))
-    for path in NUISANCES["current"].keys() - set(problem.unknown.paths):  # that fit may have chosen another kind
-        begin.pop(path, None)
-    factors = _initial_factors(problem, begin)
+    begin = zip(start.paths, start.factors.tolist(), strict=True)
+    gone = NUISANCES["current"].keys() - set(problem.unknown.paths)  # the other fit may have chosen a current
+    factors = _initial_factors(problem, {path: factor for path, factor in begin if path not in gone})
     return factors, start.point if _same_shapes(start.point, initial_point(problem)) else initial_point(problem)
 
 

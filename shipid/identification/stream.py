@@ -49,15 +49,6 @@ def current_sentence(before: Solution, after: Solution) -> str:
     )
 
 
-def start_by_run(one: Solution, currents: Array) -> Solution:
-    """A fit with one current of all runs as the start of one by run, with given currents (R, 2) [m/s]."""
-    nuisances = one.point.nuisances.copy()
-    names = list(one.nuisances[one.runs[0]])
-    places = [names.index(name) for name in NUISANCES["current"]]
-    nuisances[:, places] = currents / one.settings.widths["current"]
-    return replace(one, point=replace(one.point, nuisances=nuisances))
-
-
 def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
     """No current, one of all runs and one by run, each after one step of Gauss-Newton with the factors.
 
