@@ -315,7 +315,7 @@ def run_identification(
             *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
-            *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER])),
+            *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER]), settings),
             *filter(None, (curvature_warning(solution, dataset, judged, determined, partial(_go_on, held)),)),
             *_better_fit_warnings(solution, curves),
             *(
@@ -720,10 +720,12 @@ def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[
     return warnings
 
 
-def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float) -> list[str]:
+def _fit_warnings(
+    solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float, settings: Identify
+) -> list[str]:
     """Warnings about the fit: coloured residuals, horizon, untrusted errors, bounds, no test, worse free runs.
 
-    rate : at which a small yaw of the identified ship grows [1/s].
+    rate : at which a small yaw of the identified ship grows [1/s]. settings : as given, with what priors they name.
     """
     warnings, between = [], residual_spacing(solution)
     coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
@@ -764,15 +766,19 @@ def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, Fre
             "so few runs may hide a slow drift of sensors, wind or current, which makes errors larger than their "
             f"intervals say, by these factors: {join_names(said)}; fit more runs"
         )
-    contrary = against_priors(judged.fit)
+    named = isinstance(settings.nuisance, Mapping) and "current" in settings.nuisance
+    contrary = {path: of for path, of in against_priors(judged.fit).items() if named or path in solution.values}
     if contrary:
         of_path = dict(zip(solution.paths, short_names(solution.paths), strict=True))
         said = [
-            f"{of_path[path]} would be {significant_digits(factor)} +- {significant_digits(half, 2)} (prior {width:g})"
+            f"{'the factor of ' if path in solution.values else ''}{of_path[path]} would be "
+            f"{significant_digits(factor * size)} +- {significant_digits(half * size, 2)}"
+            f"{'' if path in solution.values else ' m/s'} (prior {width * size:g})"
             for path, (width, factor, half) in contrary.items()
+            for size in [1.0 if path in solution.values else solution.settings.widths["current"]]
         ]
         warnings.append(
-            f"the runs contradict the priors: by the runs alone the factor of {join_names(said)}; base, log or "
+            f"the runs contradict the priors: by the runs alone {join_names(said)}; base, log or "
             "priors are wrong, and the intervals take the priors for true"
         )
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]

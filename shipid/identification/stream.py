@@ -41,10 +41,10 @@ def current_sentence(before: Solution, after: Solution) -> str:
     currents = [[of_run[name] for name in NUISANCES["current"]] for of_run in after.nuisances.values()]
     size = np.sqrt(np.square(currents).sum(axis=1).mean())
     explained = 1 - np.square(after.residuals).sum() / max(np.square(before.residuals).sum(), 1e-300)
-    wind = ", or of wind that the log lacks" if "wind" in before.vessel.document else ""
     return (
         f"residuals look like those of {which}, {significant_digits(float(size), 2)} m/s, which takes "
-        f"{percent_text(float(explained))} of their squares away{wind}: "
+        f"{percent_text(float(explained))} of their squares away"
+        f"{', or of wind that the log lacks' if 'wind' in before.vessel.document else ''}: "
         "it is estimated beside the numbers; compare with --set current=none"
     )
 

@@ -188,3 +188,12 @@ def test_what_a_current_takes_away_is_not_known_of_the_numbers(monkeypatch: pyte
     _next_manoeuvres(SHIP.with_values(solution.values), log, log.runs, solution, judged)
     whole = judged.information + np.diag(solution.prior_widths**-2.0)
     np.testing.assert_allclose(np.linalg.inv(known[0]), np.linalg.inv(whole)[:3, :3], rtol=1e-6)
+
+
+@pytest.mark.parametrize("more", [{}, {"nuisance": {"current": 0.05}}])
+def test_only_a_prior_of_a_current_that_is_named_is_contradicted(monkeypatch: pytest.MonkeyPatch, more: dict) -> None:
+    monkeypatch.setattr("shipid.identification.outcome.TRIED", [("turning", [35.0])])
+    log = log_of(1, np.tile([1.8, 0.0], (6, 1)))
+    said = " ".join(run_identification(SHIP, log, Identify(**HOW, current="one", **more), log.runs).warnings)
+    assert ("current_north would be 1.8 +- 0.0" in said) is bool(more)
+    assert ("m/s (prior 0.05)" in said) is bool(more)
