@@ -36,7 +36,6 @@ FALL = 1e-3  # relative fall of the objective that is worth a search across a ki
 INNER, HALVINGS, CLOSE = 12, 6, 1e-10  # Gauss-Newton steps of one run, halvings of one, and the change that ends them
 BEGIN = {"current_north": 0.01, "current_east": 0.01, "latency": 0.3}  # in prior widths: off a vanishing slope
 FAR, DIRECTIONS = 0.5, 4  # prior widths, and on the circle: currents that a run is also begun from
-VALLEYS = 3  # searches that go on where the run's current leads to another valley
 NEAR = 1e-3  # of a factor: nearer to a bound than this, with the objective falling towards it, it is set to the bound
 
 
@@ -109,19 +108,7 @@ def search_factors(
         if not np.isfinite(run.start.objective):
             return Result(run.start.factors, run.start.at, float("inf"), before, "diverged")
         word = run.to_the_end(tolerance, most)
-        best = run.best
-        for _ in range(VALLEYS):
-            deeper = best_valley(problem, best.factors, best.point) if word == "ok" else None
-            if deeper is None:
-                break
-            there = evaluate_factors(problem, best.factors, deeper)
-            if there.objective >= best.objective * (1 - FALL):
-                break
-            watch.iterations += 1
-            again = _SearchState(problem, there, free, watch)
-            word = again.to_the_end(tolerance, most)
-            best = again.best
-    return Result(best.factors, best.at, best.objective, watch.iterations, word)
+    return Result(run.best.factors, run.best.at, run.best.objective, watch.iterations, word)
 
 
 def best_valley(problem: Problem, factors: Array, point: Point) -> Point | None:

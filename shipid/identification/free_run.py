@@ -87,7 +87,7 @@ def simulate_free_runs(
         raise DataError(f"{many}: give a longer step, or fewer runs", path="step")
     overridden = run_overrides(settings, runs)
     first = next(iter(vessels.values()))
-    asked = {"horizon": length, "nuisance": [], "runs": overridden}
+    asked = {"horizon": length, "nuisance": [], "current": "none", "runs": overridden}
     problem = build_problem(first, dataset, runs, settings.model_copy(update=_held_settings(first, overridden) | asked))
     given = np.array(list(first.parameters.values()))
     predicted: dict[tuple[int, int], Array] = {}

@@ -315,7 +315,7 @@ def run_identification(
             *warn_of_unmeasured_inputs(vessel, dataset, fitted, solution.settings),
             *unrecorded_time_warning(dataset, fitted, settings),
             *_not_varied(dataset, fitted, solution.paths),
-            *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER])),
+            *_fit_warnings(solution, judged, pairs, yaw_growth_rate(dataset, fitted, pair[AFTER]), settings),
             *filter(None, (curvature_warning(solution, dataset, judged, determined, partial(_go_on, held)),)),
             *_better_fit_warnings(solution, curves),
             *(
@@ -327,7 +327,7 @@ def run_identification(
         warnings += _implausible_estimates(vessel, pair[AFTER], solution.values)
         outputs = _compare_outputs(pair, dataset, fitted)
         warnings += tuple(_unused_output_warnings(outputs, settings))
-        groups = _errors_by_group(pair[AFTER], dataset, tested or fitted, settings)
+        groups = _errors_by_group(pair[AFTER], solution, dataset, tested or fitted, settings)
         warnings += uneven_side_warnings(groups)
         ranked = None
         if programme:
@@ -418,7 +418,12 @@ def _no_estimate_reason(solution: Solution) -> str:
     return f"every parameter is at a bound, fixed or dropped: {remedy}, or widen bounds"
 
 
-def _errors_by_group(vessel: Vessel, dataset: Dataset, runs: Sequence[str], settings: Identify) -> pd.DataFrame:
+def _errors_by_group(
+    vessel: Vessel, solution: Solution, dataset: Dataset, runs: Sequence[str], settings: Identify
+) -> pd.DataFrame:
+    """Errors by side, helm and speed, in the current of all runs that was estimated with the vessel."""
+    if any(solution.common_current):
+        vessel, settings = with_current(vessel, settings, runs, solution.common_current)
     series = simulate_free_runs({AFTER: vessel}, dataset, runs, settings, settings.horizon).series
     return by_group(series, AFTER, vessel, dataset)
 
@@ -633,7 +638,8 @@ def _next_manoeuvres(
     lacking = [one.title for one in choice if one.title not in possible]
     words = f"not among the manoeuvres to run next, for the identified ship cannot perform them: {'; '.join(lacking)}"
     prior = np.where(np.isfinite(solution.prior_widths), 1 / solution.prior_widths**2, 0.0)
-    known = (judged.information + np.diag(prior))[:own, :own]
+    whole = judged.information + np.diag(prior)  # what the current takes away is not known of the others
+    known = whole[:own, :own] - whole[:own, own:] @ np.linalg.solve(whole[own:, own:], whole[own:, :own])
     table = design.rank_candidates(contributions, unknown.paths[:own], known)
     return table, words if lacking else ""
 
@@ -714,10 +720,12 @@ def _better_fit_warnings(solution: Solution, curves: Sequence[Profile]) -> list[
     return warnings
 
 
-def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float) -> list[str]:
+def _fit_warnings(
+    solution: Solution, judged: Statistics, free: Mapping[str, FreeRuns], rate: float, settings: Identify
+) -> list[str]:
     """Warnings about the fit: coloured residuals, horizon, untrusted errors, bounds, no test, worse free runs.
 
-    rate : at which a small yaw of the identified ship grows [1/s].
+    rate : at which a small yaw of the identified ship grows [1/s]. settings : as given, with what priors they name.
     """
     warnings, between = [], residual_spacing(solution)
     coloured = {name: colour.memory * between for name, colour in judged.whiteness.items() if not colour.white}
@@ -758,15 +766,19 @@ def _fit_warnings(solution: Solution, judged: Statistics, free: Mapping[str, Fre
             "so few runs may hide a slow drift of sensors, wind or current, which makes errors larger than their "
             f"intervals say, by these factors: {join_names(said)}; fit more runs"
         )
-    contrary = against_priors(judged.fit)
+    named = isinstance(settings.nuisance, Mapping) and "current" in settings.nuisance
+    contrary = {path: of for path, of in against_priors(judged.fit).items() if named or path in solution.values}
     if contrary:
         of_path = dict(zip(solution.paths, short_names(solution.paths), strict=True))
         said = [
-            f"{of_path[path]} would be {significant_digits(factor)} +- {significant_digits(half, 2)} (prior {width:g})"
+            f"{'the factor of ' if path in solution.values else ''}{of_path[path]} would be "
+            f"{significant_digits(factor * size)} +- {significant_digits(half * size, 2)}"
+            f"{'' if path in solution.values else ' m/s'} (prior {width * size:g})"
             for path, (width, factor, half) in contrary.items()
+            for size in [1.0 if path in solution.values else solution.settings.widths["current"]]
         ]
         warnings.append(
-            f"the runs contradict the priors: by the runs alone the factor of {join_names(said)}; base, log or "
+            f"the runs contradict the priors: by the runs alone {join_names(said)}; base, log or "
             "priors are wrong, and the intervals take the priors for true"
         )
     bound = [path for path, there in zip(solution.paths, solution.at_bound, strict=True) if there]

@@ -148,6 +148,14 @@ class Identify(CheckedModel, BaseModel):
             name: given[name] for name in NUISANCES if name in given and (name, self.current) != ("current", "none")
         }
 
+    def with_current_named(self) -> Identify:
+        """Settings that choose no current: by run where a nuisance asks for it, else none.
+
+        For fits whose vessel is used on other runs without the current that was estimated beside its numbers.
+        """
+        kind = "by run" if "current" in self.nuisance else "none"
+        return self.model_copy(update={"current": kind}) if self.current == "chosen" else self
+
     def with_sizes(self, sizes: Mapping[str, float]) -> Identify:
         """Settings with numbers for the weights and widths that they do not name; sizes : of `typical_errors`."""
         named = self.nuisance if isinstance(self.nuisance, Mapping) else {}

@@ -20,7 +20,7 @@ from shipid.identification.settings import BLOCK, NUISANCES, Identify, weighted_
 from shipid.identification.solution import Solution
 from shipid.identification.start import by_inverse_dynamics, grow_horizon
 from shipid.identification.statistics import LinearFit, residual_whiteness
-from shipid.identification.stream import LEAST_RUNS, estimate_currents
+from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -65,11 +65,9 @@ def identify(
         if solution.status != "ok":
             break
         discounted, effective = _discount_residuals(solution)
-        before = solution
-        solution = replace(
-            _fit_dropping_factors(vessel, dataset, runs, discounted, solution, progress), effective=effective
-        )
-        solution = replace(solution, seconds=solution.seconds + before.seconds)
+        again = _fit_dropping_factors(vessel, dataset, runs, discounted, solution, progress)
+        seconds = solution.seconds + again.seconds
+        solution = replace(again, effective=effective, warnings=solution.warnings, seconds=seconds)
     problem = build_problem(vessel, dataset, runs, solution.settings)  # both objectives with the same deviations
     return replace(solution, objective_start=evaluate_factors(problem, *_initial_unknowns(problem, start)).objective)
 
@@ -124,33 +122,43 @@ def _fit_choosing_current(
     start: Mapping[str, float] | Solution | None,
     progress: Progress | None,
 ) -> Solution:
-    """The fit with the current of the settings, or with the one of least criterion after a fit without current."""
+    """The fit with the current of the settings, or with the one of least criterion after a fit without current.
+
+    Currents by run are judged once more, about a fit with one of all runs: far from no current the motion is not linear
+    in it, and currents by run seem to make up for that, or are lost in it.
+    """
     wanted = "current" in settings.widths
     if settings.current != "chosen" or (wanted and len(runs) < LEAST_RUNS):
         return _fit_dropping_factors(vessel, dataset, runs, settings, start, progress)
     without = settings.model_copy(update={"current": "none"})
     solution = _fit_dropping_factors(vessel, dataset, runs, without, start, progress)
     streams = estimate_currents(solution, dataset) if solution.status == "ok" else []
-    best = min(streams[wanted:], key=lambda one: one.criterion, default=None)
-    if best is None and wanted:
-        asked = settings.model_copy(update={"current": "by run"})
-        return _fit_dropping_factors(vessel, dataset, runs, asked, start, progress)
-    if best is None or best.kind == "none":
+    by_run = settings.model_copy(update={"current": "by run"})
+    if not streams:
+        asked = wanted and solution.status != "stopped"
+        return _fit_dropping_factors(vessel, dataset, runs, by_run, start, progress) if asked else solution
+    if min(streams[wanted:], key=lambda one: one.criterion).kind == "none":
         return solution
-    chosen = settings.model_copy(update={"current": best.kind}).with_sizes(typical_errors(vessel, dataset, runs))
-    begin = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
-    if best.kind == "one":
-        begin |= dict(zip(NUISANCES["current"], (best.currents[0] / chosen.widths["current"]).tolist(), strict=True))
+    chosen = settings.model_copy(update={"current": "one"}).with_sizes(typical_errors(vessel, dataset, runs))
+    own = dict(zip(solution.paths, solution.factors.tolist(), strict=True))
+    current = (streams[1].currents[0] / chosen.widths["current"]).tolist()
+    begin = own | dict(zip(NUISANCES["current"], current, strict=True))
     again = _fit_dropping_factors(vessel, dataset, runs, chosen, begin, progress)
-    if again.status != "ok" and not wanted:
-        return solution
-    said = () if wanted else (best.sentence("wind" in vessel.document),)
+    fits = [solution, again]
+    closer = (estimate_currents(again, dataset) if again.status == "ok" else []) or streams[1:]
+    if again.status != "stopped" and closer[1].criterion < closer[0].criterion:
+        again = _fit_dropping_factors(vessel, dataset, runs, by_run, own, progress)
+        fits.append(again)
+    if again.status not in ("ok", "stopped") and not wanted:
+        failed = f"residuals look like those of a current, but the fit with it fails: {again.sentence}"
+        return replace(solution, warnings=(*solution.warnings, failed))
+    said = () if wanted else (current_sentence(solution, again),)
     return replace(
         again,
         warnings=(*again.warnings, *said),
         objective_start=solution.objective_start,
-        iterations=solution.iterations + again.iterations,
-        seconds=solution.seconds + again.seconds,
+        iterations=sum(one.iterations for one in fits),
+        seconds=sum(one.seconds for one in fits),
     )
 
 
@@ -245,7 +253,9 @@ def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | 
     """Initial factors within the bounds, and where nuisances and initial states begin."""
     if not isinstance(start, Solution):
         return _initial_factors(problem, start or {}), initial_point(problem)
-    factors = _initial_factors(problem, dict(zip(start.paths, start.factors.tolist(), strict=True)))
+    begin = zip(start.paths, start.factors.tolist(), strict=True)
+    gone = NUISANCES["current"].keys() - set(problem.unknown.paths)  # the other fit may have chosen a current
+    factors = _initial_factors(problem, {path: factor for path, factor in begin if path not in gone})
     return factors, start.point if _same_shapes(start.point, initial_point(problem)) else initial_point(problem)
 
 

@@ -164,7 +164,7 @@ class Statistics:
 
     chosen : form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 % intervals.
     alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST` and neither the
-    interval without the priors nor the one with them holds 0, no effect.
+    interval without the priors nor the one with them holds 0, no effect; 0 may be the truth where the base has it.
     sentences : the result in words, one for each factor. correlations : (n, n). free : paths of the factors that are
     neither held nor at a bound. combinations : sets of these that the data do not distinguish.
     """
@@ -195,8 +195,8 @@ def fit_statistics(fit: LinearFit) -> Statistics:
     """Covariances, 95 % intervals and identifiability of a fit, linear at the estimate.
 
     A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values, and excludes no
-    effect (0) with and without the priors; collinearity explains a wider one. The profile likelihood
-    (`shipid.identification.profile`) shows whether that is finite.
+    effect (0) with and without the priors, unless the base has none; collinearity explains a wider one. The profile
+    likelihood (`shipid.identification.profile`) shows whether that is finite.
     """
     free = _free_places(fit)
     if not len(free):
@@ -219,7 +219,9 @@ def fit_statistics(fit: LinearFit) -> Statistics:
         for name, values in {"errors": errors, "half": half, "alone": alone}.items()
     }
     identifiable = np.zeros(n, dtype=bool)
-    identifiable[free] = (alone <= WIDEST) & (np.abs(by_data) > alone) & (np.abs(inner.factors) > half)
+    begun_at_0 = np.zeros(n, dtype=bool) if fit.centre is None else np.asarray(fit.centre) == 0
+    effect = (np.abs(by_data) > alone) & (np.abs(inner.factors) > half)
+    identifiable[free] = (alone <= WIDEST) & (effect | begun_at_0[free])
     correlations = np.eye(n)
     scale = np.where(best.errors > 0, best.errors, 1.0)
     correlations[np.ix_(free, free)] = best.matrix / np.outer(scale, scale)

@@ -12,7 +12,7 @@ from shipid.data.dataset import Dataset
 from shipid.identification.covariance import invert_information
 from shipid.identification.free_run import with_current
 from shipid.identification.residuals import CURRENT, build_problem, predict_residuals, typical_errors
-from shipid.identification.settings import ENVIRONMENT, run_overrides
+from shipid.identification.settings import ENVIRONMENT, NUISANCES, run_overrides
 from shipid.identification.solution import Solution
 from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.units import percent_text, significant_digits
@@ -26,42 +26,44 @@ LEAST_RUNS = 2  # of one run a current is as well a wrong vessel
 class Stream:
     """Currents of one kind that fit best beside the factors, linearised.
 
-    currents : (R, 2) [m/s] north and east. explained : share of the squares of the residuals that they take away.
+    currents : (R, 2) [m/s] north and east.
     criterion : Schwarz's, sum over signals of n ln(squares left) + k ln(n), n being the independent residuals.
     """
 
     kind: CurrentKind
     currents: Array
-    explained: float
     criterion: float
 
-    @property
-    def size(self) -> float:
-        """Root mean square over the runs [m/s]."""
-        return float(np.sqrt(np.mean(np.sum(self.currents**2, axis=1))))
 
-    def sentence(self, wind: bool) -> str:
-        """What was chosen, and how to choose otherwise; wind : whether the vessel feels wind, which looks alike."""
-        which = {"one": "one current of all runs", "by run": "another current in each run"}[self.kind]
-        return (
-            f"residuals look like those of {which}, {significant_digits(self.size, 2)} m/s, which takes "
-            f"{percent_text(self.explained)} of their squares away{', or of wind that the log lacks' if wind else ''}: "
-            "it is estimated beside the numbers; compare with --set current=none"
-        )
+def current_sentence(before: Solution, after: Solution) -> str:
+    """What residuals without a current show, and how the fit after, with currents, may be chosen otherwise."""
+    which = {"one": "one current of all runs", "by run": "another current in each run"}[after.settings.current]
+    currents = [[of_run[name] for name in NUISANCES["current"]] for of_run in after.nuisances.values()]
+    size = np.sqrt(np.square(currents).sum(axis=1).mean())
+    explained = 1 - np.square(after.residuals).sum() / max(np.square(before.residuals).sum(), 1e-300)
+    return (
+        f"residuals look like those of {which}, {significant_digits(float(size), 2)} m/s, which takes "
+        f"{percent_text(float(explained))} of their squares away"
+        f"{', or of wind that the log lacks' if 'wind' in before.vessel.document else ''}: "
+        "it is estimated beside the numbers; compare with --set current=none"
+    )
 
 
 def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
     """No current, one of all runs and one by run, each after one step of Gauss-Newton with the factors.
 
-    solution : of `identify`, without currents. Empty where currents are known or cannot be computed. Residuals count as
-    those of a first-order process with the correlation that they have left with currents by run.
+    solution : of `identify`, without currents; or with one of all runs, about which that one and those by run are
+    linearised. Empty where currents are known or cannot be computed. Residuals count as those of a first-order process
+    with the correlation that they have left with currents by run.
 
     Source: Schwarz, Annals of Statistics 6 (1978) 461.
     """
-    fixed = bool((solution.held | solution.at_bound).all())
-    if len(solution.runs) < LEAST_RUNS or "current" in solution.settings.widths or _is_set(solution) or fixed:
+    one = solution.settings.current == "one"
+    known = ("current" in solution.settings.widths and not one) or _is_set(solution)
+    if len(solution.runs) < LEAST_RUNS or known or (solution.held | solution.at_bound).all():
         return []
-    slopes = _current_slopes(solution, dataset)
+    width = solution.settings.widths.get("current", 1.0)
+    slopes = solution.jacobian[:, -2:] / width if one else _current_slopes(solution, dataset)
     if slopes is None:
         return []
     of_run = solution.clusters[:, None] == np.arange(len(solution.runs))  # (m, R)
@@ -70,17 +72,16 @@ def estimate_currents(solution: Solution, dataset: Dataset) -> list[Stream]:
         "one": slopes,
         "by run": (of_run[:, :, None] * slopes[:, None, :]).reshape(len(slopes), -1),
     }
-    steps = {kind: _gauss_newton_step(solution, added) for kind, added in unknowns.items()}
+    steps = {kind: _gauss_newton_step(solution, added) for kind, added in unknowns.items() if not one or kind != "none"}
     colours = residual_whiteness(replace(LinearFit.of(solution), residuals=steps["by run"][1]))
-    signals, before = np.array(solution.signals), float(np.square(solution.residuals).sum())
-    worth = sum(colour.effective for colour in colours.values())
+    signals, worth = np.array(solution.signals), sum(colour.effective for colour in colours.values())
     result = []
     for kind, (step, left) in steps.items():
         squares = {name: float(np.square(left[signals == name]).sum()) for name in colours}
         misfit = sum(colour.effective * np.log(max(squares[name], 1e-300)) for name, colour in colours.items())
-        currents = np.resize(step, (len(solution.runs), 2)) if len(step) else np.zeros((len(solution.runs), 2))
-        explained = 1 - sum(squares.values()) / before if before else 0.0
-        result.append(Stream(kind, currents, explained, float(misfit + len(step) * np.log(worth))))
+        more = np.resize(step, (len(solution.runs), 2)) if len(step) else np.zeros((len(solution.runs), 2))
+        criterion = float(misfit + len(step) * np.log(worth))
+        result.append(Stream(kind, solution.common_current + more, criterion))
     return result
 
 
@@ -114,7 +115,7 @@ def _current_slopes(solution: Solution, dataset: Dataset) -> Array | None:
 
 def _gauss_newton_step(solution: Solution, added: Array) -> tuple[Array, Array]:
     """One step of Gauss-Newton in further unknowns (m, k) beside the factors: (k,), and the residuals (m,) left."""
-    free = ~(solution.held | solution.at_bound)
+    free = ~(solution.held | solution.at_bound) & [path not in NUISANCES["current"] for path in solution.paths]
     J = np.hstack([solution.jacobian[:, free], added])
     prior = np.append(solution.prior_widths[free], np.full(added.shape[1], np.inf))
     inverse = invert_information(J.T @ J + np.diag(prior**-2.0))[0]

@@ -156,7 +156,9 @@ def _identify(study: Study, family: Family, index: int, vessel: Vessel) -> Ident
     """What a family identifies; horizon, step and method are those of the study's prediction unless it says else."""
     ahead, prefix = study.prediction, f"family.{index}.identify"
     default = {"horizon": ahead.ahead, "step": ahead.step, "method": ahead.integrator}
-    settings: Identify = documents.parse_model(Identify, default | (family.identify or {}), None, prefix)
+    settings: Identify = documents.parse_model(
+        Identify, default | (family.identify or {}), None, prefix
+    ).with_current_named()
     try:
         free_factors(vessel, settings)
     except DocumentError as error:

@@ -192,7 +192,7 @@ def compare_structures(
     )
     length = proposed_horizon(vessel, survey_dataset(dataset))[0] if ahead is None else ahead
     check_length(settings, length)
-    report = say or (lambda _: None)
+    settings, report = settings.with_current_named(), say or (lambda _: None)
     parts = [part for number in range(folds) if (part := fitted[number::folds])]
     errors, fits, notes, series = list[pd.DataFrame](), dict[str, FittedStructure](), dict[str, str](), dict[str, Any]()
     for name in names:

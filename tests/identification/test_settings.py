@@ -109,3 +109,16 @@ def test_a_pattern_selects_no_constant_and_no_dimension() -> None:
 def test_the_time_constant_of_an_actuator_is_no_draught() -> None:
     paths = free_factors(load_vessel("otter"), Identify(parameters=["thruster.*.actuator.*"])).paths
     assert {"thruster.port.actuator.n.T", "thruster.starboard.actuator.n.T"} <= set(paths)
+
+
+@pytest.mark.parametrize(
+    ("given", "current"),
+    [
+        ({}, "none"),
+        ({"nuisance": ["current"]}, "by run"),
+        ({"nuisance": {"current": 0.3}}, "by run"),
+        ({"current": "one"}, "one"),
+    ],
+)
+def test_a_current_that_is_named_is_not_replaced_by_none(given: dict, current: str) -> None:
+    assert Identify(parameters=[YAW], **given).with_current_named().current == current

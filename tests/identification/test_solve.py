@@ -161,6 +161,7 @@ def test_each_run_finds_its_current_whatever_the_valleys() -> None:
         start="base",
         weights={"u": 0.05, "v": 0.05, "r": 0.00173},
         nuisance={"current": 2.5, "initial_state": 3.0},
+        current="by run",
     )
     dataset = astern(vessel, 7000)
     solution = identify(vessel, dataset, dataset.runs, wanted)

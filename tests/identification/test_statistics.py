@@ -414,3 +414,11 @@ def test_what_may_have_no_effect_is_not_identified() -> None:
     assert after.low[0] < 0 < after.high[0]
     assert "its interval holds 0, no effect" in after.sentences[0]
     assert (after.identifiable[1:] == before.identifiable[1:]).all()
+
+
+def test_what_is_nothing_at_the_base_may_be_identified_as_nothing() -> None:
+    """A current of 0 known to +-1 mm/s, and a number whose base is 0, were not identified."""
+    fit = one()
+    first = np.arange(len(fit.factors)) == 0
+    small = replace(fit, factors=np.where(first, 1e-3, fit.factors), centre=np.where(first, 0.0, 1.0))
+    assert fit_statistics(small).identifiable[0]

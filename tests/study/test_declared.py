@@ -41,6 +41,7 @@ def test_what_is_identified_is_integrated_as_it_predicts(tmp_path: Path, integra
     settings = next(one.identify for one in plan.foundations if one.name == "fit")
     assert settings is not None
     assert (settings.method, settings.step, settings.horizon) == (integrator, 0.5, plan.study.prediction.ahead)
+    assert settings.current == "none"  # the cell predicts without one
 
 
 @pytest.mark.parametrize(

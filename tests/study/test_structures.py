@@ -153,6 +153,7 @@ def test_a_run_held_out_decides_nothing_in_the_fit_that_predicts_it(monkeypatch:
 
     def fitted(*args: Any, **kwargs: Any) -> Solution:
         solution = identify(*args, **kwargs, progress=lambda number, _: number >= 2)
+        assert solution.settings.current == "none"  # its errors are those of free runs without one
         fits.append((tuple(solution.runs), np.array(list(solution.values.values())).tobytes()))
         return replace(solution, status="ok")
 
