@@ -26,6 +26,7 @@ from shipid.files import make_folder, write_set
 from shipid.simulation.approach import Controls
 from shipid.simulation.perform import rollout_inputs
 from shipid.simulation.standard import define_standard
+from shipid.units import plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, FamilyDocument, Variant, change_structure, draw_members, resolve_families
@@ -41,15 +42,17 @@ class VesselFamily:
     """A family on its vessel.
 
     rules : the family, with `extends` written out. base : the vessel that the members change, with their `structure`.
+    file : the document that errors name.
     """
 
     rules: Family
     base: Vessel
+    file: Path | None = None
 
     @cached_property
     def members(self) -> tuple[Variant, ...]:
         """All members, as the seed of the rules draws them."""
-        return tuple(draw_members(self.rules, self.base))
+        return tuple(draw_members(self.rules, self.base, self.file))
 
     def draw(self, seed: int) -> VesselFamily:
         """The family with the members that another seed draws."""
@@ -207,7 +210,7 @@ def read_families(document: str | Path) -> dict[str, VesselFamily]:
     file, content = read_family_document(document)
     families = resolve_families([Family.model_validate(block) for block in content["family"]], file)
     bases = [change_structure(one, load_vessel(str(one.base), file.parent)) for one in families]
-    return {one.name: VesselFamily(one, base) for one, base in zip(families, bases, strict=True)}
+    return {one.name: VesselFamily(one, base, file) for one, base in zip(families, bases, strict=True)}
 
 
 def read_family(document: str | Path, name: str | None = None) -> VesselFamily:
@@ -241,5 +244,6 @@ def verify_lock(file: str | Path) -> str:
     now = family.lock() | {name: documents.parse_toml(text) for name, text in patches.items()}
     if changes := compare_contents(then, now):
         first = "; ".join(f"{path} {old} in the file, {new} now" for path, (old, new) in [*changes.items()][:3])
-        raise ShipidError(f"{len(changes)} entries are not as they were locked: {first}", path=str(file))
+        words = f"{len(changes)} {plural_word(len(changes), 'entry is', 'entries are')} not as locked: {first}"
+        raise ShipidError(f"{words}; put it back, or export the family anew", file=file)
     return str(stored["digest"])

@@ -37,7 +37,7 @@ def test_the_way_of_a_family(tmp_path: Path) -> None:
     assert "as locked: digest" in output_of("family", "verify", lock)
     lock.write_text(lock.read_text().replace("seed = 2", "seed = 3"))
     code, _, error = ended("family", "verify", lock)
-    assert (code, error.count("\n"), "not as they were locked" in error) == (1, 1, True)
+    assert (code, error.count("\n"), "not as locked" in error) == (1, 1, True)
     differences = json.loads(output_of("family", "diff", file, lock, "--family", "high", "--json"))
     assert differences["rules"] == [{"what": "rules.seed", "one": 2, "other": 3}]
     assert {row["members that differ"] for row in differences["numbers"]} == {4}

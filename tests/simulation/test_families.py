@@ -170,7 +170,7 @@ def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: P
     ):
         lock.write_text(re.sub(old, new, text, count=1))
         assert lock.read_text() != text
-        with pytest.raises(ShipidError, match=f"as they were locked: .*{path}") as caught:
+        with pytest.raises(ShipidError, match=f"not as locked: .*{path}") as caught:
             shipid.verify_lock(lock)
         assert "\n" not in str(caught.value)
     with pytest.raises(DocumentError, match=r"holds no \[lock\]"):
@@ -205,7 +205,7 @@ def test_a_patch_beside_a_lock_is_verified_with_it(document: Path, tmp_path: Pat
         ('base_digest = "', 'base_digest = "0', "base_digest"),
     ):
         patch.write_text(text.replace(old, new))
-        with pytest.raises(ShipidError, match=rf"1 entries are not as they were locked: high-3\.toml\.{path}"):
+        with pytest.raises(ShipidError, match=rf"1 entry is not as locked: high-3\.toml\.{path}"):
             shipid.verify_lock(lock)
     patch.unlink()
     assert len(shipid.verify_lock(lock)) == 16
@@ -250,3 +250,13 @@ def test_a_study_takes_families_by_path_and_by_name(document: Path, tmp_path: Pa
     assert one.digest == two.digest
     values = [f.variant.values for f in one.foundations if f.variant]
     assert values == [m.values for name in ("low", "high") for m in shipid.read_family(document, name).members]
+
+
+def test_a_fault_of_a_rule_is_named_with_its_document(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(
+        'vessel = "mariner"\n[[family]]\nname = "own"\n[[family.perturb]]\nparameters = ["x.y"]\nfactor = [0.5, 1.5]\n'
+    )
+    own = shipid.read_family(file)
+    with pytest.raises(DocumentError, match=r"own\.toml: family\.own\.perturb\.\d\.parameters: 'x\.y' selects nothing"):
+        own.table()
