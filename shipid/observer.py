@@ -637,13 +637,13 @@ def tune_observer(
     dataset : the training runs, as the observer sees them.
     windows : of these runs: instants of prediction and true paths.
     paths : (settings, columns of the windows with the estimates `observer.*`) -> predicted paths (T, S, 2) [m], as of
-        `shipid.hybrid.physics.Physics.paths`; not finite where a window diverges.
+        `shipid.hybrid.physics.Physics.paths`.
     settings : the levels, and what is not searched.
 
     Returns
     -------
-    The settings, with `choose` false, and the mean error [m] of each that was tried, by what was changed. A window that
-    diverges counts as 1e9 m, so that settings with fewer of them are better.
+    The settings, with `choose` false, and the mean error [m] of each that was tried, by what was changed. A window
+    whose path is no number counts as 1e9 m.
     """
     first = (settings or Observer()).model_copy(update={"choose": False})
     tried: dict[str, float] = {}

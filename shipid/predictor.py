@@ -461,14 +461,13 @@ def fit(
     seed, refits = check_whole_number("seed", seed, 0, DataError), check_whole_number("refits", refits, 0, DataError)
     _check_fit(method, kind, physics, windows)
     name = "physics" if physics.vessel is not None else "none"
-    paths = physics.paths(windows.instants(known=commands == "known"))
-    diverged = ~np.isfinite(paths).all(axis=(0, 2))
+    paths, diverged = physics.variant_paths(windows.instants(known=commands == "known"))
     if diverged.any():
         raise DataError(
             f"the physics diverges on {percent_text(diverged.mean(), 1)} of the windows: take a smaller step, or rk4"
         )
     task = Task(
-        cases={name: Case(physics, paths)},
+        cases={name: Case(physics, paths[:, 0])},
         windows=windows,
         folds=_split_folds(method, windows, validation_runs, seed) if method.compensates else (),
         commands=tuple(windows.planned),

@@ -210,12 +210,11 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         f"share of high models shown to lead at N_D = {grid.table.amounts[-1]}": float(better.mean()),
         f"share of high models shown to be worse at N_D = {grid.table.amounts[-1]}": float(worse.mean()),
     }
-    orders = table.H[NO_MODEL].shape[1]
+    orders, moves = table.H[NO_MODEL].shape[1], verdict_of(False, False)
     if orders < FEWEST_ORDERS:
         lacks = f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has"
-        return "undecided", f"{evidence}; {lacks} {orders} {plural_word(orders, 'seed')}", numbers
-    moves: Verdict = "undecided"
-    if worst:
+        evidence += f"; {lacks} {orders} {plural_word(orders, 'seed')}"
+    elif worst:
         of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
         more = _chance_of_mean(of_worst - calm)
         moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)

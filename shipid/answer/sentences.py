@@ -155,7 +155,15 @@ def _missing_cells(results: Results) -> Iterator[str]:
 
 
 def _caveats_of_families(results: Results) -> Iterator[str]:
-    """Which families know more runs than the others, of the test or of training."""
+    """Which models diverge, and which families know more runs than the others, of the test or of training."""
+    counts = results.models.filter(like="diverged_").sum(axis=1)
+    if counts.any():
+        lost = results.models[counts > 0]
+        verb, (training, test) = plural_word(len(lost), "diverges", "diverge"), lost.filter(like="diverged_").sum()
+        yield (
+            f"{model_list(lost['model'])} {verb} on {training:.0f} training and {test:.0f} test windows: a path then "
+            "keeps its last velocity, and its error counts as the distance run at most."
+        )
     saw = families_set_from(results.plan, results.test.spans)
     if saw:
         yield f"The numbers of {model_list(saw)} were set from runs that test: shown, but counted in no other sentence."

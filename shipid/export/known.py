@@ -159,14 +159,22 @@ class PredictorInputs:
 
     @cached_property
     def path(self) -> MX:
-        """Path (2, T) of the physics alone [m]; zeros without physics, not a number where it diverges."""
+        """Path (2, T) of the physics alone [m], see `shipid.hybrid.physics.hold_velocity`; zeros without physics."""
         if self.physics.vessel is None:
             return MX(np.zeros((2, self.names.horizon)))
         way = self.records[:2, :]
         if self.physics.observer is not None:
             ages = ca.DM(self.physics.step * np.arange(1, self.names.horizon + 1))
             way += column_of_entries(self.seen, ("current_north", "current_east")) @ ages.T
-        return ca.if_else(self._slow(self.records), turn_vectors(way, -self.now["psi"]), np.nan)
+        path = turn_vectors(way, -self.now["psi"])
+        places, last = [MX(np.zeros(2))], self.physics.step * column_of_entries(self.now, "uv")
+        before, sound = places[0], MX(1)
+        for place in ca.horzsplit(path):
+            step = place - before
+            sound = ca.logic_and(sound, step.T @ step <= (SPEED_LIMIT * self.physics.step) ** 2)
+            last, before = ca.if_else(sound, step, last), place
+            places.append(ca.if_else(sound, place, places[-1] + last))
+        return ca.if_else(self._slow(self.records), path, ca.horzcat(*places[1:]))
 
     def _slow(self, records: MX) -> MX:
         """Whether no velocity of some carries is above that of any ship: in Python the rollout diverged."""
@@ -206,7 +214,7 @@ class PredictorInputs:
             table |= split_by_name([f"error-{seconds:g}.{name}" for name in axes], self._past_error(seconds))
         if moments:
             every = ca.vertcat(self.path, self.equations.horizontal(self.records))
-            every = ca.if_else(all_within(every), every, 0)
+            every = ca.if_else(ca.logic_and(all_within(every), self._slow(self.records)), every, 0)
             for k in moments:
                 table |= split_by_name([f"physics-{k * self.physics.step:g}.{name}" for name in axes], every[:, k - 1])
         return table

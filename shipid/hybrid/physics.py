@@ -20,8 +20,9 @@ from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance_loss
 from shipid.engine.integrate import Method as Integrator
-from shipid.engine.rollout import Distances, Trajectories, rollout, rollout_distances
+from shipid.engine.rollout import SPEED_LIMIT, Distances, Trajectories, rollout, rollout_distances
 from shipid.errors import DataError, ShipidError
+from shipid.metrics import vector_lengths
 from shipid.observer import ESTIMATE_COLUMNS, Observer, filter_bank, observed_start
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.log import LEANING, body_velocities, horizontal_velocities, state_column
@@ -75,22 +76,28 @@ class Physics:
         return self.vessel
 
     def paths(self, instants: Instants) -> Array:
-        """Paths (T, S, 2) [m] in the frame (11); zeros without physics, not finite where the rollout diverges."""
-        check_instants(instants)
-        if self.vessel is None:
-            return np.zeros((self.horizon, len(instants), 2))
-        paths, _ = self.variant_paths(instants)
-        return paths[:, 0]
+        """Paths (T, S, 2) [m] in the frame (11), see `variant_paths`; zeros without physics."""
+        return self.variant_paths(instants)[0][:, 0]
 
     def variant_paths(
         self, instants: Instants, parameters: Array | None = None, device: str = "cpu"
     ) -> tuple[Array, Array]:
         """Paths (T, V, S, 2) [m] in the frame (11) of V variants, `parameters` (V, P), and which diverged (V, S).
 
-        What the columns do not hold is zero: see `missing_columns`.
+        From where a path diverges it keeps its last velocity, see `hold_velocity`. It is no number where an input is
+        none. What the columns do not hold is zero: see `missing_columns`. Without physics there is one, zero.
         """
-        result, (north, east) = self._rollout(instants, ("north", "east"), parameters, device)
-        return np.stack(_positions_in_frame(instants, north, east), axis=-1), result.diverged
+        check_instants(instants)
+        if self.vessel is None:
+            return np.zeros((self.horizon, 1, len(instants), 2)), np.zeros((1, len(instants)), bool)
+        result, (north, east), lost = self._rollout(instants, ("north", "east"), parameters, device)
+        paths = np.stack(_positions_in_frame(instants, north, east), axis=-1)
+        begun = self.step * np.stack([instants.columns.get(name, 0 * lost) for name in ("u", "v")], axis=-1)
+        bad = result.diverged
+        paths[:, bad] = hold_velocity(
+            paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad], SPEED_LIMIT * self.step
+        )
+        return paths + lost[:, None], bad
 
     def states(self, instants: Instants, *, engine: str = AUTO) -> dict[str, Array]:
         """Return x, y [m] in the frame (11), u, v, r and psi after 1..T steps, name -> (T, S), horizontal as in a log.
@@ -99,8 +106,9 @@ class Physics:
         """
         leaning = tuple(name for name in LEANING if name in vessel_dynamics(self.ship).state)
         kept = ("north", "east", *MOTION, *leaning)
-        result, (north, east) = self._rollout(instants, kept, None, "cpu", engine)
-        x, y = _positions_in_frame(instants, north[:, 0], east[:, 0])
+        result, (north, east), lost = self._rollout(instants, kept, None, "cpu", engine)
+        lost = np.where(result.diverged[0], np.nan, lost)
+        x, y = _positions_in_frame(instants, north[:, 0] + lost, east[:, 0] + lost)
         motion = {name: result[name][1:, 0] for name in (*MOTION, *leaning)}
         if leaning:
             with np.errstate(all="ignore"):  # a path that diverged
@@ -113,7 +121,7 @@ class Physics:
         if not names:
             return {}
         kept = ("north", "east", *(f"{ACTUAL}{name}" for name in names))
-        result, _ = self._rollout(instants, kept, None, "cpu")
+        result, *_ = self._rollout(instants, kept, None, "cpu")
         return {name: result[f"{ACTUAL}{name}"][:, 0] for name in names}
 
     def gradient(
@@ -187,8 +195,11 @@ class Physics:
         parameters: Array | None,
         device: str,
         engine: str = AUTO,
-    ) -> tuple[Trajectories, tuple[Array, Array]]:
-        """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps."""
+    ) -> tuple[Trajectories, tuple[Array, Array], Array]:
+        """Trajectories of the vessel, and north and east (T, V, S) [m] over ground after 1..T steps.
+
+        Last (S,): NaN for an instant with an input that is no number, which a force may hide; else 0.
+        """
         start, commands, environment, slow, drift = self._inputs(instants)
         if engine == AUTO and len(instants) * self.horizon > REPEATED_FROM:
             engine = REPEATED
@@ -207,12 +218,14 @@ class Physics:
             engine=engine,
             device=device,
         )
-        lost = np.where(result.diverged, np.nan, 0.0)  # a force may hide an input that is no number
-        north, east = result["north"][1:] + lost, result["east"][1:] + lost
+        given = (*start.values(), *commands.values(), *environment.values())
+        known = np.isfinite([np.atleast_2d(values).sum(axis=0) for values in given]).all(axis=0)
+        lost = np.where(known, 0.0, np.nan)
+        north, east = result["north"][1:], result["east"][1:]
         if drift is not None:
             ages = self.step * np.arange(1, self.horizon + 1)[:, None, None]
             north, east = north + ages * drift[0], east + ages * drift[1]
-        return result, (north, east)
+        return result, (north, east), lost
 
     def _inputs(self, instants: Instants) -> RolloutInputs:
         """Start, commands, environment, slow force and drift of a rollout; what has no column is zero."""
@@ -237,6 +250,20 @@ class Physics:
         return start, commands, environment, slow, drift
 
 
+def hold_velocity(paths: Array, begun: Array, limit: float) -> Array:
+    """Paths (T, ..., 2) [m] from the origin that repeat their last sound step from where a step is none.
+
+    begun : (..., 2) [m], the step that is repeated where the first is none. limit : [m], no sound step is longer.
+    """
+    places = np.concatenate([np.zeros_like(paths[:1]), paths])
+    with np.errstate(all="ignore"):  # a step from infinity to infinity
+        steps = np.concatenate([begun[None], np.diff(places, axis=0)])
+    sound = np.logical_and.accumulate(vector_lengths(steps[1:]) <= limit)[..., None]
+    last = sound.sum(axis=0, keepdims=True)
+    place, step = (np.take_along_axis(each, last, axis=0) for each in (places, steps))
+    return np.where(sound, paths, place + np.cumsum(~sound, axis=0) * step)
+
+
 def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:
     """Place and heading (S,) at the instants; zero where they are not among the columns."""
     zero = np.zeros(len(instants))
@@ -245,8 +272,8 @@ def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:
 
 
 def _positions_in_frame(instants: Instants, north: Array, east: Array) -> tuple[Array, Array]:
-    """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged is not finite."""
-    with np.errstate(invalid="ignore"):  # it is flagged, and no news to the caller
+    """Positions (T, ..., S) [m] in the frame (11) of the instants; a path that diverged may not be finite."""
+    with np.errstate(all="ignore"):  # it is flagged, and no news to the caller
         return to_frame(north, east, *_place_of_instants(instants))
 
 

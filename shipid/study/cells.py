@@ -14,7 +14,14 @@ from shipid.data.windows import Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, shorten_line
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
-from shipid.metrics import PREDICTION_ERRORS, coverage_share, position_error, summarise_errors, vector_lengths
+from shipid.metrics import (
+    PREDICTION_ERRORS,
+    cap_paths,
+    coverage_share,
+    position_error,
+    summarise_errors,
+    vector_lengths,
+)
 from shipid.observer import Estimates
 from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
 from shipid.study.declared import Foundation, StudyMethod
@@ -140,6 +147,9 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
             test=part,
             pool_paths={name: paths[:, place[training]] for name, paths in prepared.pool_paths.items()},
             test_paths={name: paths[:, place[judged]] for name, paths in prepared.pool_paths.items()},
+            diverged={
+                name: (pool[place[training]], pool[place[judged]]) for name, (pool, _) in prepared.diverged.items()
+            },
         )
         known = predictions(inside, tuple(rest.spans), work.device, {name for name, _ in left_out})
         again = work._replace(prepared=inside, windows=rest, known=known)
@@ -171,13 +181,14 @@ def evaluate_cell(
     one, way, result = work.known[name], work.ways[method], fitted[method][name]
     foundation, prepared, batch = one.foundation, work.prepared, work.batch
     errors, seconds = left_out.get(pair, (None, 0.0))
+    alone = cap_paths(one.test_paths, prepared.test.future, one.diverged)
     row: dict[str, Any] = {
         "cell": batch.cell(name, method),
         "foundation": name,
         "family": foundation.family,
         "member": foundation.member,
         "method": method,
-        **(accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY),
+        **(accuracy_of(alone, prepared.test) if foundation.base is not None else NO_ACCURACY),
         "N_D": batch.N_D,
         "seed": batch.seed,
         "runs": len(prepared.runs(batch)),
@@ -217,18 +228,14 @@ def _failed_columns(status: str, sentence: str) -> dict[str, Any]:
 def _test_errors(
     prepared: PreparedStudy, one: FoundationPrediction, predictor: Predictor, way: StudyMethod
 ) -> tuple[dict[str, Any], Array | None]:
-    """Errors [m] of a predictor on the test windows, and its paths where they are finite and within reach of a ship."""
-    test, study = prepared.test, prepared.study
-    failed = ~np.isfinite(one.test_paths).all(axis=(0, 2))
-    if failed.any():
-        share = f"physics diverges on {percent_text(failed.mean(), 1)} of the test windows"
-        return _failed_columns("diverged", share if np.isfinite(one.paths).all() else one.sentence), None
+    """Errors [m] of a predictor on the test windows, and its paths, see `cap_paths`, if a ship can reach them."""
+    test, study, sentence = prepared.test, prepared.study, one.sentence
+    if not np.isfinite(one.test_paths).all():
+        return _failed_columns("diverged", sentence), None
     instants = instants_of(study, predictor.vessel, prepared.data, test, one.estimates)
     predictor.check_restored(instants, one.test_paths, way.method.corrector)
-    paths = predictor.predict(instants, one.test_paths)
-    failed = ~(vector_lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(
-        axis=0
-    )  # where physics has diverged, too
+    paths = cap_paths(predictor.predict(instants, one.test_paths), test.future, one.diverged)
+    failed = ~(vector_lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(axis=0)
     if failed.any():
         where = f"{percent_text(failed.mean(), 1)} of the test windows"
         return _failed_columns(
@@ -242,7 +249,10 @@ def _test_errors(
         region = predictor.band(paths, instants, level)
         outcome["coverage"] = coverage_share(region.holds(test.future - paths), test.run)
         outcome["width"] = float(region.radius.mean())
-    return {**outcome, "status": "ok", "sentence": one.sentence}, paths
+    if one.diverged.any():
+        share = f"physics diverges on {percent_text(one.diverged.mean(), 1)} of the test windows"
+        sentence = "; ".join(filter(None, [sentence, f"{share}: errors there are at most the distance run"]))
+    return {**outcome, "status": "ok", "sentence": sentence}, paths
 
 
 def _predictor(
@@ -268,6 +278,7 @@ class FoundationPrediction:
 
     foundation : with the numbers that were identified and the observer that was chosen, if any.
     paths, test_paths : (T, S, 2) [m] in the frame (11) on the batch's windows and the test's; zeros without physics.
+    diverged : (S,) the test windows on which it diverges.
     sentence : the message of the identification; empty where nothing was identified. seconds : core-seconds that
         identification and choice took.
     estimates : what the observer knows at every row of the runs; None without one.
@@ -276,6 +287,7 @@ class FoundationPrediction:
     foundation: Foundation
     paths: Array
     test_paths: Array
+    diverged: Array
     sentence: str = ""
     seconds: float = 0.0
     estimates: Estimates | None = None
@@ -298,7 +310,8 @@ def predictions(
             continue
         if not one.fitted:
             paths = prepared.pool_paths[one.name][:, mask], prepared.test_paths[one.name]
-            result[one.name] = FoundationPrediction(one, *paths, estimates=prepared.estimates.get(one.name))
+            lost, known_of_it = prepared.diverged[one.name][1], prepared.estimates.get(one.name)
+            result[one.name] = FoundationPrediction(one, *paths, lost, estimates=known_of_it)
         else:
             data = rows_apart_from_test(prepared.data, prepared.test) if data is None else data
             result[one.name] = _fit_foundation(prepared, one, runs, data, windows, device, known)
@@ -340,11 +353,10 @@ def _fit_foundation(
                 seconds += time.thread_time() - begun
             calls = sum(one.observer is not None for one in prepared.foundations)
             estimates = estimates_of(study, now, prepared.data, prepared.test, calls)
-        pair = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
-        if not np.isfinite(pair[0]).all():
-            raise ShipidError("the model diverges on training windows")
+        paths = paths_of(study, prepared.data, (windows, prepared.test), now, device, estimates)
     except ShipidError as error:
         words = "identification" if foundation.identify is not None else "observer"
         here, there = (np.full_like(part.future, np.nan) for part in (windows, prepared.test))
-        return FoundationPrediction(foundation, here, there, f"{words}: {error.message}")
-    return FoundationPrediction(now, *pair, sentence, seconds, estimates)
+        lost = np.zeros(len(prepared.test), bool)
+        return FoundationPrediction(foundation, here, there, lost, f"{words}: {error.message}")
+    return FoundationPrediction(now, paths.pool, paths.test, paths.diverged[1], sentence, seconds, estimates)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -47,7 +47,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
 from shipid.logs.segments import run_kind
-from shipid.metrics import position_error
+from shipid.metrics import cap_paths, position_error
 from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
@@ -60,6 +60,7 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import Family, draw_variant
 
 Array = np.ndarray
+Pair = tuple[Array, Array]
 MOST_REDRAWS = 100
 
 
@@ -70,8 +71,10 @@ class PreparedStudy:
     study : the checked document, with the seeds of its world.
     data : the runs themselves.
     pool, test : windows for training and validation, and windows of the untouched test runs.
-    foundations : after redraws.
-    pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics.
+    foundations : after redraws, where a family asks for them.
+    pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics. Those of the pool are
+        capped where they diverge, see `cap_paths`.
+    diverged : foundation -> windows of pool and test on which it diverges, (S,) each.
     estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
         depend on the batch.
     notes : what was assumed, redrawn or left out, in sentences.
@@ -85,6 +88,7 @@ class PreparedStudy:
     foundations: tuple[Foundation, ...]
     pool_paths: Mapping[str, Array]
     test_paths: Mapping[str, Array]
+    diverged: Mapping[str, Pair]
     notes: tuple[str, ...]
     estimates: Mapping[str, Estimates] = field(default_factory=dict)
     kinds: Mapping[str, str] = field(default_factory=dict)
@@ -225,7 +229,8 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
 def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
     """Cut windows, set the test runs aside, and roll every model out on all of them.
 
-    A member that diverges on windows of the pool is redrawn with the next counter; the test set is never looked at.
+    A member that diverges on windows of the pool stays, see `cap_paths`, or is redrawn with the next counter where its
+    family says so; the test set is never looked at.
     """
     dataset = _in_order(plan, dataset)
     rest, test, notes = partition(plan, dataset)
@@ -250,8 +255,9 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         pool=rest,
         test=test,
         foundations=foundations,
-        pool_paths={name: pair[0] for name, pair in paths.items()},
-        test_paths={name: pair[1] for name, pair in paths.items()},
+        pool_paths={name: one.pool for name, one in paths.items()},
+        test_paths={name: one.test for name, one in paths.items()},
+        diverged={name: one.diverged for name, one in paths.items()},
         notes=tuple(dict.fromkeys(notes)),
         estimates=estimates,
         kinds=kinds_of_runs(dataset),
@@ -286,8 +292,15 @@ def _test_runs(study: Study, windows: Windows) -> list[str]:
     return wanted
 
 
-Pair = tuple[Array, Array]
 Alike = tuple[str, ...]  # structure of a vessel and the numbers of its actuators: their hidden states are equal
+
+
+class PathsOfParts(NamedTuple):
+    """Paths (T, S, 2) [m] of a foundation, those of training capped, see `cap_paths`; windows on which they diverge."""
+
+    pool: Array
+    test: Array
+    diverged: Pair
 
 
 def _roll_out(
@@ -297,22 +310,27 @@ def _roll_out(
     notes: list[str],
     device: str,
     estimates: dict[str, Estimates],
-) -> tuple[tuple[Foundation, ...], dict[str, Pair]]:
-    """Paths of every foundation on (pool, test), members that diverge on the pool redrawn; fills in the estimates."""
+) -> tuple[tuple[Foundation, ...], dict[str, PathsOfParts]]:
+    """Paths of every foundation, with the members that its family redraws; fills in the estimates."""
     study, calls = plan.study, sum(one.observer is not None for one in plan.foundations)
     families = {family.name: family for family in plan.families}
-    finished: dict[str, tuple[Foundation, Pair]] = {}
+    finished: dict[str, tuple[Foundation, PathsOfParts]] = {}
     waiting = [one for one in plan.foundations if one.base and one.identify is None and one.observer is None]
     known: dict[Alike, list[Instants]] = {}
     while waiting:
         again = []
-        for foundation, paths, share in _one_round(study, dataset, parts, waiting, device, known):
-            if share:
-                again.append(_redraw(foundation, families[foundation.family], share, plan.file, notes))
-            else:
-                finished[foundation.name] = (foundation, paths)
+        for foundation, paths in _one_round(study, dataset, parts, waiting, device, known):
+            family, lost = families[foundation.family], int(paths.diverged[0].sum())
+            words = f"{foundation.name} diverges on {percent_text(lost / len(parts[0]), 1)} of the training windows"
+            if lost and (family.redraw or not any(block.drawn for block in family.perturb)):
+                again.append(_redraw(foundation, family, words, plan.file, notes))
+                continue
+            finished[foundation.name] = (foundation, paths)
+            if lost:
+                notes.append(f"{words}: its path keeps its last velocity there, its error is at most the distance run")
         waiting = again
-    zeros = (np.zeros_like(parts[0].future), np.zeros_like(parts[1].future))
+    pool, test = (np.zeros_like(part.future) for part in parts)
+    zeros = PathsOfParts(pool, test, (np.zeros(len(parts[0]), bool), np.zeros(len(parts[1]), bool)))
     for foundation in plan.foundations:
         if (foundation.identify or foundation.observer) and foundation.variant is not None:
             same, paths = finished[foundation.variant.name]
@@ -417,8 +435,8 @@ def _one_round(
     foundations: Sequence[Foundation],
     device: str,
     known: dict[Alike, list[Instants]],
-) -> Iterator[tuple[Foundation, Pair, float]]:
-    """Paths of each foundation on (pool, test) and the share of pool windows on which it diverged.
+) -> Iterator[tuple[Foundation, PathsOfParts]]:
+    """Each foundation with its paths.
 
     Foundations of one structure are one rollout. known : instants of earlier rounds, to which those of this are added.
     """
@@ -433,13 +451,14 @@ def _one_round(
         if key not in known:
             known[key] = [instants_of(study, vessel, dataset, windows) for windows in parts]
         parameters = np.array([one.variant.parameters for one, _ in group if one.variant is not None])
-        (pool, pool_bad), (test, test_bad) = (
-            physics_of(study, vessel).variant_paths(instants, parameters, device) for instants in known[key]
-        )
+        rolled = [physics_of(study, vessel).variant_paths(instants, parameters, device) for instants in known[key]]
         for position, (foundation, _) in enumerate(group):
-            paths = (pool[:, position], test[:, position])
-            paths[1][:, test_bad[position]] = np.nan
-            yield foundation, paths, float(pool_bad[position].mean())
+            yield foundation, _paths_of_parts(parts, *((paths[:, position], bad[position]) for paths, bad in rolled))
+
+
+def _paths_of_parts(parts: Sequence[Windows], pool: Pair, test: Pair) -> PathsOfParts:
+    """Paths and where they diverge, of pool and test."""
+    return PathsOfParts(cap_paths(pool[0], parts[0].future, pool[1]), test[0], (pool[1], test[1]))
 
 
 def paths_of(
@@ -449,29 +468,26 @@ def paths_of(
     foundation: Foundation,
     device: str,
     estimates: Estimates | None = None,
-) -> Pair:
-    """Paths of one foundation on (pool, test); where it diverges they are not numbers."""
+) -> PathsOfParts:
+    """Paths of one foundation."""
     vessel = foundation.vessel
     physics = physics_of(study, vessel, foundation.observer)
-    (pool, pool_bad), (test, test_bad) = (
+    rolled = (
         physics.variant_paths(instants_of(study, vessel, dataset, windows, estimates), None, device)
         for windows in parts
     )
-    test[:, 0, test_bad[0]] = np.nan
-    return (np.full_like(pool[:, 0], np.nan), test[:, 0]) if pool_bad.any() else (pool[:, 0], test[:, 0])
+    return _paths_of_parts(parts, *((paths[:, 0], bad[0]) for paths, bad in rolled))
 
 
-def _redraw(foundation: Foundation, family: Family, share: float, file: str, notes: list[str]) -> Foundation:
-    """The member drawn again with the next counter, which is noted; Diverges where nothing can be drawn, or no more."""
+def _redraw(foundation: Foundation, family: Family, words: str, file: str, notes: list[str]) -> Foundation:
+    """The member drawn again with the next counter, noted after `words`; DivergenceError where nothing can be drawn."""
     assert foundation.variant is not None
     assert foundation.base is not None
     counter = foundation.variant.counter + 1
     if counter > MOST_REDRAWS or not any(block.drawn for block in family.perturb):
         tries = f" after {MOST_REDRAWS} redraws" if counter > MOST_REDRAWS else ""
-        words = f"{foundation.name} diverges on {percent_text(share, 1)} of the training windows{tries}"
         remedy = "take a smaller [prediction] step, rk4, or narrower factors"
-        raise DivergenceError(f"{words}: {remedy}", path=f"family.{foundation.family}")
-    words = f"{foundation.name} diverged on {percent_text(share, 1)} of the training windows"
+        raise DivergenceError(f"{words}{tries}: {remedy}", path=f"family.{foundation.family}")
     notes.append(f"{words}: redrawn, counter {counter}")
     return replace(foundation, variant=draw_variant(family, foundation.member, foundation.base, counter, file))
 

@@ -213,8 +213,10 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
 
 
 def _read_models(folder: Path, physics: Mapping[str, np.ndarray], test: Windows) -> pd.DataFrame:
-    """One row per model: accuracy [m], also by axis of the frame (11), and whether it diverged on the test windows."""
+    """One row per model: accuracy [m], also by axis of the frame (11), and on how many windows it diverges, if any."""
     frame = pd.DataFrame(read_json(folder / store.FOUNDATIONS))
+    counts = frame.filter(like="diverged_")
+    frame = frame if counts.sum().any() else frame.drop(columns=counts)
     frame["model"] = frame["foundation"]
     for name in ("A", "A_90", "A_rms"):
         frame[name] = frame[name].astype(float)

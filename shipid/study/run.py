@@ -29,6 +29,7 @@ from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
+from shipid.metrics import cap_paths
 from shipid.study import seals, store
 from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
 from shipid.study.cluster import Line, SentJournal, on_dask
@@ -186,12 +187,18 @@ def _prepare_folder(
 
 def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy) -> None:
     """Store what all batches share, so that a report needs nothing else."""
-    test, fixed = prepared.test, [one for one in prepared.foundations if not one.fitted]
-    paths = {one.name: prepared.test_paths[one.name] for one in fixed}
+    test, lost = prepared.test, prepared.diverged
+    fixed = [one for one in prepared.foundations if not one.fitted]
+    paths = {one.name: cap_paths(prepared.test_paths[one.name], test.future, lost[one.name][1]) for one in fixed}
     store.write_test(folder, test, paths, prepared.naive)
     rows = input_envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
-    known = {one.name: accuracy_of(paths[one.name], test) for one in fixed if one.base is not None}
+    known = {
+        one.name: accuracy_of(paths[one.name], test)
+        | {f"diverged_{part}": int(bad.sum()) for part, bad in zip(("training", "test"), lost[one.name], strict=True)}
+        for one in fixed
+        if one.base is not None
+    }
     described = [{**foundation_record(one), **known.get(one.name, NO_ACCURACY)} for one in prepared.foundations]
     write_json(folder / store.FOUNDATIONS, described)
     seals.write_seal(folder, COMMON, [folder / name for name in (store.TEST, store.ENVELOPE, store.FOUNDATIONS)])

@@ -152,7 +152,8 @@ def first_look(
     windows = cut_windows(part, horizon=horizon, step=step, interval=max(step, horizon * step / 4), path=path)
     instants = windows.instants(known=True, hidden=window_memory(vessel, part, windows))
     physics = Physics(vessel, horizon, step, "rk4")
-    error = np.nan_to_num(position_error(physics.paths(instants), windows.future), nan=np.inf)
+    paths, diverged = physics.variant_paths(instants)
+    error = np.where(diverged, np.inf, position_error(paths[:, 0], windows.future))
     constant = position_error(constant_motion(windows), windows.future)
     predicted, true, now = physics.states(instants), windows.states, windows.columns["psi"]
     turned, speed = true["psi"][-1] - now, np.hypot(true["u"][-1], true["v"][-1])

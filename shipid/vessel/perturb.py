@@ -198,6 +198,9 @@ class Family(CheckedModel, BaseModel):
     sample: Literal["independent", "latin-hypercube", "sobol"] = Field(
         default="independent", description="how members are spread over the ranges; the latter two fill them evenly"
     )
+    redraw: bool = Field(
+        default=False, description="draws a member that diverges on training windows again; by default it stays"
+    )
     equal: bool = Field(default=False, description="allows several members that nothing drawn tells apart")
     description: str | None = None
     structure: dict[str, Any] = Field(
@@ -306,6 +309,7 @@ def resolve_families(families: Sequence[Family], file: str | Path | None = None)
             "extends": None,
             "structure": parent.structure | family.structure,
             "perturb": [*parent.perturb, *family.perturb],
+            "redraw": parent.redraw or family.redraw,
             "seen": [*parent.seen, *family.seen],
             "identify": parent.identify if family.identify is None else family.identify,
             "observer": parent.observer if family.observer is None else family.observer,

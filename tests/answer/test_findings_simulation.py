@@ -135,6 +135,14 @@ def test_S3_an_order_that_comes_by_chance_is_undecided(judged: Any) -> None:
     assert (few["verdict"], few["evidence"][:39]) == ("undecided", "4 physics models, a trend needs 5; left")
 
 
+@pytest.mark.parametrize("seeds", [1, 4, 5])
+def test_S4_can_be_refuted_with_any_number_of_seeds(judged: Any, seeds: int) -> None:
+    """Before, fewer than five seeds left it undecided, although no order of the runs could have confirmed it."""
+    all_better = judged({**H, "high-2": (7.0, 3.0, 0.7)}, seeds=seeds)["S4"]
+    none_better = judged({**H, "high-1": (9.0, 5.0, 2.0)}, seeds=seeds)["S4"]
+    assert all_better["verdict"] == none_better["verdict"] == "refuted"
+
+
 def test_S4_worst_and_calm(judged: Any) -> None:
     calm = judged(seeds=5, wobble={"high-2": 0.001, "moderate-1": 0.05, "moderate-2": 0.05, "moderate-3": 0.05})["S4"]
     assert calm["verdict"] == "refuted"

@@ -16,6 +16,7 @@ from shipid.observer import MEASURED_MOTION, Observer, run_observer
 from shipid.study.prepare import at_instants
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import load_vessel
+from shipid.vessel.perturb import Family, draw_members
 from tests.conftest import variety
 from tests.identification.trials import trials
 from tests.study.test_whole import windy
@@ -166,12 +167,50 @@ def test_physics_of_a_wrong_argument_is_refused(wrong: dict[str, Any], message: 
         Physics(**{"vessel": SHIP, "horizon": 5, "step": 1.0, **wrong})
 
 
+def wild_members(seed: int, count: int = 40) -> np.ndarray:
+    """Numbers (V, P) of drawn members, many of which diverge."""
+    block = {"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0], "change_sign": True}
+    family = Family(name="wild", base="gunnerus-28.9", members=count, seed=seed, perturb=[block])  # type: ignore[list-item]
+    return np.array([one.parameters for one in draw_members(family, SHIP)])
+
+
+@pytest.mark.parametrize("method", ["euler", "rk4"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_every_member_has_a_path_that_keeps_its_last_velocity(windows: Windows, seed: int, method: Any) -> None:
+    """A member that does not diverge has the path of its rollout to the bit; one that does goes straight on."""
+    physics, members, columns = Physics(SHIP, 25, 1.0, method), wild_members(seed), windows.columns
+    paths, diverged = physics.variant_paths(windows.instants(), members)
+    assert np.isfinite(paths).all()
+    assert 0 < diverged.any(axis=1).sum() < len(members)
+    model = vessel_dynamics(SHIP)
+    given = ({name: columns[name] for name in names} for names in (model.state, model.commands, model.environment))
+    raw = rollout(SHIP, *given, step=1.0, num_steps=25, method=method, parameters=members)
+    with np.errstate(all="ignore"):
+        x, y = to_frame(raw["north"][1:], raw["east"][1:], columns["north"], columns["east"], columns["psi"])
+        unheld = np.stack([x, y], axis=-1)
+        steps = np.diff(unheld, axis=0, prepend=0.0)
+        gone = ~np.logical_and.accumulate(np.hypot(steps[..., 0], steps[..., 1]) <= 100.0) & diverged
+    np.testing.assert_array_equal(raw.diverged, diverged)
+    np.testing.assert_array_equal(paths[~gone], unheld[~gone])
+    kept = np.diff(paths, axis=0, prepend=0.0)
+    begun = np.broadcast_to(np.stack([columns["u"], columns["v"]], axis=-1), kept.shape[1:])
+    before = np.concatenate([begun[None], kept[:-1]])
+    np.testing.assert_allclose(kept[gone], before[gone], atol=1e-9)
+    assert gone[1:].any()
+
+
+def test_an_input_that_is_no_number_gives_no_path(windows: Windows) -> None:
+    """A force may hide it: a path that keeps its velocity must not."""
+    lost = np.arange(len(windows)) == 2
+    columns = windows.columns | {"V_w": np.where(lost, np.nan, windows.columns["V_w"])}
+    np.testing.assert_array_equal(np.isnan(RIGHT.paths(Instants(columns))).all(axis=(0, 2)), lost)
+
+
 def test_without_a_vessel_there_is_nothing_to_roll_out(windows: Windows) -> None:
-    """Before, an AssertionError; paths are zero."""
+    """Before, an AssertionError; paths are zero, and do not diverge."""
     none = Physics(None, windows.horizon, windows.step)
     for ask in (
         lambda: none.states(windows.instants()),
-        lambda: none.variant_paths(windows.instants()),
         lambda: none.distances(windows.instants(), windows.future),
         lambda: none.gradient(windows.instants(), windows.future, []),
     ):

@@ -215,7 +215,7 @@ def test_cells_stand_side_by_side(tmp_path: Path, recorded: Recorded) -> None:
 
 def test_a_member_that_diverges_is_redrawn_once_for_it_and_its_identified_twin(recorded: Recorded) -> None:
     """Yaw damping of the wrong sign in nearly every draw; the identified family starts from the same member."""
-    family = {"name": "wild", "base": "gunnerus-28.9", "seed": 2}
+    family: dict[str, Any] = {"name": "wild", "base": "gunnerus-28.9", "seed": 2, "redraw": True}
     block = {"parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_ur"], "factor": [-60.0, 3.0]}
     family["perturb"] = [block | {"change_sign": True}]
     plan, dataset = study(recorded, [family, {"name": "tamed", "extends": "wild", "identify": IDENTIFY}])

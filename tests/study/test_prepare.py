@@ -13,12 +13,14 @@ import pandas as pd
 import pytest
 import tomlkit
 
+from shipid.answer.sentences import answer_sentences
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.logs.kinds import LOW_SPEED, RANDOM
+from shipid.metrics import position_error
 from shipid.predictor import Predictor
 from shipid.study import prepare as module
 from shipid.study.envelope import input_envelope
@@ -36,6 +38,7 @@ from shipid.study.prepare import (
     runs_by_amount,
     window_memory,
 )
+from shipid.study.results import read_results
 from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import draw_variant, resolve_families
@@ -105,7 +108,9 @@ def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
 
 
-def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_members_that_diverge_in_training_are_redrawn_where_the_family_asks_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The next counter draws anew, the others keep theirs, and it is reported; the same again gives the same.
 
     The actuators, which all members have alike, are followed once for the pool and once for the test, not every round.
@@ -117,7 +122,7 @@ def test_members_that_diverge_in_training_are_redrawn(tmp_path: Path, monkeypatc
         return window_memory(vessel, dataset, windows)
 
     monkeypatch.setattr(module, "window_memory", counted)
-    family = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
+    family: dict[str, Any] = {"name": "wild", "base": "gunnerus-28.9", "members": 6, "redraw": True}
     family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0], "change_sign": True}]
     plan = tiny_plan(tmp_path, {"family": [family]})
     prepared = prepare(plan, obtain_runs(plan))
@@ -142,12 +147,39 @@ def test_what_cannot_be_drawn_is_reported(tmp_path: Path, monkeypatch: pytest.Mo
     """A fixed factor draws nothing else; a hopeless range is given up."""
     monkeypatch.setattr(module, "MOST_REDRAWS", 9)
     for factor, message in ((-1e4, "diverges on"), ([-2e4, -1e4], "after 9 redraws")):
-        family = {"name": "lost", "base": "gunnerus-28.9", "perturb": [{"parameters": ["hull.derivatives.X_u|u|"]}]}
-        family["perturb"][0] |= {"factor": factor, "change_sign": True}  # type: ignore[index]
+        block = {"parameters": ["hull.derivatives.X_u|u|"], "factor": factor, "change_sign": True}
+        family = {"name": "lost", "base": "gunnerus-28.9", "redraw": True, "perturb": [block]}
         plan = tiny_plan(tmp_path, {"family": [family], "unusual": ["family.0.perturb.0.factor*"]})
         with pytest.raises(DivergenceError, match=message) as caught:
             prepare(plan, obtain_runs(plan))
         assert caught.value.path == "family.lost"
+
+
+def test_members_that_diverge_stay_and_err_by_the_distance_run_at_most(tmp_path: Path) -> None:
+    """No cell of them lacks a result, A is no larger than the mean distance run, and the page counts their windows."""
+    family: dict[str, Any] = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
+    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0], "change_sign": True}]
+    plan = tiny_plan(tmp_path, {"family": [family]})
+    prepared = prepare(plan, obtain_runs(plan))
+    run_here(plan, tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    assert (results.cells["status"] == "ok").all()
+    run = np.cumsum(np.linalg.norm(np.diff(prepared.test.future, axis=0, prepend=0.0), axis=-1), axis=0)
+    models, counts = results.models.set_index("model"), 0
+    for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
+        assert model.variant == planned.variant
+        pool, test = prepared.diverged[model.name]
+        error = position_error(results.physics[model.name], prepared.test.future)
+        assert (error[:, test] <= run[:, test] * (1 + 1e-9)).all()
+        assert error.mean() == pytest.approx(models.loc[model.name, "A"])
+        np.testing.assert_array_equal(results.physics[model.name][:, ~test], prepared.test_paths[model.name][:, ~test])
+        assert np.isfinite(prepared.test_paths[model.name]).all()
+        assert sum(model.name in note for note in prepared.notes) == pool.any()
+        assert models.loc[model.name, "diverged_training"] == pool.sum()
+        assert models.loc[model.name, "diverged_test"] == test.sum()
+        counts += pool.any()
+    assert 0 < counts < 6
+    assert any("test windows: a path then keeps its last velocity" in text for text, _ in answer_sentences(results))
 
 
 def test_divergence_on_test_windows_only_is_shown_never_redrawn(
@@ -167,14 +199,11 @@ def test_divergence_on_test_windows_only_is_shown_never_redrawn(
     for model in prepared.foundations[:-1]:
         assert model.variant is not None
         assert model.variant.counter == 0
-    accuracy = physics_errors(prepared, "brittle-1")
-    assert (accuracy["status"], accuracy["failed_share"]) == ("diverged", 0.5)
-    assert np.isnan(accuracy["mean"])
+        assert [part.mean() for part in prepared.diverged[model.name]] == [0.0, 0.5]
     rows = {row["foundation"]: row for row, *_ in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu")}
-    assert rows["brittle-1"]["status"] == "diverged"
-    assert "50.0 %" in rows["brittle-1"]["sentence"]
-    assert np.isnan(rows["brittle-1"]["H"])
-    assert rows["none"]["status"] == "ok"
+    assert "physics diverges on 50.0 % of the test windows" in rows["brittle-1"]["sentence"]
+    assert rows["brittle-1"]["H"] < 0.1, "the ship of this log stays where it is"
+    assert rows["none"]["sentence"] == ""
 
 
 def stepped(order: float, T: float, rate: float) -> tuple[Any, Dataset]:
