@@ -45,8 +45,9 @@ def family_show(
             rows = [
                 {"number": path, "base": base.parameters[path], "unit": base.units[path]}
                 | {"least": table[path, "value"].min(), "greatest": table[path, "value"].max()}
-                | {"factors": "{:.3g}..{:.3g}".format(*table[path, "factor"].agg(["min", "max"]))}
+                | {"factors": f"{ends['min']:.3g}..{ends['max']:.3g}" if ends.notna().all() else "none"}
                 for path in one.members[0].values
+                for ends in [table[path, "factor"].agg(["min", "max"])]
             ]
             answer.records(name, rows, formats=dict.fromkeys(("base", "least", "greatest"), "{:.4g}".format))
             answer.save("table", csv, table.set_axis(table.columns.map(" ".join), axis=1).reset_index())
@@ -59,10 +60,13 @@ def family_diff(
     family: FamilyName = None,
     as_json: Json = False,
 ) -> None:
-    """Compare a family of two documents: base and rules, and how many members have another value of a number."""
-    from shipid.simulation.families import compare_contents
+    """Compare a family of two documents: base and rules, and how many members have another value of a number.
 
-    one, two = (shipid.read_family(name, family).content() for name in (document, other))
+    Of a lock the values that it holds count.
+    """
+    from shipid.simulation.families import compare_contents, read_content
+
+    one, two = (read_content(name, family) for name in (document, other))
     changes = {path: pair for path, pair in compare_contents(one, two).items() if not path.startswith("values.")}
     values = [path.rpartition(".")[0] for path in compare_contents(one["values"], two["values"])]
     with open_answer(as_json) as answer:
@@ -89,7 +93,8 @@ def family_rollout(
     frame, lost = drawn.motion_table(done), drawn.divergence_times(done)
     spread = frame.groupby("member").last().drop(columns="t").quantile([0.05, 0.5, 0.95]).T
     with open_answer(as_json) as answer:
-        answer.say(f"{drawn.base.name}: {len(drawn.members)} members after {frame['t'].max():g} s, SI units")
+        count = f"{len(drawn.members)} members after {frame['t'].max():g} s, {len(lost) or 'none'} diverged"
+        answer.say(f"{drawn.base.name}: {count}, SI units")
         answer.records("spread", spread.set_axis(["5 %", "median", "95 %"], axis=1).reset_index(names="channel"))
         answer.records("diverge", [{"member": name, "diverges at [s]": time} for name, time in lost.items()])
         answer.save("motions", csv, frame)

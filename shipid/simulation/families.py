@@ -154,8 +154,10 @@ class VesselFamily:
     def export(self, folder: str | Path) -> Path:
         """Write a lock, and a patch document for each member that makes a vessel of it; return the file of the lock.
 
-        DataError, and nothing is written, where one of these files exists.
+        DataError, and nothing is written, where one of these files exists, or the folder is a file.
         """
+        if Path(folder).is_file():
+            raise DataError("is a file: name a folder", file=folder)
         base, lock = str(self.rules.base), Path(folder) / f"{self.rules.name}.lock.toml"
         base = os.path.relpath(self.base.file, folder) if base.endswith(".toml") else base
         patches = {Path(folder) / f"{one.name}.toml": replace(one, base=base).document() for one in self.members}
@@ -220,6 +222,13 @@ def read_family(document: str | Path, name: str | None = None) -> VesselFamily:
         raise DocumentError(f"has {len(families)} families: choose one of {', '.join(families)}", file=document)
     check_choice("family", name or next(iter(families)), families, DocumentError)
     return families[name or next(iter(families))]
+
+
+def read_content(document: str | Path, name: str | None = None) -> documents.Document:
+    """`VesselFamily.content` of a family, see `read_family`; of a lock with the base and the values that it holds."""
+    content = read_family(document, name).content()
+    lock = read_family_document(document)[1].get("lock", {})
+    return content | {key: lock[key] for key in ("base", "values") if key in lock}
 
 
 def compare_contents(one: Any, other: Any) -> dict[str, tuple[Any, Any]]:

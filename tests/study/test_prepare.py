@@ -43,7 +43,7 @@ from shipid.study.run import run_unit
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import draw_variant, resolve_families
 from tests.study.test_commands import weaving
-from tests.study.tiny import logged, physics_errors, tiny_plan, whole_unit
+from tests.study.tiny import logged, physics_errors, run_here, tiny_plan, whole_unit
 
 SHIP = load_vessel("gunnerus-28.9")
 ONE_FAMILY = {"name": "right", "base": "gunnerus-28.9"}
