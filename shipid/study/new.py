@@ -8,6 +8,7 @@ import textwrap
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from shipid.simulation.standard import shaft_speed
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import obtain_runs, partition, prepare
 from shipid.study.survey import Look, Survey, first_look, separation_of_sources, survey_dataset, typical_runs
-from shipid.units import GRAVITY, RPM, plural_word
+from shipid.units import GRAVITY, RPM, percent_text, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
@@ -39,6 +40,8 @@ MOST_AMOUNTS, MOST_STUDY_WINDOWS = 6, 20000
 # Ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead.
 LENGTHS_AHEAD = 2.5
 WIND_SPEED, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
+CURRENT_SHARE, SPEED_NOISE = 0.05, 0.005  # of the service speed
+MOST_JITTER, JITTER_SHARE, COMPASS_NOISE = 0.5, 1 / 200, 0.0044  # m, of the length, rad
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEP_PARTS = (1, 2, 4, 8)  # of the step: a small craft is stiff in yaw
 STEPS_AHEAD, STEPS_AHEAD_OF_LOG, LONGEST_STEP = 15, 30, 2.0  # least, of constant and of recorded orders; s
@@ -357,8 +360,9 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice("truth.duration", duration, f"s: {INSTANTS_A_MANOEUVRE} instants and the horizon"),
         Choice("truth.step", fine, f"s: the ship takes {ship_time:.3g} s for its length"),
         Choice("truth.interval", step, "s between logged rows"),
-        *([_wind_for_length(length)] if "V_w" in vessel_dynamics(vessel).environment else []),
+        *_ordinary_weather(vessel, length, service),
         _turning_orders(controls, service, rpm),
+        *_ordinary_sensors(length, service),
         Choice("split.test", TEST_MANOEUVRES, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
         Choice("prediction.ahead", float(f"{ahead:.9g}"), why),
@@ -400,11 +404,43 @@ def _past_of_method(method: Choice) -> float:
     return float(max(method.value[0].get("memory", {}).get("turned", [0.0])))
 
 
-def _wind_for_length(length: float) -> Choice:
-    """Wind for a ship of a length [m]: WIND_SPEED; below WIND_LENGTH times sqrt(L / WIND_LENGTH), by Froude's rule."""
-    speed = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
-    why = f"m/s, from anywhere: at most {WIND_SPEED:g} m/s, on a ship below {WIND_LENGTH:g} m less by Froude's rule"
-    return Choice("truth.wind_speed", [0.0, speed], why)
+def _ordinary_weather(vessel: Vessel, length: float, service: float) -> list[Choice]:
+    """A current that no model knows; gusts where the vessel feels wind: without them nothing disturbs the truth.
+
+    Wind is WIND_SPEED; on a ship below WIND_LENGTH times sqrt(L / WIND_LENGTH), by Froude's rule.
+    """
+    feels, most = vessel_dynamics(vessel).environment, float(f"{CURRENT_SHARE * service:.2g}")
+    why = f"m/s, over ground, another in each run, unknown to the models: up to {percent_text(CURRENT_SHARE)} of the "
+    why += f"service speed of {service:.3g} m/s, as a weak tide is (0.4 m/s for a ship of 8 m/s)"
+    weather = [Choice("truth.current_speed", [0.0, most], why)]
+    if "V_c" not in feels:
+        weather.append(Choice("truth.set.current.kind", "uniform", "the truth alone drifts: models are as they are"))
+    if "V_w" in feels:
+        wind = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
+        why = f"m/s, from anywhere: at most {WIND_SPEED:g} m/s, on a ship below {WIND_LENGTH:g} m less by Froude's rule"
+        gusts = Choice("truth.gusts.kind", "npd", "ISO 19901-1: a predictor knows the wind of the moment only")
+        weather += [Choice("truth.wind_speed", [0.0, wind], why), gusts]
+    return weather
+
+
+def _ordinary_sensors(length: float, service: float) -> list[Choice]:
+    """Noise of ordinary sensors, scaled with the ship, so that an error has a floor; test paths are the exact ones."""
+    position, speed, rate = (
+        min(MOST_JITTER, JITTER_SHARE * length),
+        SPEED_NOISE * service,
+        SPEED_NOISE * service / length,
+    )
+    fix = f"m: DGNSS on a ship of 100 m or more, {JITTER_SHARE:g} L below: RTK on a boat, cameras over a model"
+    log = f"m/s: {percent_text(SPEED_NOISE)} of the service speed; IMO MSC.96(72) allows a log 2 %"
+    noises = {
+        "north": (position, f"{fix}. Models learn from these fixes; the exact path judges what they predict from them"),
+        "east": (position, "as north"),
+        "psi": (COMPASS_NOISE, "rad: 0.25 deg RMS, which IMO A.424(XI) allows a gyro compass"),
+        "u": (speed, log),
+        "v": (speed, "as u"),
+        "r": (rate, "rad/s: that of u over the length; IMO A.526(13) allows a rate gyro 0.5 deg/min and 5 %"),
+    }
+    return [Choice(f"truth.sensors.{name}.noise", float(f"{noise:.2g}"), why) for name, (noise, why) in noises.items()]
 
 
 def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
@@ -444,7 +480,7 @@ def _degraded_families(named: str, vessel: Vessel) -> list[dict[str, Any]]:
     moderate = {"parameters": damping, "factor": [0.4, 1.6]}
     high = {"parameters": [path for path in INERTIA_PATHS if path in vessel.parameters], "factor": [0.6, 1.4]}
     words = (
-        "the numbers of the truth: the error that steps and held orders leave",
+        "the numbers of the truth: the error that current, gusts and sensors leave",
         "each hull coefficient times a separate factor in 0.4-1.6",
         "as moderate, and mass, yaw inertia and added mass times factors in 0.6-1.4",
     )
@@ -466,9 +502,10 @@ def _study_text(choices: Sequence[Choice], warnings: Sequence[str] = ()) -> str:
     blocks = {"": _comment([*head, *(f"NOTE {one}" for one in warnings)])}
     last = {"method": "", "family": ""}  # lists of tables: what follows them in the file would belong to them
     for choice in choices:
-        block, _, key = choice.path.rpartition(".")
+        block = choice.path.rpartition(".")[0]
         title = f"[{block}]\n" if block else ""
-        value = tomlkit.dumps({block: {key: choice.value}} if block else {key: choice.value}).removeprefix(title)
+        nested = reduce(lambda inner, part: {part: inner}, reversed(choice.path.split(".")), choice.value)
+        value = tomlkit.dumps(nested).removeprefix(title)
         text = f"{_comment([choice.why])}{value}"
         if choice.path in last:
             last[choice.path] = text
