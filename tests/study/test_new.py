@@ -262,7 +262,7 @@ def test_wind_is_that_of_a_small_ship_by_froudes_rule(length: float, wind: float
 
 
 def test_sensors_are_those_of_the_ship_at_any_scale() -> None:
-    """A model at Froude's scale has the noise of its ship in its own lengths and times, up to the fix of a large one."""
+    """A model at Froude's scale has the noise of its ship in its own lengths and times, but a ship has one fix."""
     random = np.random.default_rng(11)
     for length, scale in zip(random.uniform(1, 100, 20), random.uniform(0.01, 1, 20), strict=True):
         ship, model = (
