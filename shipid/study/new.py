@@ -28,7 +28,7 @@ from shipid.simulation.standard import shaft_speed
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import obtain_runs, partition, prepare
 from shipid.study.survey import Look, Survey, first_look, separation_of_sources, survey_dataset, typical_runs
-from shipid.units import GRAVITY, RPM, percent_text, plural_word
+from shipid.units import RPM, percent_text, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
@@ -54,7 +54,7 @@ Shares of the way: a towing carriage 1e-4, jitter of 0.3 m on a ship of 30 m 0.0
 """
 RUNS_FOR_FOLDS, PROPOSED_FOLDS = 6, 3
 MANOEUVRES, TEST_MANOEUVRES, INSTANTS_A_MANOEUVRE = 60, 10, 50  # of a simulated study
-PAST_IN_WAVE_TIMES, LEAST_PAST_STEPS = 11.6, 8  # sqrt(L / g): 20 s of a ship of 29 m; steps
+PAST_LENGTHS, LEAST_PAST_STEPS = 1.5, 8  # L / U: of 0.8, 1.5, 2.5 and 11.6 sqrt(L / g) the best on four ships; steps
 LAGS_OF_MEMORY = (0.1, 0.2, 0.4, 0.5, 1.0)  # shares of the past
 HELM_DEG, STEPS_A_LENGTH = 35.0, 150  # the helm of a turning circle (MSC.137(76)); of the truth
 STEERING_DERIVATIVES = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed
@@ -157,8 +157,9 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     """A study of all vessels on recorded runs; the first one is made inaccurate, too (method, section 5)."""
     every, first = survey_dataset(dataset), next(iter(vessels.values()))
     ahead, step, why = proposed_horizon(first, every)
+    passing = (first.length or 0.0) / every.speed if every.speed > 0 else 0.0
     for spare in (float(every.runs["duration"].median()) - ahead, 0.0):
-        method = _proposed_method(first.length, step, spare)
+        method = _proposed_method(passing, step, spare)
         usable = _runs_that_hold(dataset, ahead, step, _past_of_method(method))
         if len(usable) > LEAST_AMOUNT:
             break
@@ -342,11 +343,12 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         rpm = shaft_speed(controls, service) / RPM
     except ShipidError as error:
         raise DocumentError(error.message, file=vessel.file, path="particulars.U_0") from None
-    horizon, why = horizon_of(length, 0.75 * service, [np.inf])
+    usual = 0.75 * service
+    horizon, why = horizon_of(length, usual, [np.inf])
     step = step_of(horizon, 0.0)
     ahead = round(horizon / step) * step
     amounts = amounts_of_data(MANOEUVRES - TEST_MANOEUVRES)
-    method = _proposed_method(length, step, np.inf)
+    method = _proposed_method(length / usual, step, np.inf)
     past, ship_time = _past_of_method(method), length / service
     duration = float(f"{ahead + INSTANTS_A_MANOEUVRE * step:.6g}")
     fine = min(_round_number_below(ship_time / STEPS_A_LENGTH), step / 10)
@@ -377,24 +379,25 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     return Draft(_study_text(choices), choices, plan)
 
 
-def _proposed_method(length: float | None, step: float, spare: float) -> Choice:
+def _proposed_method(passing: float, step: float, spare: float) -> Choice:
     """Compensation of the path with a memory, which validation may refuse; without one where runs are too short.
 
-    spare : time [s] of the median run beyond the horizon; a third of it may be past.
+    passing : time [s] in which the ship runs its length; 0: not known. spare : time [s] of the median run beyond the
+        horizon; a third of it may be past.
     """
-    past = PAST_IN_WAVE_TIMES * float(np.sqrt((length or 0.0) / GRAVITY))
-    if not LEAST_PAST_STEPS * step <= past <= spare / 3:
-        why = f"no memory: a past of {past:.3g} s is below {LEAST_PAST_STEPS} steps, or above a third of what the "
-        why += f"median run holds beyond the horizon, {spare:.3g} s"
+    past = min(PAST_LENGTHS * passing, spare / 3)
+    if past < LEAST_PAST_STEPS * step:
+        why = f"no memory: a past of {past:.3g} s, {PAST_LENGTHS:g} L/U or a third of what the median run holds beyond "
+        why += f"the horizon, is below {LEAST_PAST_STEPS} steps"
         return Choice("method", [{"name": "drawn", "kind": "path-drawn"}], why)
     lags = [
         float(f"{lag:.6g}") for lag in sorted({step * max(round(share * past / step), 1) for share in LAGS_OF_MEMORY})
     ]
     memory = {"history": lags[:-2], "turned": lags[-2:], "error": [lags[-3]]}
     why = (
-        f"inputs of the last {lags[-1]:g} s ({PAST_IN_WAVE_TIMES:g} sqrt(L / g)): what ship and orders did, and "
-        "what the physics got wrong; validation chooses how much of it is taken. The first instants of a run are left "
-        "out: they have no past"
+        f"inputs of the last {lags[-1]:g} s, {past / passing:.2g} L/U: what ship and orders did, and what the physics "
+        "got wrong; validation chooses how much of it is taken. The first instants of a run are left out: they have no "
+        "past"
     )
     return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
 

@@ -24,6 +24,8 @@ from shipid.study.new import (
     _degraded_families,
     _ordinary_sensors,
     _ordinary_weather,
+    _past_of_method,
+    _proposed_method,
     _true_path,
     _turning_orders,
     amounts_of_data,
@@ -259,6 +261,19 @@ def test_wind_is_that_of_a_small_ship_by_froudes_rule(length: float, wind: float
     assert given["truth.wind_speed"] == [0.0, wind]
     assert given["truth.gusts.kind"] == "npd"
     assert "truth.gusts.kind" not in {one.path for one in _ordinary_weather(load_vessel("mariner"), length, 5.0)}
+
+
+def test_the_past_is_a_time_of_the_ship_at_any_speed() -> None:
+    """A slow model tanker, L / U = 16 s, had no memory: 11.6 sqrt(L / g) are 6 s. Short runs give a shorter past."""
+    random = np.random.default_rng(3)
+    for passing in [16.0, *random.uniform(0.5, 500.0, 20)]:
+        method = _proposed_method(passing, passing / 12, 1e6)
+        assert _past_of_method(method) / passing == pytest.approx(1.5, rel=0.05)  # whole steps
+        short = random.uniform(3.0, 4.0) * passing
+        past = _past_of_method(_proposed_method(passing, passing / 12, short))
+        assert 0.95 * passing <= past <= 1.07 * short / 3
+    for passing, step, spare in [(16.0, 4.0, 1e6), (16.0, 1.0, 20.0), (0.0, 1.0, 1e6), (16.0, 1.0, -5.0)]:
+        assert "memory" not in _proposed_method(passing, step, spare).value[0]
 
 
 def test_sensors_are_those_of_the_ship_at_any_scale() -> None:
