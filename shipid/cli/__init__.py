@@ -66,8 +66,8 @@ def main() -> None:
 
 def print_usage_error(error: Any, _: Any = None) -> None:
     """Print a wrong argument in one line, as `main` prints other errors; that of Typer is four."""
-    command = f"`{error.ctx.command_path} --help` shows what is right" if error.ctx else "try --help"
-    sys.stderr.write(f"error: {' '.join(error.format_message().split()).rstrip('.')}: {command}\n")
+    fault, command = " ".join(error.format_message().split()), error.ctx.command_path if error.ctx else "shipid"
+    sys.stderr.write(f"error: {fault.rstrip('.')}: `{command} --help` shows what is right\n")
 
 
 usage_error: Any = typer.BadParameter.__base__  # Typer, which has its own Click, does not export it

@@ -439,8 +439,8 @@ def _compare_outputs(
         return pd.DataFrame(columns=["output", "unit", "measured", *pair])
     tables = {name: compare_outputs(vessel, part) for name, vessel in pair.items()}
     if north or east:
-        sea, _ = with_current(pair[AFTER], solution.settings, (), (north, east))
-        tables[AFTER] = compare_outputs(sea, part, {"V_c": math.hypot(north, east), "beta_c": math.atan2(east, north)})
+        flow = {"V_c": math.hypot(north, east), "beta_c": math.atan2(east, north)}
+        tables[AFTER] = compare_outputs(with_current(pair[AFTER], solution.settings, (), (north, east))[0], part, flow)
 
     def level(name: str, output: str, column: str) -> float:
         here = tables[name][tables[name]["output"] == output]

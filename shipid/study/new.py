@@ -262,8 +262,10 @@ def _log_in_words(seen: Survey, dataset: Dataset) -> str:
 def _true_path(dataset: Dataset, ahead: float, speed: float) -> Choice:
     """The true path: positions, unless they scatter where the integral of the velocities does not."""
     half, whole = (separation_of_sources(dataset, lag) for lag in (ahead / 2, ahead))
-    apart = f"positions and the integral of u, v, psi part by {half:.2g} m in {ahead / 2:g} s"
-    apart += f", {whole:.2g} m in {ahead:g} s (RMS)"
+    apart = (
+        f"positions and the integral of u, v, psi part by {half:.2g} m in {ahead / 2:g} s, "
+        f"{whole:.2g} m in {ahead:g} s (RMS)"
+    )
     if any(whole < growth * half and whole > share * speed * ahead for growth, share in SCATTER_OF_POSITIONS):
         return Choice("data.path", "velocity", f"{apart}: it grows as positions that scatter do")
     return Choice("data.path", "position", f"{apart}: positions do not scatter")
@@ -343,12 +345,11 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         rpm = shaft_speed(controls, service) / RPM
     except ShipidError as error:
         raise DocumentError(error.message, file=vessel.file, path="particulars.U_0") from None
-    usual = 0.75 * service
-    horizon, why = horizon_of(length, usual, [np.inf])
+    horizon, why = horizon_of(length, 0.75 * service, [np.inf])
     step = step_of(horizon, 0.0)
     ahead = round(horizon / step) * step
     amounts = amounts_of_data(MANOEUVRES - TEST_MANOEUVRES)
-    method = _proposed_method(length / usual, step, np.inf)
+    method = _proposed_method(horizon / LENGTHS_AHEAD, step, np.inf)
     past, ship_time = _past_of_method(method), length / service
     duration = float(f"{ahead + INSTANTS_A_MANOEUVRE * step:.6g}")
     fine = min(_round_number_below(ship_time / STEPS_A_LENGTH), step / 10)
@@ -387,8 +388,10 @@ def _proposed_method(passing: float, step: float, spare: float) -> Choice:
     """
     past = min(PAST_LENGTHS * passing, spare / 3)
     if past < LEAST_PAST_STEPS * step:
-        why = f"no memory: a past of {past:.3g} s, {PAST_LENGTHS:g} L/U or a third of what the median run holds beyond "
-        why += f"the horizon, is below {LEAST_PAST_STEPS} steps"
+        why = (
+            f"no memory: a past of {past:.3g} s, {PAST_LENGTHS:g} L/U or a third of what the median run holds beyond "
+            f"the horizon, is below {LEAST_PAST_STEPS} steps"
+        )
         return Choice("method", [{"name": "drawn", "kind": "path-drawn"}], why)
     lags = [
         float(f"{lag:.6g}") for lag in sorted({step * max(round(share * past / step), 1) for share in LAGS_OF_MEMORY})
@@ -413,17 +416,23 @@ def _ordinary_weather(vessel: Vessel, length: float, service: float) -> list[Cho
     Wind is WIND_SPEED; on a ship below WIND_LENGTH times sqrt(L / WIND_LENGTH), by Froude's rule.
     """
     feels, most = vessel_dynamics(vessel).environment, float(f"{CURRENT_SHARE * service:.2g}")
-    why = f"m/s, over ground, another in each run, unknown to the models: up to {percent_text(CURRENT_SHARE)} of the "
-    why += f"service speed of {service:.3g} m/s, as a weak tide is (0.4 m/s for a ship of 8 m/s)"
-    weather = [Choice("truth.current_speed", [0.0, most], why)]
-    if "V_c" not in feels:
-        weather.append(Choice("truth.set.current.kind", "uniform", "the truth alone drifts: models are as they are"))
-    if "V_w" in feels:
-        wind = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
-        why = f"m/s, from anywhere: at most {WIND_SPEED:g} m/s, on a ship below {WIND_LENGTH:g} m less by Froude's rule"
-        gusts = Choice("truth.gusts.kind", "npd", "ISO 19901-1: a predictor knows the wind of the moment only")
-        weather += [Choice("truth.wind_speed", [0.0, wind], why), gusts]
-    return weather
+    wind = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
+    choices = {
+        "truth.current_speed": (
+            [0.0, most],
+            f"m/s, over ground, another in each run, unknown to the models: up to {percent_text(CURRENT_SHARE)} of the "
+            f"service speed of {service:.3g} m/s, as a weak tide is (0.4 m/s for a ship of 8 m/s)",
+        ),
+        "truth.set.current.kind": ("uniform", "the truth alone drifts: models are as they are"),
+        "truth.wind_speed": (
+            [0.0, wind],
+            f"m/s, from anywhere: {WIND_SPEED:g} m/s at most, on a ship below {WIND_LENGTH:g} m less by Froude's rule",
+        ),
+        "truth.gusts.kind": ("npd", "ISO 19901-1: a predictor knows the wind of the moment only"),
+    }
+    apply = dict.fromkeys(("truth.wind_speed", "truth.gusts.kind"), "V_w" in feels)
+    apply["truth.set.current.kind"] = "V_c" not in feels
+    return [Choice(path, value, why) for path, (value, why) in choices.items() if apply.get(path, True)]
 
 
 def _ordinary_sensors(length: float, service: float) -> list[Choice]:
@@ -433,13 +442,15 @@ def _ordinary_sensors(length: float, service: float) -> list[Choice]:
         SPEED_NOISE * service,
         SPEED_NOISE * service / length,
     )
-    fix = f"m: DGNSS on a ship of 100 m or more, {JITTER_SHARE:g} L below: RTK on a boat, cameras over a model"
-    log = f"m/s: {percent_text(SPEED_NOISE)} of the service speed; IMO MSC.96(72) allows a log 2 %"
     noises = {
-        "north": (position, f"{fix}. Models learn from these fixes; the exact path judges what they predict from them"),
+        "north": (
+            position,
+            f"m: DGNSS on a ship of 100 m or more, {JITTER_SHARE:g} L below: RTK on a boat, cameras over a model. "
+            "Models learn from these fixes; the exact path judges what they predict from them",
+        ),
         "east": (position, "as north"),
         "psi": (COMPASS_NOISE, "rad: 0.25 deg RMS, which IMO A.424(XI) allows a gyro compass"),
-        "u": (speed, log),
+        "u": (speed, f"m/s: {percent_text(SPEED_NOISE)} of the service speed; IMO MSC.96(72) allows a log 2 %"),
         "v": (speed, "as u"),
         "r": (rate, "rad/s: that of u over the length; IMO A.526(13) allows a rate gyro 0.5 deg/min and 5 %"),
     }
@@ -467,8 +478,10 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
         else:
             orders[common] = [value / row.factor for value in row.usual]
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
-    why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the "
-    why += "ship ahead rests"
+    why = (
+        f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the ship "
+        "ahead rests"
+    )
     return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 
 

@@ -175,9 +175,8 @@ def _against_truth(plan: Plan, test: Windows) -> Windows:
     ahead, columns, future = test.step * np.arange(1, test.horizon + 1)[:, None], test.columns, test.future.copy()
     for run, rows in exact.groupby("run", sort=False):
         mine = test.run == run
-        at = [np.interp(test.t[mine] + ahead, rows["t"], rows[name]) for name in ("north", "east")]
-        frame = (columns[name][mine] for name in ("north", "east", "psi"))
-        future[:, mine] = np.stack(to_frame(*at, *frame), axis=-1)
+        at = (np.interp(test.t[mine] + ahead, rows["t"], rows[name]) for name in ("north", "east"))
+        future[:, mine] = np.stack(to_frame(*at, *(columns[name][mine] for name in ("north", "east", "psi"))), axis=-1)
     return replace(test, future=future)
 
 

@@ -303,8 +303,8 @@ def _errors_and_fit(
 
     def replay(ship: Vessel, found: Solution, runs: Sequence[str]) -> FreeRuns:
         """Free runs, in the current of all runs that was estimated with the vessel."""
-        current = found.common_current
-        sea, known = with_current(ship, settings, runs, current) if any(current) else (ship, settings)
+        flows = any(found.common_current)
+        sea, known = with_current(ship, settings, runs, found.common_current) if flows else (ship, settings)
         return simulate_free_runs({name: sea}, dataset, runs, known, ahead)
 
     whole, solution = fit(fitted, ())

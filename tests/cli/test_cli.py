@@ -111,7 +111,7 @@ def test_a_mistake_is_one_line(mistake: str, capfd: pytest.CaptureFixture[str]) 
         (["study", "run"], "Missing argument 'study': `shipid study run --help`"),
         (["study", "run", "quick", "--nonsense"], "No such option: --nonsense: `shipid study run --help`"),
         (["nosuch"], "No such command 'nosuch': `shipid --help`"),
-        (["study", "run", "quick", "--workers", "many"], "'many' is not a valid int"),
+        (["study", "run", "quick", "--workers", "many"], "Invalid value for '--workers': "),
     ],
 )
 def test_a_wrong_argument_is_one_line(arguments: list[str], fault: str) -> None:
