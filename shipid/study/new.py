@@ -479,8 +479,8 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
             orders[common] = [value / row.factor for value in row.usual]
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     why = (
-        f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the ship "
-        "ahead rests"
+        f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the "
+        "ship ahead rests"
     )
     return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 
