@@ -64,6 +64,16 @@ def main() -> None:
         sys.exit(1)
 
 
+def print_usage_error(error: Any, _: Any = None) -> None:
+    """Print a wrong argument in one line, as `main` prints other errors; that of Typer is four."""
+    fault, command = " ".join(error.format_message().split()), error.ctx.command_path if error.ctx else "shipid"
+    sys.stderr.write(f"error: {fault.rstrip('.')}: `{command} --help` shows what is right\n")
+
+
+usage_error: Any = typer.BadParameter.__base__  # Typer, which has its own Click, does not export it
+usage_error.show = print_usage_error
+
+
 def error_line(error: Exception) -> str | None:
     """What went wrong and what helps, for an error that the user can correct; None for a fault of shipid."""
     if isinstance(error, ShipidError):

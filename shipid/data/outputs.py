@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,11 +24,12 @@ def outputs_in_common(vessel: Vessel, dataset: Dataset) -> list[str]:
     return [name for name in dataset.outputs if name in model.outputs]
 
 
-def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
+def predicted_outputs(vessel: Vessel, dataset: Dataset, weather: Mapping[str, float] | None = None) -> pd.DataFrame:
     """Outputs that the vessel predicts in the recorded motion, by the recorded orders, through the actuators' lags.
 
     Returns one row for each row of the dataset, with `run`, `t` [s] and a column [SI] for each of `outputs_in_common`.
-    Nothing is simulated but the actuators, so that errors of the hull do not count. Currents are taken as 0.
+    Nothing is simulated but the actuators, so that errors of the hull do not count. weather : signal of the environment
+    that the log lacks, such as a current -> its value in all runs; 0 by default.
     """
     model, wanted = vessel_dynamics(vessel), outputs_in_common(vessel, dataset)
     places = [list(model.outputs).index(name) for name in wanted]
@@ -35,6 +37,7 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     for run, rows in stretches_of_runs(dataset):
         columns = {str(name): rows[name].to_numpy() for name in rows.columns if name != "run"}
         still = np.zeros(len(rows))
+        columns |= {name: still + value for name, value in (weather or {}).items()}
         motion = columns | body_velocities(columns)
         states = [motion.get(state_column(name), still) for name in (*model.state, *model.hidden)]
         memory = memory_along(vessel, {name: columns[name] for name in model.commands}, columns["t"]) or {}
@@ -49,13 +52,13 @@ def predicted_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def compare_outputs(vessel: Vessel, dataset: Dataset) -> pd.DataFrame:
-    """Measured outputs beside the predicted ones, run by run.
+def compare_outputs(vessel: Vessel, dataset: Dataset, weather: Mapping[str, float] | None = None) -> pd.DataFrame:
+    """Measured outputs beside the predicted ones, run by run; weather : as of `predicted_outputs`.
 
     Returns `output`, `run`, `unit`, `measured` and `predicted` (root mean squares), `scale` (measured over predicted,
     by least squares) and `error` (root mean square of the difference); empty without a common output.
     """
-    predicted = predicted_outputs(vessel, dataset)
+    predicted = predicted_outputs(vessel, dataset, weather)
     measured = pd.concat([rows for _, rows in stretches_of_runs(dataset)], ignore_index=True)
     table: list[dict[str, Any]] = []
     for name in predicted.columns[2:]:

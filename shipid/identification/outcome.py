@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -325,7 +326,7 @@ def run_identification(
             ),
         )
         warnings += _implausible_estimates(vessel, pair[AFTER], solution.values)
-        outputs = _compare_outputs(pair, dataset, fitted)
+        outputs = _compare_outputs(pair, solution, dataset, fitted)
         warnings += tuple(_unused_output_warnings(outputs, settings))
         groups = _errors_by_group(pair[AFTER], solution, dataset, tested or fitted, settings)
         warnings += uneven_side_warnings(groups)
@@ -428,12 +429,18 @@ def _errors_by_group(
     return by_group(series, AFTER, vessel, dataset)
 
 
-def _compare_outputs(pair: Mapping[str, Vessel], dataset: Dataset, runs: Sequence[str]) -> pd.DataFrame:
-    """Measured outputs against those of the vessels, in the recorded motion."""
+def _compare_outputs(
+    pair: Mapping[str, Vessel], solution: Solution, dataset: Dataset, runs: Sequence[str]
+) -> pd.DataFrame:
+    """Measured outputs against those of the vessels, in the recorded motion; as the free runs are, in the current."""
     part = dataset.select(runs)
+    north, east = solution.common_current
     if not outputs_in_common(pair[AFTER], part):
         return pd.DataFrame(columns=["output", "unit", "measured", *pair])
     tables = {name: compare_outputs(vessel, part) for name, vessel in pair.items()}
+    if north or east:
+        flow = {"V_c": math.hypot(north, east), "beta_c": math.atan2(east, north)}
+        tables[AFTER] = compare_outputs(with_current(pair[AFTER], solution.settings, (), (north, east))[0], part, flow)
 
     def level(name: str, output: str, column: str) -> float:
         here = tables[name][tables[name]["output"] == output]

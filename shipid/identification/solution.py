@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.identification.fit import Point
-from shipid.identification.settings import NUISANCES, Identify
+from shipid.identification.settings import NUISANCES, Identify, free_factors
 from shipid.vessel.load import Vessel
 
 Array = NDArray[np.float64]
@@ -72,6 +72,13 @@ class Solution:
             return 0.0, 0.0
         north, east = (self.nuisances[self.runs[0]][name] for name in NUISANCES["current"])
         return north, east
+
+    @property
+    def sizes(self) -> tuple[tuple[float, str], ...]:
+        """Value [SI] of the parameter at each factor of 1, or of a current of all runs [m/s], and its unit, (n,)."""
+        unknown, units = free_factors(self.vessel, self.settings), self.vessel.units
+        named = zip(unknown.paths, unknown.scale, strict=True)
+        return tuple((scales[0], units.get(path, "m/s")) for path, scales in named)
 
     @property
     def identified(self) -> Vessel:

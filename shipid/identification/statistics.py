@@ -74,6 +74,7 @@ class LinearFit:
     spent : (m,) share of each residual that the nuisances have taken (its leverage); 0 without nuisances.
     at_bound : (n,) estimates at a bound. held : (n,) factors that were not free. Neither has an interval.
     dropped : paths of held factors that the drop test removed. runs : name of each run number, or empty.
+    sizes : of each factor of 1 the value and its unit, or empty: how intervals are told where the base is 0.
     """
 
     paths: tuple[str, ...]
@@ -89,6 +90,7 @@ class LinearFit:
     dropped: tuple[str, ...] = ()
     runs: tuple[str, ...] = ()
     centre: Array | None = None
+    sizes: tuple[tuple[float, str], ...] = ()
 
     @classmethod
     def of(cls, solution: Any) -> LinearFit:
@@ -164,7 +166,7 @@ class Statistics:
 
     chosen : form of covariance to report. errors : (n,) standard errors. low, high : (n,) ends of the 95 % intervals.
     alone : (n,) half-widths without the priors. identifiable : (n,) whether that is at most `WIDEST` and neither the
-    interval without the priors nor the one with them holds 0, no effect; 0 may be the truth where the base has it.
+    interval without the priors nor the one with them holds 0, no effect.
     sentences : the result in words, one for each factor. correlations : (n, n). free : paths of the factors that are
     neither held nor at a bound. combinations : sets of these that the data do not distinguish.
     """
@@ -195,8 +197,8 @@ def fit_statistics(fit: LinearFit) -> Statistics:
     """Covariances, 95 % intervals and identifiability of a fit, linear at the estimate.
 
     A factor is identified if its 95 % interval from the data alone is within +-`WIDEST` base values, and excludes no
-    effect (0) with and without the priors, unless the base has none; collinearity explains a wider one. The profile
-    likelihood (`shipid.identification.profile`) shows whether that is finite.
+    effect (0) with and without the priors; collinearity explains a wider one. The profile likelihood
+    (`shipid.identification.profile`) shows whether that is finite.
     """
     free = _free_places(fit)
     if not len(free):
@@ -219,9 +221,7 @@ def fit_statistics(fit: LinearFit) -> Statistics:
         for name, values in {"errors": errors, "half": half, "alone": alone}.items()
     }
     identifiable = np.zeros(n, dtype=bool)
-    begun_at_0 = np.zeros(n, dtype=bool) if fit.centre is None else np.asarray(fit.centre) == 0
-    effect = (np.abs(by_data) > alone) & (np.abs(inner.factors) > half)
-    identifiable[free] = (alone <= WIDEST) & (effect | begun_at_0[free])
+    identifiable[free] = (alone <= WIDEST) & (np.abs(by_data) > alone) & (np.abs(inner.factors) > half)
     correlations = np.eye(n)
     scale = np.where(best.errors > 0, best.errors, 1.0)
     correlations[np.ix_(free, free)] = best.matrix / np.outer(scale, scale)
@@ -674,8 +674,9 @@ def _factor_sentences(
     shared = _width_inflation(fit, free)
     for j, (path, name) in enumerate(zip(fit.paths, short_names(fit.paths), strict=True)):
         together = next((combination for combination in sets if path in combination.paths), None)
-        of_what = "its base value" if fit.centre is None or fit.centre[j] else "its scale"
-        known = f"{name} is known to +-{significant_digits(100 * half[j], 2)} % of {of_what}"
+        of_base = fit.centre is None or fit.centre[j] or not fit.sizes
+        size, unit = (100.0, "% of its base value") if of_base else fit.sizes[j]
+        known = f"{name} is known to +-{significant_digits(abs(size) * half[j], 2)} {unit}"
         if path in fit.dropped:
             sentences.append(f"{name} was dropped, to {fit.factors[j]:.4g}: the data do not support a change")
         elif fit.held is not None and fit.held[j]:
@@ -694,9 +695,7 @@ def _factor_sentences(
         elif np.isfinite(alone[j]):
             why = "hardly excited" if alone[j] > WIDEST * shared[j] else "others do a part of the same"
             why = why if alone[j] > WIDEST else "its interval holds 0, no effect"
-            sentences.append(
-                f"{name} is not identified: +-{significant_digits(100 * alone[j], 2)} % of {of_what}, {why}"
-            )
+            sentences.append(f"{name} is not identified: +-{significant_digits(abs(size) * alone[j], 2)} {unit}, {why}")
         else:
             sentences.append(f"{name} is not identified: no independent effect on these data")
     return tuple(sentences)

@@ -157,8 +157,8 @@ def estimates_figure(content: IdentificationContent) -> PageFigure:
         id="estimates",
         title="The estimates",
         takeaway=f"Not identified: {join_few_names(vague, 8)}." if vague else "Every parameter is identified.",
-        how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the runs alone, without priors, leave "
-        "an interval wider than ±100 % of the base value, or the estimate is at a bound or was dropped."
+        how="Dot: estimate; bar: 95 % interval; dotted: the base value. Hollow: the interval holds 0, no effect, or is "
+        "wider than ±100 % of the base value by the runs alone, without priors; or a bound or a drop ended the fit."
         + (
             f" The base has 0 for {join_few_names(none, 8)}: there factors are on the scale, which is dotted."
             if none

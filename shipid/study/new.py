@@ -8,6 +8,7 @@ import textwrap
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from shipid.simulation.standard import shaft_speed
 from shipid.study.plan import Plan, build_plan
 from shipid.study.prepare import obtain_runs, partition, prepare
 from shipid.study.survey import Look, Survey, first_look, separation_of_sources, survey_dataset, typical_runs
-from shipid.units import GRAVITY, RPM, plural_word
+from shipid.units import RPM, percent_text, plural_word
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import derivative_order
@@ -39,6 +40,8 @@ MOST_AMOUNTS, MOST_STUDY_WINDOWS = 6, 20000
 # Ship lengths: the paper's experiments look 2.3 (15 s at full scale) and 2.4 (30 s, simulated) ahead.
 LENGTHS_AHEAD = 2.5
 WIND_SPEED, WIND_LENGTH = 6.0, 28.9  # m/s, m: up to a moderate breeze on R/V Gunnerus, as in the bundled studies
+CURRENT_SHARE, SPEED_NOISE = 0.05, 0.005  # of the service speed
+MOST_JITTER, JITTER_SHARE, COMPASS_NOISE = 0.5, 1 / 200, 0.0044  # m, of the length, rad
 SHARE_OF_RUN = 1 / 3  # of the median run that the horizon may take
 STEP_PARTS = (1, 2, 4, 8)  # of the step: a small craft is stiff in yaw
 STEPS_AHEAD, STEPS_AHEAD_OF_LOG, LONGEST_STEP = 15, 30, 2.0  # least, of constant and of recorded orders; s
@@ -51,7 +54,7 @@ Shares of the way: a towing carriage 1e-4, jitter of 0.3 m on a ship of 30 m 0.0
 """
 RUNS_FOR_FOLDS, PROPOSED_FOLDS = 6, 3
 MANOEUVRES, TEST_MANOEUVRES, INSTANTS_A_MANOEUVRE = 60, 10, 50  # of a simulated study
-PAST_IN_WAVE_TIMES, LEAST_PAST_STEPS = 11.6, 8  # sqrt(L / g): 20 s of a ship of 29 m; steps
+PAST_LENGTHS, LEAST_PAST_STEPS = 1.5, 8  # L / U: of 0.8, 1.5, 2.5 and 11.6 sqrt(L / g) the best on four ships; steps
 LAGS_OF_MEMORY = (0.1, 0.2, 0.4, 0.5, 1.0)  # shares of the past
 HELM_DEG, STEPS_A_LENGTH = 35.0, 150  # the helm of a turning circle (MSC.137(76)); of the truth
 STEERING_DERIVATIVES = ("N_ur", "Y_ur", "N_uv", "N_r", "Y_r", "N_v")  # linear in v, r at a speed
@@ -154,8 +157,9 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     """A study of all vessels on recorded runs; the first one is made inaccurate, too (method, section 5)."""
     every, first = survey_dataset(dataset), next(iter(vessels.values()))
     ahead, step, why = proposed_horizon(first, every)
+    passing = (first.length or 0.0) / every.speed if every.speed > 0 else 0.0
     for spare in (float(every.runs["duration"].median()) - ahead, 0.0):
-        method = _proposed_method(first.length, step, spare)
+        method = _proposed_method(passing, step, spare)
         usable = _runs_that_hold(dataset, ahead, step, _past_of_method(method))
         if len(usable) > LEAST_AMOUNT:
             break
@@ -258,8 +262,10 @@ def _log_in_words(seen: Survey, dataset: Dataset) -> str:
 def _true_path(dataset: Dataset, ahead: float, speed: float) -> Choice:
     """The true path: positions, unless they scatter where the integral of the velocities does not."""
     half, whole = (separation_of_sources(dataset, lag) for lag in (ahead / 2, ahead))
-    apart = f"positions and the integral of u, v, psi part by {half:.2g} m in {ahead / 2:g} s"
-    apart += f", {whole:.2g} m in {ahead:g} s (RMS)"
+    apart = (
+        f"positions and the integral of u, v, psi part by {half:.2g} m in {ahead / 2:g} s, "
+        f"{whole:.2g} m in {ahead:g} s (RMS)"
+    )
     if any(whole < growth * half and whole > share * speed * ahead for growth, share in SCATTER_OF_POSITIONS):
         return Choice("data.path", "velocity", f"{apart}: it grows as positions that scatter do")
     return Choice("data.path", "position", f"{apart}: positions do not scatter")
@@ -343,7 +349,7 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     step = step_of(horizon, 0.0)
     ahead = round(horizon / step) * step
     amounts = amounts_of_data(MANOEUVRES - TEST_MANOEUVRES)
-    method = _proposed_method(length, step, np.inf)
+    method = _proposed_method(horizon / LENGTHS_AHEAD, step, np.inf)
     past, ship_time = _past_of_method(method), length / service
     duration = float(f"{ahead + INSTANTS_A_MANOEUVRE * step:.6g}")
     fine = min(_round_number_below(ship_time / STEPS_A_LENGTH), step / 10)
@@ -357,8 +363,9 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
         Choice("truth.duration", duration, f"s: {INSTANTS_A_MANOEUVRE} instants and the horizon"),
         Choice("truth.step", fine, f"s: the ship takes {ship_time:.3g} s for its length"),
         Choice("truth.interval", step, "s between logged rows"),
-        *([_wind_for_length(length)] if "V_w" in vessel_dynamics(vessel).environment else []),
+        *_ordinary_weather(vessel, length, service),
         _turning_orders(controls, service, rpm),
+        *_ordinary_sensors(length, service),
         Choice("split.test", TEST_MANOEUVRES, f"manoeuvres, drawn: a sixth of {MANOEUVRES}"),
         Choice("split.folds", 1, "with the method `path-drawn` every run validates in turn"),
         Choice("prediction.ahead", float(f"{ahead:.9g}"), why),
@@ -373,24 +380,27 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     return Draft(_study_text(choices), choices, plan)
 
 
-def _proposed_method(length: float | None, step: float, spare: float) -> Choice:
+def _proposed_method(passing: float, step: float, spare: float) -> Choice:
     """Compensation of the path with a memory, which validation may refuse; without one where runs are too short.
 
-    spare : time [s] of the median run beyond the horizon; a third of it may be past.
+    passing : time [s] in which the ship runs its length; 0: not known. spare : time [s] of the median run beyond the
+        horizon; a third of it may be past.
     """
-    past = PAST_IN_WAVE_TIMES * float(np.sqrt((length or 0.0) / GRAVITY))
-    if not LEAST_PAST_STEPS * step <= past <= spare / 3:
-        why = f"no memory: a past of {past:.3g} s is below {LEAST_PAST_STEPS} steps, or above a third of what the "
-        why += f"median run holds beyond the horizon, {spare:.3g} s"
+    past = min(PAST_LENGTHS * passing, spare / 3)
+    if past < LEAST_PAST_STEPS * step:
+        why = (
+            f"no memory: a past of {past:.3g} s, {PAST_LENGTHS:g} L/U or a third of what the median run holds beyond "
+            f"the horizon, is below {LEAST_PAST_STEPS} steps"
+        )
         return Choice("method", [{"name": "drawn", "kind": "path-drawn"}], why)
     lags = [
         float(f"{lag:.6g}") for lag in sorted({step * max(round(share * past / step), 1) for share in LAGS_OF_MEMORY})
     ]
     memory = {"history": lags[:-2], "turned": lags[-2:], "error": [lags[-3]]}
     why = (
-        f"inputs of the last {lags[-1]:g} s ({PAST_IN_WAVE_TIMES:g} sqrt(L / g)): what ship and orders did, and "
-        "what the physics got wrong; validation chooses how much of it is taken. The first instants of a run are left "
-        "out: they have no past"
+        f"inputs of the last {lags[-1]:g} s, {past / passing:.2g} L/U: what ship and orders did, and what the physics "
+        "got wrong; validation chooses how much of it is taken. The first instants of a run are left out: they have no "
+        "past"
     )
     return Choice("method", [{"name": "memory", "kind": "path-drawn", "choose": True, "memory": memory}], why)
 
@@ -400,11 +410,51 @@ def _past_of_method(method: Choice) -> float:
     return float(max(method.value[0].get("memory", {}).get("turned", [0.0])))
 
 
-def _wind_for_length(length: float) -> Choice:
-    """Wind for a ship of a length [m]: WIND_SPEED; below WIND_LENGTH times sqrt(L / WIND_LENGTH), by Froude's rule."""
-    speed = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
-    why = f"m/s, from anywhere: at most {WIND_SPEED:g} m/s, on a ship below {WIND_LENGTH:g} m less by Froude's rule"
-    return Choice("truth.wind_speed", [0.0, speed], why)
+def _ordinary_weather(vessel: Vessel, length: float, service: float) -> list[Choice]:
+    """A current that no model knows; gusts where the vessel feels wind: without them nothing disturbs the truth.
+
+    Wind is WIND_SPEED; on a ship below WIND_LENGTH times sqrt(L / WIND_LENGTH), by Froude's rule.
+    """
+    feels, most = vessel_dynamics(vessel).environment, float(f"{CURRENT_SHARE * service:.2g}")
+    wind = float(f"{WIND_SPEED * min(length / WIND_LENGTH, 1.0) ** 0.5:.2g}")
+    choices = {
+        "truth.current_speed": (
+            [0.0, most],
+            f"m/s, over ground, another in each run, unknown to the models: up to {percent_text(CURRENT_SHARE)} of the "
+            f"service speed of {service:.3g} m/s, as a weak tide is (0.4 m/s for a ship of 8 m/s)",
+        ),
+        "truth.set.current.kind": ("uniform", "the truth alone drifts: models are as they are"),
+        "truth.wind_speed": (
+            [0.0, wind],
+            f"m/s, from anywhere: {WIND_SPEED:g} m/s at most, on a ship below {WIND_LENGTH:g} m less by Froude's rule",
+        ),
+        "truth.gusts.kind": ("npd", "ISO 19901-1: a predictor knows the wind of the moment only"),
+    }
+    apply = dict.fromkeys(("truth.wind_speed", "truth.gusts.kind"), "V_w" in feels)
+    apply["truth.set.current.kind"] = "V_c" not in feels
+    return [Choice(path, value, why) for path, (value, why) in choices.items() if apply.get(path, True)]
+
+
+def _ordinary_sensors(length: float, service: float) -> list[Choice]:
+    """Noise of ordinary sensors, scaled with the ship, so that an error has a floor; test paths are the exact ones."""
+    position, speed, rate = (
+        min(MOST_JITTER, JITTER_SHARE * length),
+        SPEED_NOISE * service,
+        SPEED_NOISE * service / length,
+    )
+    noises = {
+        "north": (
+            position,
+            f"m: DGNSS on a ship of 100 m or more, {JITTER_SHARE:g} L below: RTK on a boat, cameras over a model. "
+            "Models learn from these fixes; the exact path judges what they predict from them",
+        ),
+        "east": (position, "as north"),
+        "psi": (COMPASS_NOISE, "rad: 0.25 deg RMS, which IMO A.424(XI) allows a gyro compass"),
+        "u": (speed, f"m/s: {percent_text(SPEED_NOISE)} of the service speed; IMO MSC.96(72) allows a log 2 %"),
+        "v": (speed, "as u"),
+        "r": (rate, "rad/s: that of u over the length; IMO A.526(13) allows a rate gyro 0.5 deg/min and 5 %"),
+    }
+    return [Choice(f"truth.sensors.{name}.noise", float(f"{noise:.2g}"), why) for name, (noise, why) in noises.items()]
 
 
 def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
@@ -428,8 +478,10 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
         else:
             orders[common] = [value / row.factor for value in row.usual]
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
-    why = f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the "
-    why += "ship ahead rests"
+    why = (
+        f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the "
+        "ship ahead rests"
+    )
     return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 
 
@@ -444,7 +496,7 @@ def _degraded_families(named: str, vessel: Vessel) -> list[dict[str, Any]]:
     moderate = {"parameters": damping, "factor": [0.4, 1.6]}
     high = {"parameters": [path for path in INERTIA_PATHS if path in vessel.parameters], "factor": [0.6, 1.4]}
     words = (
-        "the numbers of the truth: the error that steps and held orders leave",
+        "the numbers of the truth: the error that current, gusts and sensors leave",
         "each hull coefficient times a separate factor in 0.4-1.6",
         "as moderate, and mass, yaw inertia and added mass times factors in 0.6-1.4",
     )
@@ -466,9 +518,10 @@ def _study_text(choices: Sequence[Choice], warnings: Sequence[str] = ()) -> str:
     blocks = {"": _comment([*head, *(f"NOTE {one}" for one in warnings)])}
     last = {"method": "", "family": ""}  # lists of tables: what follows them in the file would belong to them
     for choice in choices:
-        block, _, key = choice.path.rpartition(".")
+        block = choice.path.rpartition(".")[0]
         title = f"[{block}]\n" if block else ""
-        value = tomlkit.dumps({block: {key: choice.value}} if block else {key: choice.value}).removeprefix(title)
+        nested = reduce(lambda inner, part: {part: inner}, reversed(choice.path.split(".")), choice.value)
+        value = tomlkit.dumps(nested).removeprefix(title)
         text = f"{_comment([choice.why])}{value}"
         if choice.path in last:
             last[choice.path] = text

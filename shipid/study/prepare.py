@@ -37,6 +37,7 @@ from shipid.data.windows import (
     nested_runs,
     part_folds,
     run_folds,
+    to_frame,
     windows_over_spans,
 )
 from shipid.engine.casadi import memory_along
@@ -153,7 +154,7 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
     with _name_study_file(plan):
         windows = all_windows(plan, dataset)
         is_test = np.isin(windows.run, _test_runs(plan.study, windows))
-        test, rest = windows.select(is_test), windows.select(~is_test)
+        test, rest = _against_truth(plan, windows.select(is_test)), windows.select(~is_test)
         coarse = coarse_in_words(dataset, windows.step)
         notes = [
             *([coarse] if coarse else []),
@@ -167,6 +168,20 @@ def partition(plan: Plan, dataset: Dataset) -> tuple[Windows, Windows, list[str]
             rest = rest.select(~touching)
         _check_amounts(plan, rest, len(test.spans))
     return rest, test, notes
+
+
+def _against_truth(plan: Plan, test: Windows) -> Windows:
+    """Test windows of a simulated study with the exact future path, seen from the measured position and heading."""
+    truth = plan.study.truth
+    if truth is None or plan.truth is None or not truth.sensors:
+        return test
+    exact = simulate_truth(truth.model_copy(update={"sensors": {}, "interval": truth.step}), plan.truth)
+    ahead, columns, future = test.step * np.arange(1, test.horizon + 1)[:, None], test.columns, test.future.copy()
+    for run, rows in exact.groupby("run", sort=False):
+        mine = test.run == run
+        at = (np.interp(test.t[mine] + ahead, rows["t"], rows[name]) for name in ("north", "east"))
+        future[:, mine] = np.stack(to_frame(*at, *(columns[name][mine] for name in ("north", "east", "psi"))), axis=-1)
+    return replace(test, future=future)
 
 
 def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:

@@ -25,7 +25,7 @@ from shipid.errors import DataError, ShipidError
 from shipid.evidence import FEWEST_RUNS, paired_difference, which_significant
 from shipid.files import write_new
 from shipid.identification.bands import Measure, band_refusal, check_level, measure_bands
-from shipid.identification.free_run import ALL, FreeRuns, check_length, simulate_free_runs
+from shipid.identification.free_run import ALL, FreeRuns, check_length, simulate_free_runs, with_current
 from shipid.identification.outcome import (
     ERRORS_OF,
     TRIED,
@@ -301,16 +301,22 @@ def _errors_and_fit(
             raise ShipidError(solution.sentence)
         return other.vessel.with_values(solution.values), solution
 
+    def replay(ship: Vessel, found: Solution, runs: Sequence[str]) -> FreeRuns:
+        """Free runs, in the current of all runs that was estimated with the vessel."""
+        flows = any(found.common_current)
+        sea, known = with_current(ship, settings, runs, found.common_current) if flows else (ship, settings)
+        return simulate_free_runs({name: sea}, dataset, runs, known, ahead)
+
     whole, solution = fit(fitted, ())
     frames, series = [], []
     for part in parts:
         rest = [run for run in fitted if run not in part]
-        replayed = simulate_free_runs({name: fit(rest, part)[0]}, dataset, part, settings, ahead)
+        replayed = replay(*fit(rest, part), part)
         frames.append(replayed.errors[replayed.errors["run"] != ALL])
         series.append(replayed.series)
     errors = [_with_mean(pd.concat(frames, ignore_index=True)).assign(set="folds")]
     if tested:
-        test: FreeRuns = simulate_free_runs({name: whole}, dataset, tested, settings, ahead)
+        test = replay(whole, solution, tested)
         errors.append(_with_mean(test.errors[test.errors["run"] != ALL]).assign(set="test"))
     judged = fit_statistics(LinearFit.of(solution))
     caution = band_refusal(solution, judged, residual_spacing(solution))

@@ -105,6 +105,23 @@ def test_a_mistake_is_one_line(mistake: str, capfd: pytest.CaptureFixture[str]) 
     assert remedy in err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["study", "run"], "Missing argument 'study': `shipid study run --help`"),
+        (["study", "run", "quick", "--nonsense"], "No such option: --nonsense: `shipid study run --help`"),
+        (["nosuch"], "No such command 'nosuch': `shipid --help`"),
+        (["study", "run", "quick", "--workers", "many"], "Invalid value for '--workers': "),
+    ],
+)
+def test_a_wrong_argument_is_one_line(arguments: list[str], fault: str) -> None:
+    """It was four: usage, a hint, a blank and the fault."""
+    status, out, err = ended(*arguments)
+    assert (status, out) == (2, "")
+    assert re.fullmatch(r"error: [^\n]*\n", err)
+    assert fault in err
+
+
 def test_an_argument_that_is_not_utf_8_is_refused_before_any_work() -> None:
     """Documents, pages and tables would have to name the file."""
     code, _, error = ended("study", "run", os.fsdecode(b"caf\xe9.toml"))

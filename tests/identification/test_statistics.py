@@ -416,9 +416,20 @@ def test_what_may_have_no_effect_is_not_identified() -> None:
     assert (after.identifiable[1:] == before.identifiable[1:]).all()
 
 
-def test_what_is_nothing_at_the_base_may_be_identified_as_nothing() -> None:
-    """A current of 0 known to +-1 mm/s, and a number whose base is 0, were not identified."""
-    fit = one()
-    first = np.arange(len(fit.factors)) == 0
-    small = replace(fit, factors=np.where(first, 1e-3, fit.factors), centre=np.where(first, 0.0, 1.0))
-    assert fit_statistics(small).identifiable[0]
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_is_called_identified_whose_interval_holds_no_effect(seed: int) -> None:
+    """Also a current, or a number whose base is 0: its sentence has its unit, and no share of a scale."""
+    rng = np.random.default_rng(seed)
+    fit = one(float(rng.choice([0.0, 0.8])), prior_widths=rng.choice([0.01, 0.3, np.inf], COUNT))
+    shown = replace(
+        fit, factors=rng.choice([0.0, 1e-3, 0.1, 1.0], COUNT) * rng.choice([-1, 1], COUNT),
+        centre=rng.choice([0.0, 1.0], COUNT), sizes=((-5.0, "m/s"),) * COUNT,
+    )  # fmt: skip
+    judged = fit_statistics(shown)
+    no_effect = (judged.low <= 0) & (judged.high >= 0)
+    assert no_effect.any()
+    assert not judged.identifiable[no_effect].any()
+    for known, sentence, centre in zip(judged.identifiable, judged.sentences, shown.centre, strict=True):
+        assert (" is not identified: " in sentence) != known
+        assert re.search(r"\+-[\d.]+ m/s" if centre == 0 else r"\+-[\d.]+ % of its base value", sentence)
+        assert "scale" not in sentence

@@ -22,9 +22,12 @@ from shipid.study.new import (
     LEAST_AMOUNT,
     SHARE_OF_RUN,
     _degraded_families,
+    _ordinary_sensors,
+    _ordinary_weather,
+    _past_of_method,
+    _proposed_method,
     _true_path,
     _turning_orders,
-    _wind_for_length,
     amounts_of_data,
     draft_study,
     horizon_of,
@@ -36,7 +39,7 @@ from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
 from shipid.vessel.template import Particulars, first_guess
-from tests.study.tiny import logged
+from tests.study.tiny import logged, physics_errors
 
 SHIP = "gunnerus-33.9"
 
@@ -234,6 +237,8 @@ def test_without_data_the_vessel_is_simulated(tmp_path: Path, vessel: str) -> No
     truth = plan.study.truth
     assert truth is not None
     assert truth.duration >= plan.study.prediction.horizon * plan.study.prediction.step
+    error = physics_errors(prepare(plan, obtain_runs(plan)), "nominal")["mean"]
+    assert error > 1.2 * truth.sensors["north"].noise  # mean distance of a fix: sqrt(pi / 2) standard deviations
     assert max(plan.study.grid.N_D) == truth.manoeuvres - plan.study.split.test  # type: ignore[operator]
 
 
@@ -252,7 +257,37 @@ def test_every_coefficient_of_the_hull_is_degraded_families(name: str) -> None:
     [(300.0, 6.0), (28.9, 6.0), (4.0, 2.2)],  # 6 sqrt(L / 28.9)
 )
 def test_wind_is_that_of_a_small_ship_by_froudes_rule(length: float, wind: float) -> None:
-    assert _wind_for_length(length).value == [0.0, wind]
+    given = {one.path: one.value for one in _ordinary_weather(load_vessel(SHIP), length, 5.0)}
+    assert given["truth.wind_speed"] == [0.0, wind]
+    assert given["truth.gusts.kind"] == "npd"
+    assert "truth.gusts.kind" not in {one.path for one in _ordinary_weather(load_vessel("mariner"), length, 5.0)}
+
+
+def test_the_past_is_a_time_of_the_ship_at_any_speed() -> None:
+    """A slow model tanker, L / U = 16 s, had no memory: 11.6 sqrt(L / g) are 6 s. Short runs give a shorter past."""
+    random = np.random.default_rng(3)
+    for passing in [16.0, *random.uniform(0.5, 500.0, 20)]:
+        method = _proposed_method(passing, passing / 12, 1e6)
+        assert _past_of_method(method) / passing == pytest.approx(1.5, rel=0.05)  # whole steps
+        short = random.uniform(3.0, 4.0) * passing
+        past = _past_of_method(_proposed_method(passing, passing / 12, short))
+        assert 0.95 * passing <= past <= 1.07 * short / 3
+    for passing, step, spare in [(16.0, 4.0, 1e6), (16.0, 1.0, 20.0), (0.0, 1.0, 1e6), (16.0, 1.0, -5.0)]:
+        assert "memory" not in _proposed_method(passing, step, spare).value[0]
+
+
+def test_sensors_are_those_of_the_ship_at_any_scale() -> None:
+    """A model at Froude's scale has the noise of its ship in its own lengths and times, but a ship has one fix."""
+    random = np.random.default_rng(11)
+    for length, scale in zip(random.uniform(1, 100, 20), random.uniform(0.01, 1, 20), strict=True):
+        ship, model = (
+            {one.path.split(".")[2]: one.value for one in _ordinary_sensors(length * k, 7.0 * k**0.5)}
+            for k in (1.0, scale)
+        )
+        units = {"north": scale, "east": scale, "psi": 1.0, "u": scale**0.5, "v": scale**0.5, "r": scale**-0.5}
+        assert all(model[name] == pytest.approx(ship[name] * units[name], rel=0.1) for name in units)  # two digits
+        assert all(one.why for one in _ordinary_sensors(length, 7.0))
+    assert _ordinary_sensors(400.0, 8.0)[0].value == 0.5
 
 
 def test_a_ship_without_helm_gets_an_order_for_each_screw() -> None:

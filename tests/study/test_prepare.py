@@ -15,7 +15,7 @@ import tomlkit
 
 from shipid.answer.sentences import answer_sentences
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows, cut_windows
+from shipid.data.windows import Windows, cut_windows, from_frame
 from shipid.errors import DataError, DivergenceError, DocumentError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
@@ -34,6 +34,7 @@ from shipid.study.prepare import (
     kinds_of_runs,
     obtain_runs,
     over_gaps,
+    partition,
     prepare,
     runs_by_amount,
     window_memory,
@@ -106,6 +107,22 @@ def test_the_model_of_the_truth_is_exact(tmp_path: Path) -> None:
     assert physics_errors(prepared, "right")["rms"] < 1e-9
     assert physics_errors(prepared, "wrong-1")["mean"] > 0.01
     np.testing.assert_array_equal(prepared.test_paths["none"], 0.0)
+
+
+def test_noisy_fixes_are_judged_against_the_exact_path(tmp_path: Path) -> None:
+    """Exact physics errs by the fix that it starts from; what trains is the log, and the tracks are the same."""
+    exact, noisy = (
+        tiny_plan(tmp_path, {"truth.interval": 1.0, "truth.sensors": sensors})
+        for sensors in ({}, {name: {"noise": 0.5} for name in ("north", "east")})
+    )
+    one, two = (partition(plan, obtain_runs(plan)) for plan in (exact, noisy))
+    start = [two[1].columns[name] - one[1].columns[name] for name in ("north", "east")]
+    tracks = [from_frame(*np.moveaxis(w.future, -1, 0), *(w.columns[name] for name in ("north", "east", "psi")))
+              for w in (one[1], two[1])]  # fmt: skip
+    np.testing.assert_allclose(tracks[0], tracks[1], atol=1e-9)
+    errors = position_error(one[1].future, two[1].future)
+    np.testing.assert_allclose(errors, np.broadcast_to(np.hypot(*start), errors.shape), atol=1e-9)
+    assert position_error(one[0].future, two[0].future).mean() == pytest.approx(0.5 * np.sqrt(np.pi), rel=0.1)
 
 
 def test_members_that_diverge_in_training_are_redrawn_where_the_family_asks_for_it(

@@ -49,7 +49,7 @@ def test_what_is_shown_is_among_what_identify_compares() -> None:
     assert all(set(shown) < set(COMPARED[kind]) for kind, shown in MEASURES_SHOWN.items())
 
 
-def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
+def zigzags(vessel: Vessel, seed: int = 0, **weather: Any) -> Dataset:
     """Six noisy zigzags at two speeds."""
     runs = [
         Zigzag(
@@ -63,7 +63,7 @@ def zigzags(vessel: Vessel, seed: int = 0) -> Dataset:
         )
         for a, b, n, side in TRIALS
     ]  # type: ignore[arg-type]
-    frame = perform_manoeuvres(vessel, runs, step=0.1, interval=0.5)
+    frame = perform_manoeuvres(vessel, runs, step=0.1, interval=0.5, **weather)
     rng = np.random.default_rng(seed)
     for name, deviation in NOISE.items():
         frame[name] += rng.normal(0, deviation, len(frame))
@@ -169,6 +169,19 @@ def test_a_run_held_out_decides_nothing_in_the_fit_that_predicts_it(monkeypatch:
     assert [runs for runs, _ in plain] == [runs for runs, _ in changed]
     for (runs, one), (_, other) in zip(plain, changed, strict=True):
         assert (one == other) == (data.runs[0] not in runs)
+
+
+@pytest.mark.slow
+def test_a_current_of_all_runs_is_that_of_the_runs_held_out() -> None:
+    """Each fold estimates it, and its free runs are in it; they were in still water."""
+    flow = {"V_c": np.full(len(TRIALS), 0.1), "beta_c": np.full(len(TRIALS), 0.7)}
+    data = zigzags(SHIP.with_values({"current.kind": "uniform"}), environment=flow)
+    found = {}
+    for current in ("one", "none"):
+        settings = SETTINGS.model_copy(update={"parameters": ["hull.mmg.R_0"], "current": current})
+        compared = compare_structures(SHIP, data, settings, ["present"], ahead=20.0, folds=2, level=None)
+        found[current] = compared.table["position"].iloc[0]
+    assert found["one"] < 0.2 * found["none"]
 
 
 def table_of(position: np.ndarray) -> pd.DataFrame:
