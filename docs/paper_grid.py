@@ -148,7 +148,7 @@ def main() -> None:
     end, plan = time.monotonic() + 3600 * given.hours, read_plan("simulation")
     if not FILE.exists():
         FILE.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
-    if not given.run.exists():
+    if given.hours and not given.run.exists():
         for event in prepare_study(plan, given.run):
             print(event.text, file=sys.stderr)
     for number in missing_cells(plan, pd.read_csv(FILE)):

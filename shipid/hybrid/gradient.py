@@ -17,13 +17,13 @@ from math import ceil
 import numpy as np
 import optuna
 
-from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths, smooth_basis
-from shipid.hybrid.features import Inputs, choose_features, input_group
+from shipid.hybrid.compensator import Compensator, Layers, Network, flatten_paths, smooth_basis
+from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
 from shipid.hybrid.method import Array, FitResult, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.search import Search, best_trials, mean_squared_error, seed_of, setting_at_share, trial_row
-from shipid.hybrid.training import Layers, Learner, Length, StackTraining
+from shipid.hybrid.training import Learner, Length, StackTraining
 from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
@@ -127,11 +127,7 @@ class _Trainer:
         place = (fold, input_table_key(table))
         if place not in self._seen:
             training = {name: values[self.task.folds[fold][0]] for name, values in table.items()}
-            if self.method.mirror:
-                varying = VaryingInputs.of(training, mirror=True)
-            else:
-                features = choose_features(training)
-                varying = VaryingInputs(features, Normaliser.fit(training, tuple(features)), None)
+            varying = VaryingInputs.of(training, self.method.mirror)
             self._seen[place] = varying, varying.normaliser.apply(table)
         return self._seen[place]
 
@@ -175,7 +171,19 @@ class _Trainer:
 
     def train(self, asked: Mapping[Trial, Mapping[str, float]]) -> dict[Trial, _TrialOutcome]:
         """Train the networks of some trials; several of a model race."""
-        running = [self._begin(members) for members in self._stacks(asked)]
+        running = [
+            (
+                members,
+                StackTraining(
+                    [one.learner for one in members],
+                    self.length,
+                    order_seed=seed_of(self.task.seed, members[0].trial[1], members[0].fold),
+                    reflection=members[0].varying.reflection,
+                    device=self.task.device,
+                ),
+            )
+            for members in self._stacks(asked)
+        ]
         seconds = dict.fromkeys(asked, 0.0)
         stopped: set[Trial] = set()
         per_model = len(asked) // len(self.tables)
@@ -196,18 +204,6 @@ class _Trainer:
                 row["state"] = "stopped"
             outcomes[trial] = _TrialOutcome(row, networks)
         return outcomes
-
-    def _begin(self, members: list[_StackMember]) -> _RunningStack:
-        """Begin to train a stack."""
-        first = members[0]
-        training = StackTraining(
-            [one.learner for one in members],
-            self.length,
-            order_seed=seed_of(self.task.seed, first.trial[1], first.fold),
-            reflection=first.varying.reflection,
-            device=self.task.device,
-        )
-        return members, training
 
     def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None) -> FitResult:
         """The networks of the best trial; those of an earlier session are trained once more, in the same company."""
