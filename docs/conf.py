@@ -16,6 +16,8 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 from pages import commands_page, mapping_page, python_page, study_page, vessel_page  # noqa: E402
+from paper_grid import figures_page  # noqa: E402
+from pictures import PLOTLY  # noqa: E402
 from records import unsupported  # noqa: E402
 
 from shipid import __version__  # noqa: E402
@@ -31,6 +33,7 @@ MADE = {
     "keys-vessel": vessel_page,
     "keys-mapping": mapping_page,
     "options": commands_page,
+    "paper-grid": figures_page,
 }
 
 extensions = ["myst_nb"]
@@ -41,7 +44,7 @@ exclude_patterns = ["_build", "README.md"]
 
 html_theme = "furo"
 html_title = "shipid"
-html_static_path = ["_static"]
+html_static_path = ["_static", str(PLOTLY)]  # with what draws the figures of the reports
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_copyright = False

@@ -3,7 +3,8 @@
 `python docs/records.py paper-grid python docs/paper_grid.py RUN --hours 2` computes cells that
 `docs/records/paper-grid.csv` lacks, in the folder RUN, adds each to that file as it ends, and writes their table as the
 record. Amounts of 10, 30 and 100 runs come first. It may be interrupted at any time: a cell goes on from its last trial
-as long as RUN is there.
+as long as RUN is there. With `--drawn` it computes the cells of `path-drawn` at the first amounts, all at once, and
+writes `docs/records/paper-grid-drawn.csv`. The site draws figures 8, 9 and 10 of both files whenever it is built.
 """
 
 from __future__ import annotations
@@ -12,17 +13,22 @@ import argparse
 import shutil
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
-from shipid import read_plan
+from shipid import ShipidError, figures, read_plan
+from shipid.metrics import rank_correlation
+from shipid.report.content import DATA_DRIVEN
 from shipid.study.plan import Plan
 from shipid.study.run import prepare_study, run_study
 from shipid.study.store import read_rows, shard_folder
 from shipid.version import __version__
 
 FILE = Path(__file__).parent / "records" / "paper-grid.csv"
+DRAWN = FILE.with_name("paper-grid-drawn.csv")
 COLUMNS = ["model", "N_D", "A", "H", "H_90", "H_end", "seconds", "version"]
 FIRST = (10, 30, 100)
 """Amounts of data that are computed to the end before the others begin."""
@@ -39,16 +45,94 @@ def missing_cells(plan: Plan, known: pd.DataFrame) -> list[int]:
     return [number for _, _, number in sorted(units)]
 
 
-def table_of_errors(rows: pd.DataFrame) -> str:
-    """The cells as a table of H over models and amounts, and what the cells took."""
-    models = rows.groupby("model")["A"].first().sort_values(na_position="last")
-    wide = rows.pivot(index="model", columns="N_D", values="H").reindex(models.index)
-    lines = [f"| model | A [m] | {' | '.join(map(str, wide.columns))} |", f"| --- |{' ---: |' * (1 + wide.shape[1])}"]
-    for (model, accuracy), values in zip(models.items(), wide.to_numpy(), strict=True):
+def table_of_errors(rows: pd.DataFrame, drawn: pd.DataFrame) -> str:
+    """The cells as a table of H over models and amounts, each beside that of `path-drawn`, and what the cells took."""
+    amounts = sorted(set(rows["N_D"]))
+    wide = [one.pivot(index="model", columns="N_D", values="H") for one in (rows, drawn)]
+    heads = [f"{N_D}{words}" for N_D in amounts for words in ("", ", `path-drawn`")]
+    lines = [f"| model | A [m] | {' | '.join(heads)} |", f"| --- |{' ---: |' * (1 + len(heads))}"]
+    for model, accuracy in rows.groupby("model")["A"].first().sort_values(na_position="last").items():
+        values = [one.get(N_D, pd.Series(dtype=float)).get(model, np.nan) for N_D in amounts for one in wide]
         cells = [f"{value:.2f}" if value == value else "-" for value in (accuracy, *values)]
         lines.append(f"| {model} | {' | '.join(cells)} |")
     took = f"{len(rows)} of 190 cells, {rows['seconds'].sum() / 3600:.1f} core-hours."
     return "\n".join([f"H [m], mean over the horizon of 30 s. One world. {took}", "", *lines])
+
+
+def counts_of_findings(rows: pd.DataFrame) -> list[str]:
+    """What the cells so far say of S1 to S6, as counts: the findings themselves need a whole grid and errors by run."""
+    wide = rows.pivot(index="model", columns="N_D", values="H")
+    accuracy = rows.groupby("model")["A"].first()
+    pure = wide.loc[DATA_DRIVEN] if DATA_DRIVEN in wide.index else pd.Series(np.nan, wide.columns)
+    physics = wide[wide.index != DATA_DRIVEN]
+    lines = []
+    for N_D in wide:
+        known = physics[N_D].dropna()
+        A = accuracy[known.index]
+        lines.append(f"N_D = {N_D}: compensated H is below A for {int((known < A).sum())} of {len(known)} models.")
+        if pure[N_D] == pure[N_D]:
+            for finding, family in (("S1", "moderate"), ("S4", "high")):
+                mine = known[known.index.str.startswith(family)]
+                better = f"{int((mine < pure[N_D]).sum())} of {len(mine)} {family} models"
+                lines.append(f"{finding}, N_D = {N_D}: {better} have a lower H than none.")
+        if len(known) > 2:
+            by_90 = rows[rows["N_D"] == N_D].set_index("model")["H_90"][known.index]
+            lines.append(f"S3, N_D = {N_D}: rank correlation of H and A {rank_correlation(A, known):.2f}.")
+            lines.append(f"S5, N_D = {N_D}: rank correlation of H and H_90 {rank_correlation(known, by_90):.2f}.")
+    for few, many in pairwise(wide):
+        both = wide[[few, many]].dropna()
+        fallen = int((both[many] < both[few]).sum())
+        lines.append(f"S2: H is lower at {many} runs than at {few} for {fallen} of {len(both)} models.")
+        sooner = physics.index[physics[few] < pure[many]]
+        if pure[many] == pure[many]:
+            lines.append(f"S6: {len(sooner)} models have a lower H with {few} runs than none with {many}.")
+    return [*lines, "S7 needs the paths, which these rows do not hold."]
+
+
+def beside_drawn(rows: pd.DataFrame, drawn: pd.DataFrame) -> str:
+    """How H of the cells compares with that of `path-drawn` on the same cells."""
+    both = rows.merge(drawn, on=["model", "N_D"], suffixes=("", "_drawn"))
+    ratio = both["H"] / both["H_drawn"]
+    lower = f"lower in {int((ratio < 1).sum())} of {len(ratio)} cells"
+    return f"Against `path-drawn` H is {np.exp(np.log(ratio).mean()):.2f} times as large (geometric mean), {lower}."
+
+
+def figures_page() -> str:
+    """The page of the site with figures 8, 9 and 10 of the paper, for both methods."""
+    lines = [
+        "# The paper's grid",
+        "",
+        "H over the models, sorted by A, and N_D (8), H over N_D (9), H_90 over N_D (10).",
+    ]
+    lines += ["The first bar or point, N_D = 0, is the physics alone. [Record](../records/paper-grid.md).", ""]
+    lines += ["```{raw} html", '<script src="../_static/plotly-cartesian.min.js"></script>', "```", ""]
+    for file, name in ((FILE, "The paper's recipe"), (DRAWN, "`path-drawn` on the same cells")):
+        cells = pd.read_csv(file)
+        family = cells["model"].str.rpartition("-")[0].where(cells["model"] != DATA_DRIVEN, DATA_DRIVEN)
+        content = figures.content_of(cells.assign(family=family))
+        drawers = (
+            figures.error_map,
+            lambda one: figures.gain(one, "mean"),
+            lambda one: figures.gain(one, "90th percentile"),
+        )
+        for number, draw in enumerate(drawers, 8):
+            lines += [f"## {name}: figure {number}", ""]
+            try:
+                drawn = draw(content).to_html(full_html=False, include_plotlyjs=False)
+                lines += ["```{raw} html", drawn, "```", ""]
+            except ShipidError as error:  # a grid that has just begun
+                lines += [f"Not drawn yet: {error}.", ""]
+    return "\n".join(lines)
+
+
+def compute_drawn(folder: Path) -> None:
+    """Compute the cells of `path-drawn`, the default of the product, and write their rows."""
+    method = [{"name": "drawn", "kind": "path-drawn"}]
+    plan = read_plan("simulation", {"method": method, "grid.N_D": list(FIRST)})
+    for event in [*prepare_study(plan, folder), *run_study(plan, folder, workers=1)]:
+        print(event.text or event.row.get("cell", ""), file=sys.stderr)
+    rows = read_rows(folder).rename(columns={"foundation": "model"}).assign(version=__version__)
+    rows.loc[rows["model"] != "nominal", COLUMNS].to_csv(DRAWN, index=False)
 
 
 def main() -> None:
@@ -56,11 +140,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("run", type=Path, help="folder of the run, made where there is none")
     parser.add_argument("--hours", type=float, default=1.0, help="no cell begins later")
+    parser.add_argument("--drawn", action="store_true", help="compute the cells of `path-drawn` instead")
     given = parser.parse_args()
+    if given.drawn:
+        compute_drawn(given.run)
+        return
     end, plan = time.monotonic() + 3600 * given.hours, read_plan("simulation")
     if not FILE.exists():
         FILE.write_text(",".join(COLUMNS) + "\n", encoding="utf-8")
-    if not given.run.exists():
+    if given.hours and not given.run.exists():
         for event in prepare_study(plan, given.run):
             print(event.text, file=sys.stderr)
     for number in missing_cells(plan, pd.read_csv(FILE)):
@@ -73,7 +161,8 @@ def main() -> None:
         row = read_rows(place).rename(columns={"foundation": "model"}).assign(version=__version__)
         row[COLUMNS].to_csv(FILE, mode="a", header=False, index=False)
         shutil.rmtree(place)
-    print(table_of_errors(pd.read_csv(FILE)))
+    rows, drawn = pd.read_csv(FILE), pd.read_csv(DRAWN)
+    print(table_of_errors(rows, drawn), beside_drawn(rows, drawn), *counts_of_findings(rows), sep="\n\n")
 
 
 if __name__ == "__main__":

@@ -60,15 +60,13 @@ class Network(StoredData):
 
 
 @dataclass(frozen=True)
-class Compensator(StoredData):
-    """The mean of some networks: one per fold (`path-trained`), or those of the best trials (`path-drawn`).
+class PathCorrector(StoredData):
+    """What adds a compensation to the path of the physics, from what is known at the instant.
 
-    inputs : which quantities they may take.
+    inputs : which quantities it may take.
     """
 
     inputs: Inputs
-    networks: tuple[Network, ...]
-    hyperparameters: Mapping[str, float]
 
     @property
     def past(self) -> float:
@@ -78,6 +76,18 @@ class Compensator(StoredData):
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         return paths + self.compensation(self.inputs.table(physics, instants))
+
+    def compensation(self, table: Mapping[str, Array]) -> Array:
+        """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Compensator(PathCorrector):
+    """The mean of some networks: one per fold (`path-trained`), or those of the best trials (`path-drawn`)."""
+
+    networks: tuple[Network, ...]
+    hyperparameters: Mapping[str, float]
 
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""

@@ -14,12 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveInt
 
-from shipid.data.windows import Instants
 from shipid.errors import ShipidError
-from shipid.hybrid.compensator import flatten_paths, unflatten_paths
-from shipid.hybrid.features import Inputs, Memory, select_inputs
+from shipid.hybrid.compensator import PathCorrector, flatten_paths, unflatten_paths
+from shipid.hybrid.features import Memory, select_inputs
 from shipid.hybrid.method import Array, Index
-from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import LearningProblem, PathProblem, Point, SearchedAlone, seed_of
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import VaryingInputs
@@ -78,29 +76,22 @@ class Trees(StoredData):
 
 
 @dataclass(frozen=True)
-class ForestCorrector(StoredData):
+class ForestCorrector(PathCorrector):
     """Trees that give the compensation of the path.
 
     names : inputs that the trees take, in order.
     basis : (T, r) shapes over the horizon [m] that the outputs x_1 ... x_r, y_1 ... y_r weigh.
     """
 
-    inputs: Inputs
     names: tuple[str, ...]
     basis: Array
     trees: Trees
     hyperparameters: Mapping[str, float]
 
-    @property
-    def past(self) -> float:
-        """Length of the past that a prediction needs [s]."""
-        return self.inputs.memory.past
-
-    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:
-        """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
-        table = self.inputs.table(physics, instants)
+    def compensation(self, table: Mapping[str, Array]) -> Array:
+        """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
         weights = self.trees.predict(select_inputs(table, self.names))
-        return np.asarray(paths + np.tensordot(self.basis, unflatten_paths(weights), 1))
+        return np.tensordot(self.basis, unflatten_paths(weights), 1)
 
 
 class ForestProblem(PathProblem):

@@ -17,12 +17,13 @@ from math import ceil
 import numpy as np
 import optuna
 
-from shipid.hybrid.compensator import Compensator, Network, Normaliser, flatten_paths
-from shipid.hybrid.features import Inputs, choose_features, input_group
+from shipid.hybrid.compensator import Compensator, Layers, Network, flatten_paths, smooth_basis
+from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
 from shipid.hybrid.method import Array, FitResult, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.search import Search, SearchMethod, best_trials, seed_of, setting_at_share, trial_row
-from shipid.hybrid.training import Layers, Learner, Length, StackTraining
+from shipid.hybrid.path_trained import PathTrained
+from shipid.hybrid.search import Search, best_trials, mean_squared_error, seed_of, setting_at_share, trial_row
+from shipid.hybrid.training import Learner, Length, StackTraining
 from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
@@ -32,18 +33,13 @@ STACK = 4  # of them; with more nothing is gained
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
 
-def tune_gradient(
-    task: Task, method: SearchMethod, inputs: Inputs, length: Length, *, mirror: bool = False, at_once: int = 1
-) -> dict[str, FitResult]:
+def tune_gradient(task: Task, method: PathTrained) -> dict[str, FitResult]:
     """Train networks for each foundation.
 
-    The objective is the mean validation loss over the folds; the compensator is the mean of the fold networks of the
+    The objective is the mean validation error over the folds; the compensator is the mean of the fold networks of the
     best trial. The sampler of a trial is seeded by its number.
-
-    mirror : whether networks are symmetric to port and starboard, where the inputs allow it.
-    at_once : trials that are proposed at a time; more than one race.
     """
-    trainer, search = _Trainer(task, method, inputs, length, mirror), Search(task, task.cases, method)
+    trainer, search, at_once = _Trainer(task, method), Search(task, task.cases, method), method.at_once
     space = method.space()
     if search.done != search.count:  # a round that was interrupted begins again
         search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
@@ -73,7 +69,7 @@ def tune_gradient(
                 best[key] = one
         for number in numbers:
             search.record({key: outcomes[key, number].row for key in studies})
-    return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in studies}
+    return {key: trainer.fitted(key, search.rows, best.get(key)) for key in studies}
 
 
 @dataclass(frozen=True)
@@ -86,13 +82,18 @@ class _TrialOutcome:
 
 @dataclass(frozen=True, eq=False)
 class _StackMember:
-    """A network in training: its trial and fold, what its inputs are, the scales (d,) that divide them, its data."""
+    """A network in training: its trial and fold, what its inputs are, the scales (d,) that divide them, its data.
+
+    basis : (T, r) [m] that its outputs weigh. floor : mean square [m^2] of the targets to watch that it cannot follow.
+    """
 
     trial: Trial
     fold: int
     varying: VaryingInputs
     scales: Array
     learner: Learner
+    basis: Array
+    floor: float
 
     def networks(self, layers: Layers) -> list[Network]:
         """The network as it predicts, twice as large; with a mirror also its image, whose mean with it is symmetric."""
@@ -103,8 +104,7 @@ class _StackMember:
             *hidden, (last, offset) = ((mirror @ scaled, bias), *others)
             sign = np.repeat([1.0, -1.0], len(offset) // 2)
             every.append((*hidden, (last * sign, offset * sign)))
-        basis = np.eye(len(layers[-1][1]) // 2)
-        return [Network(self.varying.features, self.varying.normaliser, basis, one) for one in every]
+        return [Network(self.varying.features, self.varying.normaliser, self.basis, one) for one in every]
 
 
 _RunningStack = tuple[list[_StackMember], StackTraining]
@@ -113,10 +113,11 @@ _RunningStack = tuple[list[_StackMember], StackTraining]
 class _Trainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(self, task: Task, method: SearchMethod, inputs: Inputs, length: Length, mirror: bool) -> None:
-        self.task, self.method, self.inputs, self.length, self.mirror = task, method, inputs, length, mirror
-        self.tables = shared_tables(task, inputs)
-        self.outputs = {key: flatten_paths(paths) for key, paths in task.targets.items()}
+    def __init__(self, task: Task, method: PathTrained) -> None:
+        self.task, self.method, self.inputs = task, method, Inputs(task.commands, method.memory)
+        self.length = Length(method.epochs, method.batch, method.patience)
+        self.tables = shared_tables(task, self.inputs)
+        self.targets = task.targets
         self._seen: dict[object, tuple[VaryingInputs, Array]] = {}
         self._again: dict[int, dict[Trial, _TrialOutcome]] = {}
 
@@ -126,13 +127,21 @@ class _Trainer:
         place = (fold, input_table_key(table))
         if place not in self._seen:
             training = {name: values[self.task.folds[fold][0]] for name, values in table.items()}
-            if self.mirror:
-                varying = VaryingInputs.of(training, mirror=True)
-            else:
-                features = choose_features(training)
-                varying = VaryingInputs(features, Normaliser.fit(training, tuple(features)), None)
+            varying = VaryingInputs.of(training, self.method.mirror)
             self._seen[place] = varying, varying.normaliser.apply(table)
         return self._seen[place]
+
+    def _outputs(self, key: str, fold: int) -> tuple[Array, Array, float]:
+        """Basis (T, r) [m], what it weighs (S, 2 r), about 1 in training, and what validation holds beside [m^2]."""
+        training, validation = self.task.folds[fold]
+        targets, terms = self.targets[key], self.method.terms
+        if terms is None:  # as in the paper: each step, in metres
+            return np.eye(len(targets)), flatten_paths(targets), 0.0
+        plain = smooth_basis(len(targets), terms)
+        weights = np.tensordot(plain.T, targets, 1)
+        scale = max(float(np.sqrt(np.square(weights[:, training]).mean())), 1e-9)
+        floor = mean_squared_error(np.tensordot(plain, weights, 1)[:, validation], targets[:, validation])
+        return plain * scale, flatten_paths(weights / scale), floor
 
     def _stacks(self, asked: Mapping[Trial, Mapping[str, float]]) -> list[list[_StackMember]]:
         """Members of all trials and folds; those that are alike, and several that are narrow, as one stack."""
@@ -145,13 +154,14 @@ class _Trainer:
                 scales = np.array([settings.get(f"{input_group(name)}_scale", 1.0) for name in names])
                 scaled = values if (scales == 1).all() else values / scales
                 seed = seed_of(self.task.seed, number, fold, key)
-                learner = Learner(scaled, self.outputs[key], training, validation, settings, seed)
+                basis, outputs, floor = self._outputs(key, fold)
+                learner = Learner(scaled, outputs, training, validation, settings, seed)
                 narrow = race and settings["units"] <= NARROW
                 alike = (number, fold, input_table_key(self.tables[key]), settings["units"])
                 sizes = (settings["layers"], len(names), len(training), len(validation))
                 mirror = varying.reflection if varying.reflection is None else varying.reflection.tobytes()
                 place = (sizes, mirror, None if narrow else alike)
-                stacks[place].append(_StackMember((key, number), fold, varying, scales, learner))
+                stacks[place].append(_StackMember((key, number), fold, varying, scales, learner, basis, floor))
         return [
             members[start : start + size]
             for place, members in stacks.items()
@@ -161,7 +171,19 @@ class _Trainer:
 
     def train(self, asked: Mapping[Trial, Mapping[str, float]]) -> dict[Trial, _TrialOutcome]:
         """Train the networks of some trials; several of a model race."""
-        running = [self._begin(members) for members in self._stacks(asked)]
+        running = [
+            (
+                members,
+                StackTraining(
+                    [one.learner for one in members],
+                    self.length,
+                    order_seed=seed_of(self.task.seed, members[0].trial[1], members[0].fold),
+                    reflection=members[0].varying.reflection,
+                    device=self.task.device,
+                ),
+            )
+            for members in self._stacks(asked)
+        ]
         seconds = dict.fromkeys(asked, 0.0)
         stopped: set[Trial] = set()
         per_model = len(asked) // len(self.tables)
@@ -183,21 +205,9 @@ class _Trainer:
             outcomes[trial] = _TrialOutcome(row, networks)
         return outcomes
 
-    def _begin(self, members: list[_StackMember]) -> _RunningStack:
-        """Begin to train a stack."""
-        first = members[0]
-        training = StackTraining(
-            [one.learner for one in members],
-            self.length,
-            order_seed=seed_of(self.task.seed, first.trial[1], first.fold),
-            reflection=first.varying.reflection,
-            device=self.task.device,
-        )
-        return members, training
-
-    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None, at_once: int) -> FitResult:
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None) -> FitResult:
         """The networks of the best trial; those of an earlier session are trained once more, in the same company."""
-        seconds = sum(row["seconds"] for row in rows[key])
+        seconds, at_once = sum(row["seconds"] for row in rows[key]), self.method.at_once
         kept = best_trials(rows[key])
         if not kept:
             return FitResult(None, rows[key], seconds)
@@ -238,7 +248,8 @@ def _gather_trials(running: list[_RunningStack]) -> dict[Trial, tuple[float, int
     for members, training in running:
         parts = zip(members, training.losses(), training.best.epochs.tolist(), training.layers(), strict=True)
         for one, loss, epochs, layers in parts:
-            ended[one.trial].append((one.fold, float(loss), epochs, one.networks(layers)))
+            error = float(loss) * np.square(one.basis).mean() * one.basis.shape[1] + one.floor
+            ended[one.trial].append((one.fold, error, epochs, one.networks(layers)))
     return {
         trial: (
             float(np.mean([loss for _, loss, _, _ in folds])),

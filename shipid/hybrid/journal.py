@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import optuna
-from optuna.distributions import BaseDistribution, FloatDistribution
 from optuna.exceptions import DuplicatedStudyError
 from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
@@ -121,7 +120,7 @@ def frozen_trial(row: Row, space: Space, cell: str = "") -> FrozenTrial:
         value=row["value"] if row["state"] == "complete" else None,
         intermediate_values={row["epochs"]: row["value"]} if row["state"] == "stopped" else None,
         params=searched,
-        distributions={name: _widen_distribution(space[name], value) for name, value in searched.items()},
+        distributions={name: space[name] for name in searched},
         user_attrs={ROW: row, CHECKSUM: _row_checksum(cell, row)},
     )
 
@@ -129,13 +128,6 @@ def frozen_trial(row: Row, space: Space, cell: str = "") -> FrozenTrial:
 def _row_checksum(cell: str, row: Row | None) -> int:
     """CRC-32 of a row of a search."""
     return zlib.crc32(json.dumps([cell, row]).encode())
-
-
-def _widen_distribution(where: BaseDistribution, value: float) -> BaseDistribution:
-    """The span, with a value that rounding put just outside of it."""
-    if isinstance(where, FloatDistribution) and not where.low <= value <= where.high:
-        return FloatDistribution(min(where.low, value), max(where.high, value), log=where.log)
-    return where
 
 
 def merge_journals(files: Iterable[Path], target: Path) -> None:

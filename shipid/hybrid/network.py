@@ -135,7 +135,9 @@ class NetworkProblem(RecurrentProblem):
             learned = {name: layer for name, layer in module.named_parameters() if layer.requires_grad}
             layers, epochs = train_reader(
                 parts,
-                lambda layers, *seen: functional_call(module.train(torch.is_grad_enabled()), dict(layers), seen),
+                lambda layers, *seen: functional_call(  # one window alone has no spread that BatchNorm could learn
+                    module.train(torch.is_grad_enabled() and len(seen[1]) > 1), dict(layers), seen
+                ),
                 torch.nn.utils.parameters_to_vector(learned.values()).detach()[None].clone(),
                 {name: tuple(layer.shape) for name, layer in learned.items()},
                 (rate, method.weight_decay),

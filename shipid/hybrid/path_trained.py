@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from shipid.hybrid.compensator import Compensator
-from shipid.hybrid.features import Inputs, Memory
+from shipid.hybrid.features import Memory
 from shipid.hybrid.method import FitResult, Task
 from shipid.hybrid.search import Probability, Scale, SearchMethod
 
@@ -35,6 +35,8 @@ class PathTrained(SearchMethod):
         the inputs in their standard deviations: searched by their logarithm. None: all are 1.
     at_once : trials that are proposed at a time. More than one race: the better half goes on, after 1/16, 1/8, ... of
         the epochs.
+    terms : the compensation is a polynomial of time with so many terms, and the outputs of the networks are about 1.
+        None, as in the paper: an output for each step, in metres.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -62,6 +64,7 @@ class PathTrained(SearchMethod):
     mirror: bool = False
     groups: tuple[PositiveFloat, PositiveFloat] | None = None
     at_once: PositiveInt = 1
+    terms: PositiveInt | None = None
 
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Return what is to be searched: name -> (low, high), the scales of the groups of inputs too."""
@@ -77,9 +80,5 @@ class PathTrained(SearchMethod):
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Train networks for every foundation; the corrector is the mean of the fold networks of the best trial."""
         from shipid.hybrid.gradient import tune_gradient  # a study is read without Optuna and PyTorch
-        from shipid.hybrid.training import Length
 
-        length = Length(self.epochs, self.batch, self.patience)
-        return tune_gradient(
-            task, self, Inputs(task.commands, self.memory), length, mirror=self.mirror, at_once=self.at_once
-        )
+        return tune_gradient(task, self)

@@ -3,7 +3,7 @@
 h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
 [dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time. AdamW on the mean
 squared error of the path, early stopping on the validation windows; the corrector is the mean over the folds. With
-mirror, x is even and y odd by construction. The unit: Cho et al. (2014); PyTorch trains it, plain arrays predict.
+mirror, x is even and y odd by construction. The unit: Cho et al. (2014).
 """
 
 from __future__ import annotations
@@ -89,21 +89,12 @@ class GatedNetwork(StoredData):
         return np.tensordot(self.basis, unflatten_paths(outputs), 1)
 
     def _outputs(self, seen: Sequences) -> Array:
-        layers, (past, now) = self.layers, seen
-        hidden = np.zeros((len(now), layers["W_h"].shape[1]))
-        for row in past:
-            a = row @ layers["W_i"].T + layers["b_i"]
-            b = hidden @ layers["W_h"].T + layers["b_h"]
-            reset, update, fresh = np.split(a, 3, axis=1)
-            reset_h, update_h, fresh_h = np.split(b, 3, axis=1)
-            gate = _logistic(update + update_h)
-            hidden = (1 - gate) * np.tanh(fresh + _logistic(reset + reset_h) * fresh_h) + gate * hidden
-        full = np.concatenate([hidden, now], axis=1)
-        return np.asarray(np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"])
+        import torch  # a study is read without it
 
+        from shipid.hybrid.training import gated_outputs
 
-def _logistic(values: Array) -> Array:
-    return (1 + np.tanh(values / 2)) / 2
+        layers = {name: torch.from_numpy(values) for name, values in self.layers.items()}
+        return np.asarray(gated_outputs(layers, *map(torch.from_numpy, seen)).numpy())
 
 
 @dataclass(frozen=True)

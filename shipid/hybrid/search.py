@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count, islice
-from math import ceil, exp, floor, log
+from math import exp, log
 from statistics import fmean
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 from zlib import crc32
@@ -252,10 +252,9 @@ def suggested_points(method: SearchMethod, search: Search, name: str, seed: int)
 def setting_at_share(method: SearchMethod, name: str, share: float) -> float:
     """The value of a searched setting at a share of its range; inside the range, whatever the rounding."""
     low, high = method.ranges()[name]
-    if name in method.LINEAR:
-        return low + share * (high - low)
-    value = exp(log(low) + share * (log(high) - log(low)))
-    return min(max(round(value), ceil(low)), floor(high)) if name in method.COUNTS else value
+    linear = name in method.LINEAR
+    value = low + share * (high - low) if linear else exp(log(low) + share * (log(high) - log(low)))
+    return min(max(round(value) if name in method.COUNTS else value, low), high)
 
 
 def ridge_values(ridge: float | tuple[float, float], count: int) -> list[float]:

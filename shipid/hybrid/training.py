@@ -19,11 +19,10 @@ from threadpoolctl import threadpool_limits
 from torch import Tensor
 from torch.nn.functional import pad
 
+from shipid.hybrid.compensator import Layers
 from shipid.hybrid.method import Array
 
-Layers = tuple[tuple[Array, Array], ...]
 Stack = Sequence[tuple[Tensor, Tensor]]
-Masks = Sequence[Tensor | None]
 Shapes = Mapping[str, tuple[int, ...]]
 Part = tuple[Sequence[tuple[Array, Array]], Array]
 """What is read, the past (P + 1, S, d) with inputs at the instant (S, e), then its mirror image if there is one; and
@@ -100,10 +99,7 @@ class StackTraining:
         dropout = [
             [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(self.widest) - 2))
         ]
-        (x, y), watched = (
-            (self._inputs(samples, reflection, device), self._targets(samples, device))
-            for samples in ([one.training for one in learners], [one.validation for one in learners])
-        )
+        (x, y), watched = (self._samples(part, reflection, device) for part in ("training", "validation"))
         num_samples = y.shape[1]
         generators = [torch.Generator().manual_seed(int(one.seed)) for one in learners]
         order = torch.Generator().manual_seed(order_seed)
@@ -139,21 +135,13 @@ class StackTraining:
             watched=watch,
         )
 
-    def _inputs(self, samples: Sequence[NDArray[np.int64]], reflection: Array | None, device: str) -> list[Tensor]:
-        """Inputs of some samples of each, and then their images if there is a mirror, (K or 1, n, d)."""
-        first = self.learners[0]
-        alike = all(
-            one.inputs is first.inputs and rows is samples[0] for one, rows in zip(self.learners, samples, strict=True)
-        )
-        own = [one.inputs[rows] for one, rows in zip(self.learners[: 1 if alike else None], samples, strict=False)]
-        plain = np.stack(own)
+    def _samples(self, part: str, reflection: Array | None, device: str) -> tuple[list[Tensor], Tensor]:
+        """Inputs (K, n, d) of `training` or `validation`, then their images if there is a mirror; targets (K, n, m)."""
+        rows = [(one, getattr(one, part)) for one in self.learners]
+        plain = np.stack([one.inputs[mine] for one, mine in rows])
         both = [plain] if reflection is None else [plain, plain @ reflection]
-        return [_single_tensor(side, device) for side in both]
-
-    def _targets(self, samples: Sequence[NDArray[np.int64]], device: str) -> Tensor:
-        """Targets (K, n, m) of some samples of each."""
-        own = [one.targets[rows] for one, rows in zip(self.learners, samples, strict=True)]
-        return _single_tensor(np.stack(own), device)
+        targets = np.stack([one.targets[mine] for one, mine in rows])
+        return [_single_tensor(side, device) for side in both], _single_tensor(targets, device)
 
     def advance(self, epochs: int | None = None) -> None:
         """Train for so many further epochs, by default to the end."""
@@ -231,9 +219,8 @@ def minimise_losses(
             return
 
 
-def stack_outputs(x: Tensor, layers: Stack, masks: Masks = ()) -> Tensor:
-    """Return outputs (K, n, m) of K networks for inputs (K or 1, n, d): tanh layers, a linear one; masks drop."""
-    h = x.expand(len(layers[0][0]), *x.shape[1:])
+def stack_outputs(h: Tensor, layers: Stack, masks: Sequence[Tensor | None] = ()) -> Tensor:
+    """Return outputs (K, n, m) of K networks for inputs (K, n, d): tanh layers, a linear one; masks drop."""
     for i, (weight, bias) in enumerate(layers):
         mask = masks[i] if masks else None
         h = torch.baddbmm(bias, h if mask is None else h * mask, weight)
@@ -414,7 +401,7 @@ def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
 def gated_outputs(layers: Mapping[str, Tensor], past: Tensor, now: Tensor) -> Tensor:
     """Outputs (S, 2 r) of a gated recurrent unit on the past (P + 1, S, d), with inputs at the instant (S, e)."""
     flat = [layers[name] for name in ("W_i", "W_h", "b_i", "b_h")]
-    start = torch.zeros(1, len(now), layers["W_h"].shape[1])
+    start = now.new_zeros(1, len(now), layers["W_h"].shape[1])
     _, hidden = torch.gru(past, start, flat, True, 1, 0.0, False, False, False)
     full = torch.cat([hidden[0], now], dim=1)
     return torch.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"]

@@ -105,3 +105,26 @@ def test_a_mirrored_ship_gets_the_mirrored_path_and_the_loss_is_that_of_the_save
     best = min(tuned.trials, key=lambda row: row["value"])
     assert {"motion_scale", "command_scale", "wind_scale"} < set(best["params"])
     assert np.square(here - targets["high-1"])[:, FOLD[1]].mean() == pytest.approx(best["value"], rel=1e-4)
+
+
+def test_on_polynomials_networks_do_not_depend_on_the_unit_of_the_targets(columns, targets):
+    """In metres Adam, whose steps have one size, gets further to a small target than to a large one."""
+    far = {"high-1": targets["high-1"] * 64.0}
+    scaled, metres = (SMALL.model_copy(update={"terms": terms, "epochs": 20}) for terms in (3, None))
+    left = {}
+    for method in (scaled, metres):
+        near, large = (
+            tune(columns, COMMANDS, given, [FOLD], method, seed=4)["high-1"].trials
+            for given in ({"high-1": targets["high-1"]}, far)
+        )
+        left[method.terms] = [one["value"] / 64.0**2 / other["value"] for one, other in zip(large, near, strict=True)]
+    np.testing.assert_allclose(left[3], 1.0, rtol=1e-4)
+    assert min(left[None]) > 1.1
+
+
+def test_the_error_of_a_trial_on_polynomials_counts_what_they_cannot_follow(columns, targets):
+    bent = {"high-1": targets["high-1"] + np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])[:, None, None]}
+    fit = tune(columns, COMMANDS, bent, [FOLD], SMALL.model_copy(update={"terms": 2}), seed=4)["high-1"]
+    made = compensation(fit.corrector, columns)[:, FOLD[1]]
+    best = min(fit.trials, key=lambda row: row["value"])
+    assert np.square(made - bent["high-1"][:, FOLD[1]]).mean() == pytest.approx(best["value"], rel=1e-4)

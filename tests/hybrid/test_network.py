@@ -134,6 +134,14 @@ def test_a_network_predicts_with_the_buffers_of_its_best_epoch(tmp_path: Path, m
         read.predict(instants)
 
 
+def test_a_last_batch_of_one_window_does_not_end_the_training() -> None:
+    """A spread over one window alone does not exist, so a layer that learns it takes what it knows."""
+    task = small_world().task()
+    method = Buffered(trials=1, epochs=3, seconds=3.0, mirror=False, batch=len(task.folds[0][0]) - 1)
+    (row,) = method.fit(task)["physics"].trials
+    assert row["state"] == "complete"
+
+
 def test_a_search_that_was_interrupted_goes_on_with_the_same_trials(tmp_path: Path) -> None:
     world = small_world()
 

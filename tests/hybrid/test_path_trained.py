@@ -49,4 +49,5 @@ def test_the_trained_path_is_what_the_method_pins():
         "mirror": False,
         "groups": None,
         "at_once": 1,
+        "terms": None,
     }
