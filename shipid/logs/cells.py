@@ -36,8 +36,11 @@ def of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path
     wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
     if wrong.any():
         row = int(np.argmax(wrong))
-        message = f"{numbers[row]:.10g} in {row_in_words(log, row)} has 60 minutes or more: is the unit deg?"
-        raise DataError(message, file=file, path=path)
+        raise DataError(
+            f"{numbers[row]:.10g} in {row_in_words(log, row)} has 60 minutes or more: is the unit deg?",
+            file=file,
+            path=path,
+        )
     return degrees
 
 
@@ -46,10 +49,11 @@ def of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: st
     wrong = ~np.isnan(numbers) & ~((numbers >= -128) & (numbers <= 127))
     if wrong.any():
         row = int(np.argmax(wrong))
-        message = (
-            f"{numbers[row]:.10g} in {row_in_words(log, row)} is none of -128 to 127, as AIS has: is the unit deg/min?"
+        raise DataError(
+            f"{numbers[row]:.10g} in {row_in_words(log, row)} is none of -128 to 127, as AIS has: is the unit deg/min?",
+            file=file,
+            path=path,
         )
-        raise DataError(message, file=file, path=path)
     return rate_of_ais(numbers)
 
 
@@ -62,10 +66,11 @@ def of_parts(
         wrong = np.abs(part) >= 60.0
         if wrong.any():
             row = int(np.argmax(wrong))
-            message = (
-                f"{name!r} is {part[row]:.10g} in {row_in_words(log, row)}, 60 or more: are these minutes or seconds?"
+            raise DataError(
+                f"{name!r} is {part[row]:.10g} in {row_in_words(log, row)}, 60 or more: are these minutes or seconds?",
+                file=file,
+                path=path,
             )
-            raise DataError(message, file=file, path=path)
     return degrees
 
 
@@ -79,8 +84,7 @@ def of_quaternion(
         row = int(np.argmax(wrong))
         said = ", ".join(map(repr, names))
         place = f"{said} have the size {size[row]:.4g} in {row_in_words(log, row)}"
-        message = f"{place}, and a quaternion has 1: are these x, y, z, w?"
-        raise DataError(message, file=file, path=path)
+        raise DataError(f"{place}, and a quaternion has 1: are these x, y, z, w?", file=file, path=path)
     return quaternion_yaw(parts)
 
 
@@ -115,18 +119,22 @@ def parse_numbers(
         numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
         infinite = np.flatnonzero(np.isinf(numbers))
         if len(infinite):
-            message = f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)"
-            raise DataError(message, file=file, path=row_in_words(log, infinite[0]))
+            raise DataError(
+                f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)",
+                file=file,
+                path=row_in_words(log, infinite[0]),
+            )
         return numbers
     read = form if isinstance(form, TableFormat) else TextFormat()
     text = column.fillna("").astype(str).str.strip()
     missing = text.isin(read.missing)
     if read.decimal == "," and read.thousands is None and (grouped := _row_of_thousands_mark(text)) is not None:
-        message = (
+        raise DataError(
             f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
-            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there"
+            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there",
+            file=file,
+            path=row_in_words(log, grouped),
         )
-        raise DataError(message, file=file, path=row_in_words(log, grouped))
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     if units and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
@@ -134,20 +142,22 @@ def parse_numbers(
         own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).to_numpy(dtype=bool)
         other = np.flatnonzero(behind.ne("").to_numpy() & ~own & ~missing.to_numpy())
         if len(other) and not sides:
-            message = (
+            raise DataError(
                 f"{text.iloc[other[0]]!r} is not in {units[0]}, as the mapping has it (column {source!r}; {len(other)} "
-                "such rows): write one unit in the whole column"
+                "such rows): write one unit in the whole column",
+                file=file,
+                path=row_in_words(log, other[0]),
             )
-            raise DataError(message, file=file, path=row_in_words(log, other[0]))
         north = behind.where(own, "").map(north_reference)
         if {"T", "M"} <= {*north}:
             kind = {"T": "true", "M": "magnetic"}[north[north.ne("")].iloc[0]]
             other = np.flatnonzero(north.isin({"T", "M"} - {kind[0].upper()}))
-            message = (
+            raise DataError(
                 f"{text.iloc[other[0]]!r} is not of {kind} north, as those before it (column {source!r}; {len(other)} "
-                "such rows): write one north in the whole column"
+                "such rows): write one north in the whole column",
+                file=file,
+                path=row_in_words(log, other[0]),
             )
-            raise DataError(message, file=file, path=row_in_words(log, other[0]))
         text = bare.where(own, text)
         missing |= text.isin(read.missing)
         plain = in_points(text, read.decimal, read.thousands).mask(missing)

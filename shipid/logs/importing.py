@@ -161,8 +161,11 @@ def run_files(source: LogSource, log: Path) -> dict[str, Path]:
     """Run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         if log.is_dir():
-            fault = 'cannot be read: a folder, and the mapping reads one file; for a file a run write runs = "*.csv"'
-            raise DataError(fault, file=log, path="source.runs")
+            raise DataError(
+                'cannot be read: a folder, and the mapping reads one file; for a file a run write runs = "*.csv"',
+                file=log,
+                path="source.runs",
+            )
         return {log.stem: log}
     if not log.is_dir():
         fault = "is a file, and the mapping takes a folder of runs" if log.is_file() else "there is no such folder"
@@ -267,8 +270,11 @@ def _check_breaks(mapping: Mapping, t: Array, off: tuple[str, ...], file: Path) 
     for index, repair in enumerate(mapping.repair if alone else ()):
         for start, end in repair.intervals if isinstance(repair, Break) and repair.enabled else ():
             if end < t[0] or start > t[-1]:
-                message = f"{format_span(start, end)} is not in the log, which has {format_span(t[0], t[-1])}"
-                raise DataError(message, file=file, path=f"repair.{index}.intervals")
+                raise DataError(
+                    f"{format_span(start, end)} is not in the log, which has {format_span(t[0], t[-1])}",
+                    file=file,
+                    path=f"repair.{index}.intervals",
+                )
 
 
 def _run_texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:

@@ -338,8 +338,9 @@ def change_structure(family: Family, base: Vessel) -> Vessel:
     try:
         return base.with_values(family.structure) if family.structure else base
     except DocumentError as error:
-        words = f"{error.path}: {error.message}" if error.path else error.message
-        raise DocumentError(words, path=f"family.{family.name}.structure") from None
+        raise DocumentError(
+            f"{error.path}: {error.message}" if error.path else error.message, path=f"family.{family.name}.structure"
+        ) from None
 
 
 Step = tuple[str, Callable[[float, Any, float], float], Any, str | None]

@@ -184,7 +184,7 @@ def _choose_other_columns(state: State) -> None:
 def _ask_roll_and_pitch(state: State) -> None:
     """Ask where the pitch follows the turning to both sides, as a ship heels, and the roll does not."""
     source = {one.name: one.source for one in state.suggestions if one.name in ("phi", "theta")}
-    if len(source) < 2 or state.psi is None:
+    if len(source) < 2:
         return
     turning = state.chosen.change(state.psi).real
     to_sides = float(np.sum(turning[turning > 0])), -float(np.sum(turning[turning < 0]))

@@ -51,7 +51,7 @@ NEAR = 15.0  # times from that: a unit further off is doubted
 
 def choose_commands(state: State) -> None:
     """Choose angles that steer, then shafts and pitches; without any, throttles of two sides."""
-    r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
     used: dict[str, int] = {}
     azimuth = _choose_steering(state, r, used)
     _choose_thrust(state, azimuth, used)
@@ -59,13 +59,13 @@ def choose_commands(state: State) -> None:
         choose_twins(state, r)
 
 
-def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
+def _choose_steering(state: State, r: Array, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
     angles = _columns_named_for(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
     turned = {name for name, signal in angles if _centre_angle(state, name, signal)}
-    power = {name: 0.0 if r is None else state.effect(r, state.columns[name]) for name in state.eligible()}
+    power = {name: state.effect(r, state.columns[name]) for name in state.eligible()}
     by_name = bool(angles)
-    if not angles and r is not None:
+    if not angles:
         # an order is held at its largest value; a response such as roll is not
         screws = _screw_columns(state)
         strength = {
@@ -83,7 +83,7 @@ def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> boo
         followed = 0.0
         why = "by its name; it is not seen to turn the ship, so that its sign is not known"
         confidence = 0.5 if by_name else 0.4
-        if by_name and abs(effect) <= SEEN and r is not None:
+        if by_name and abs(effect) <= SEEN:
             span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
             followed = evidence.order_correlation(state.t, r, state.columns[name], span)
             if abs(followed) > FOLLOWED:
@@ -159,10 +159,10 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
     return ""
 
 
-def _ask_for_side(state: State, name: str, r: Array | None) -> bool:
+def _ask_for_side(state: State, name: str, r: Array) -> bool:
     """Ask where a rudder angle is never negative and the ship turns to both sides; return whether it is so."""
     values = state.columns[name]
-    if r is None or values.min() < 0 or np.ptp(values) == 0:
+    if values.min() < 0 or np.ptp(values) == 0:
         return False
     sides = [float(np.sum(np.clip(sign * r, 0, None))) for sign in (1, -1)]
     if min(sides) < BOTH_SIDES * sum(sides):
@@ -284,8 +284,6 @@ def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
 
 
 def _runs_astern(state: State, name: str) -> bool:
-    if state.psi is None or state.position is None:
-        return False
     middle = (state.chosen.first + state.chosen.last) // 2
     ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
     fast = ahead > UNDER_WAY * float(np.percentile(np.abs(ahead), 90))
@@ -353,7 +351,7 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
 
 def _off_advance(state: State, values: Array, unit: str) -> float:
     """How many times the way in a turn of the shaft, in turning radii, is off that of a usual ship."""
-    if state.psi is None or np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
+    if np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
         return np.inf
     shaft = np.abs(values[(state.chosen.first + state.chosen.last) // 2]) * to_si(unit, "propeller.n")
     runs = shaft > RUNS * np.percentile(shaft, 95)

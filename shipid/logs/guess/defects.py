@@ -130,8 +130,6 @@ def _piles_up(values: Array, limit: float) -> bool:
 
 def defects_of_motion(state: State) -> None:
     """Report contradictions between position, heading, velocity and yaw rate."""
-    if state.psi is None:
-        return
     course = _ask_if_course(state)
     if state.r is not None:
         delay = None if course else _signal_delay(state, state.psi, evidence.integrate_rate(state.t, state.r))
@@ -142,10 +140,10 @@ def defects_of_motion(state: State) -> None:
             if state.body is not None and not _is_earth_fixed(state):
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
         _factor_of_rate(state)
-    if state.position is not None and state.velocity is None:
+    if state.velocity is None:
         _report_position_jumps(state, _own_path(state), spikes=False)
         _report_heading_offset(state)
-    if state.velocity is None or state.position is None or state.body is None:
+    if state.velocity is None or state.body is None:
         return
     _ask_for_set_clock(state)
     path = evidence.integrate_rate(state.t, state.velocity)
@@ -155,7 +153,6 @@ def defects_of_motion(state: State) -> None:
 
 def _ask_if_course(state: State) -> bool:
     """Ask where the heading is a course: the column of one has its values, or the track; whether it is so."""
-    assert state.psi is not None
     place, heading = next((i, one) for i, one in enumerate(state.suggestions) if one.name == "psi")
     same = _same_as(state, heading.source)
     if same is not None:
@@ -174,7 +171,6 @@ def _ask_if_course(state: State) -> bool:
 
 def _same_as(state: State, heading: str) -> tuple[str, float] | None:
     """The column of a course that has the values of the heading where the ship turns, and in which share; else None."""
-    assert state.psi is not None
     turns = np.abs(state.chosen.change(state.psi).real) > TURN_SHOWS
     rows = ((state.chosen.first + state.chosen.last) // 2)[turns]
     if len(rows) < SEVERAL:
@@ -199,7 +195,7 @@ def _value_step(values: Array) -> float:
 
 def _turns_with_track(state: State) -> bool:
     """Whether the heading turns later than the yaw rate, and the track turns with it as with no heading in a turn."""
-    if state.r is None or state.position is None or state.psi is None:
+    if state.r is None:
         return False
     change = state.chosen.change
     ran, rate = change(evidence.integrate_rate(state.t, state.r)).real, change(state.r).real
@@ -231,7 +227,6 @@ def _slope_with_error(values: Array, by: Array) -> tuple[float, float]:
 
 def _factor_of_rate(state: State) -> None:
     """Report a yaw rate whose integral is the heading times another number, as of gon/s or of a gyro that is off."""
-    assert state.psi is not None
     assert state.r is not None
     source = next(one.source for one in state.suggestions if one.name == "r")
     seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integrate_rate(state.t, state.r))
@@ -248,7 +243,6 @@ def _factor_of_rate(state: State) -> None:
 
 def _own_path(state: State) -> Complex:
     """Path (N,) [m] by the medians of the steps of the position about each row, where no velocities are logged."""
-    assert state.position is not None
     steps = pd.Series(np.diff(state.t))
     rows = 2 * max(STEPS_ABOUT, round(0.5 * evidence.WINDOW / float(steps.median()))) + 1
     rates = np.diff(state.position) / steps.to_numpy()
@@ -261,7 +255,7 @@ def _own_path(state: State) -> Complex:
 
 def _ask_for_set_clock(state: State) -> None:
     """Ask where the clock leaves out a time in which the ship, that was under way, went no farther than in a row."""
-    if state.joined or state.velocity is None or state.position is None:
+    if state.joined or state.velocity is None:
         return
     steps, way = np.diff(state.t), np.abs(np.diff(state.position))
     usual, fast = float(np.median(steps)), np.abs(state.velocity)
@@ -285,8 +279,6 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
 
     Returns the integrated velocities with this corrected, (N,).
     """
-    assert state.position is not None
-    assert state.psi is not None
     seen = state.chosen.change(state.position)
     ran = state.chosen.change(path)
     keep = evidence.windows_without_outliers(seen, ran)
@@ -360,7 +352,6 @@ def _find_late(state: State, what: str, against: str, delay: Delay) -> None:
 
 def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> None:
     """Report where positions leave a path (N,) [m]; of velocities also where they come back: `spikes`."""
-    assert state.position is not None
     unit = to_si(state.clock_unit, "t")
     lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
     places = [
@@ -393,7 +384,6 @@ def clock_text(state: State, t: float) -> str:
 
 
 def _report_heading_offset(state: State) -> None:
-    assert state.psi is not None
     angle, error, current = _off_on_all_courses(state)
     if error < CLEAR:
         why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
@@ -421,8 +411,6 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
 
     Over each window: way across the heading = tan(off) * (way along it) + arm * (turn) + (current across).
     """
-    assert state.psi is not None
-    assert state.position is not None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     psi = state.chosen.change(evidence.integrate_rate(state.t, state.psi)).real / span
     north = np.exp(-1j * psi)

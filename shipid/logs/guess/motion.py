@@ -55,8 +55,6 @@ class Velocities:
 
 def choose_velocities(state: State) -> None:
     """Choose the two velocity columns, or speed and course over ground, whose integral fits the track best."""
-    assert state.position is not None
-    assert state.psi is not None
     seen = state.chosen.change(state.position)
     ranked = sorted(_velocity_hypotheses(state, seen), key=lambda entry: entry.cost)
     named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
@@ -81,7 +79,6 @@ def choose_velocities(state: State) -> None:
 
 def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
     """Yield every ordered pair of columns as earth-fixed, as body-fixed, and as body-fixed with v to port."""
-    assert state.psi is not None
     words = ("u", "v", "velocity_north", "velocity_east")
     named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
     free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:20]
@@ -109,7 +106,6 @@ def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
 
 def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
     """The hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn, v r < 0."""
-    assert state.psi is not None
     if best.frame == "earth":
         return best
     other = next(
@@ -157,7 +153,6 @@ def _window_means(state: State, values: Array) -> Array:
 
 def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -> None:
     fit, first, second, frame = best.fit, best.first, best.second, best.frame
-    assert state.psi is not None
     pair = {first, second}
     runner = min(
         (e.fit for e in ranked if e.frame != frame and {e.first, e.second} == pair),
@@ -302,7 +297,6 @@ def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
 
     bound : unexplained share of the track, at most.
     """
-    assert state.psi is not None
     speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
     if state.numbered:
         speeds = courses = state.eligible()
@@ -350,7 +344,6 @@ def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
 
 def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
     """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course."""
-    assert state.psi is not None
     assert state.body is not None
     change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * state.psi)))
     keep = evidence.windows_without_outliers(seen, change)
@@ -370,8 +363,6 @@ def _as_track(
     state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg", along: str = ""
 ) -> tuple[Fit, Complex]:
     """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it."""
-    assert state.position is not None
-    assert state.psi is not None
     seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, velocity)))
     keep = evidence.windows_without_outliers(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
     if keep.sum() < 20 or abs(complex(np.mean(ran[keep] / np.abs(ran[keep])))) > ONE_WAY:
@@ -402,8 +393,6 @@ def _as_track(
 
 def ship_pace(state: State) -> tuple[float, float]:
     """How fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
-    assert state.position is not None
-    assert state.psi is not None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     speeds = np.abs(state.chosen.change(state.position)) / span
     rates = np.abs(state.chosen.change(state.psi)) / span
@@ -429,8 +418,6 @@ def check_clock(state: State, length: float = np.inf) -> None:
 
 def _ask_clock_by_speed(state: State) -> bool:
     """Ask where a recorded speed along the heading gives the track only with a clock in another unit, as in minutes."""
-    assert state.psi is not None
-    assert state.position is not None
     seen, way = state.chosen.change(state.position), np.exp(1j * state.psi)
     for name in state.called("speed"):
         written = unit_in_name(name, "m/s")
@@ -453,7 +440,6 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
 
     most : share of the heading's change that a column without a fitting name may leave unexplained.
     """
-    assert state.psi is not None
     change = state.chosen.change(state.psi)
     if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)

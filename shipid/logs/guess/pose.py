@@ -196,8 +196,12 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
     clockwise, mirror_like = frame in ("ned", "enu"), abs(best.mirrored) > abs(best.same)
     if best.misfit <= POOR and mirror_like != (frame == "enu"):
         others = ["enu"] if mirror_like else [name for name in get_args(Frame) if name != "enu"]
-        words = f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
-        raise DataError(f"{words} {' or '.join(others)}", file=file, path="--frame")
+        raise DataError(
+            f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
+            f" {' or '.join(others)}",
+            file=file,
+            path="--frame",
+        )
     given = replace(best, settled=f"--frame {frame}", counts=1 if clockwise else -1)
     if frame != "ned":
         given = _y_is_west(given, given.settled) if frame == "zup" else _x_is_east(given, given.settled)
