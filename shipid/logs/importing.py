@@ -146,8 +146,9 @@ def import_log(
             _distinct_runs(piece for run, part in each for piece in _split_runs(part, run)), ignore_index=True
         )
     elif mapping.source.runs is None:
-        segments = mapping.segment or (_whole_segment(rows, mapping, source),)
-        frame, outside = _cut_into_runs(rows, segments, to_si(mapping.clock.unit, "t"), source)
+        unit, t = to_si(mapping.clock.unit, "t"), rows["t"]
+        whole = Segment(run=source.stem, start=t.iloc[0] / unit, end=t.iloc[-1] / unit)
+        frame, outside = _cut_into_runs(rows, mapping.segment or (whole,), unit, source)
         repairs += outside
     else:
         frame = pd.concat([_name_run(part.rows, run) for run, part in each], ignore_index=True)
@@ -451,11 +452,6 @@ def _estimate_velocities(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tu
     note = f"innovations {np.sqrt(squares / len(rows)):.2f} times as large as the noise declared (1 if it fits)"
     records = [{"kind": "estimated", "column": ", ".join(lacking), "count": len(rows), "note": note}]
     return pd.concat(parts, ignore_index=True), records
-
-
-def _whole_segment(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
-    unit = to_si(mapping.clock.unit, "t")
-    return Segment(run=file.stem, start=rows["t"].iloc[0] / unit, end=rows["t"].iloc[-1] / unit)
 
 
 def _cut_into_runs(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.words import name_parts, number_in_name, side_in_name, words_of_side
-from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of, signal_row
+from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
 
@@ -223,7 +223,9 @@ def _missing_command(state: State, name: str, idle: set[str], vessel: Vessel) ->
     if name in idle and is_shaft(name) and state.suggestions:
         why = f"no column of the log is {name}: taken as stopped"
         state.find("command not logged", (), GUESSED, why)
-        yield Suggestion(name, state.suggestions[0].source, _quoted_command(name), GUESSED, why, {"factor": 0.0})
+        yield Suggestion(
+            name, state.suggestions[0].source, SIGNALS[signal_of(name)].read_in, GUESSED, why, {"factor": 0.0}
+        )
         return
     state.ask((signal_of(name),), f"which column is {name}? {vessel.name} needs it")
 
@@ -246,15 +248,5 @@ def _lateral_position(name: str, vessel: Vessel) -> float:
 
 def _side_or_place(name: str, vessel: Vessel) -> str:
     """Side or end that the name of a command says, else the side on which the vessel has it; empty where neither."""
-    return _place_in_name(name) or _side_of_component(name, vessel)
-
-
-def _side_of_component(name: str, vessel: Vessel) -> str:
     y = _lateral_position(name, vessel)
-    return "port" if y < 0 else "starboard" if y > 0 else ""
-
-
-def _quoted_command(name: str) -> str:
-    row = signal_row(name)
-    assert row is not None
-    return row.read_in
+    return _place_in_name(name) or ("port" if y < 0 else "starboard" if y > 0 else "")

@@ -134,8 +134,9 @@ def guess(
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
     for doubt in sniffed.doubts:
         state.ask(("clock", "t"), doubt)
-    if sniffed.clock["unit"] != "date":
-        _ask_for_clock(state, str(sniffed.clock["from"]))
+    clock = str(sniffed.clock["from"])
+    if sniffed.clock["unit"] != "date" and not (is_clock(clock) or state.numbered):
+        state.ask(("clock",), f"no column is called a clock: {clock!r} rises from row to row. Is it the time?")
     if state.r is None:
         choose_yaw_rate(state)
     choose_commands(state)
@@ -152,12 +153,6 @@ def guess(
     defects_of_motion(state)
     left = unused_reasons(state, numbering)
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
-
-
-def _ask_for_clock(state: State, name: str) -> None:
-    """Ask whether a column is the clock that only rises, and has another name."""
-    if not (is_clock(name) or state.numbered):
-        state.ask(("clock",), f"no column is called a clock: {name!r} rises from row to row. Is it the time?")
 
 
 def _report_run_parts(state: State, source: GuessFiles) -> None:

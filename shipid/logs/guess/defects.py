@@ -137,7 +137,8 @@ def defects_of_motion(state: State) -> None:
             _find_late(state, "heading", "yaw rate", delay)
             # or the tests below would report the same delay again
             state.psi = np.interp(state.t + delay.seconds, state.t, state.psi)
-            if state.body is not None and not _is_earth_fixed(state):
+            earth = any(one.name == "speed" or (one.name == "u" and one.extra) for one in state.suggestions)
+            if state.body is not None and not earth:
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
         _factor_of_rate(state)
     if state.velocity is None:
@@ -266,12 +267,6 @@ def _ask_for_set_clock(state: State) -> None:
         times += rollover_words(steps[row])
         words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
         state.ask(("clock", "t"), f"{words}Then split the log there")
-
-
-def _is_earth_fixed(state: State) -> bool:
-    return any(
-        column.name in ("u", "speed") and (column.name == "speed" or column.extra) for column in state.suggestions
-    )
 
 
 def _arm_or_delay(state: State, path: Complex) -> Complex:

@@ -83,7 +83,7 @@ def _take_positions(state: State) -> None:
             fine = _angle_fraction(state, north, east)
             for name in (north, east):
                 _set_scale(state, name, fine, f"whole numbers of {PARTS[fine]}")
-        elif all(_is_ddmm(one) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
+        elif all(np.all(one % 100 < 60) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
             for name in (north, east):
                 state.columns[name] = degrees_and_minutes(state.columns[name])
                 state.spikes.pop(name, None)
@@ -289,8 +289,3 @@ def _whole_turn(values: Array) -> float | None:
 
 def _within_globe(both: Iterable[Array], factor: float) -> bool:
     return all(float(one.max()) * factor <= most for one, most in zip(both, (90.0, 360.0), strict=True))
-
-
-def _is_ddmm(values: Array) -> bool:
-    """Whether numbers, too large for degrees, are degrees and minutes, as in 6326.4 for 63 deg 26.4 min."""
-    return bool(np.all(values % 100 < 60))

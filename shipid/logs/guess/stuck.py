@@ -62,7 +62,6 @@ def _turn_by_others(state: State, name: str, first: int, last: int) -> float:
         span = slice(first, last + 1)
         return float(np.real(integrate_rate(state.t[span], state.r[span])[-1]))
     turned = float(state.psi[last] - state.psi[first])
-    if name == "course":
+    if name == "course" or state.r is None:
         return turned
-    assert state.r is not None
     return turned - float(state.r[first]) * float(state.t[last] - state.t[first])
