@@ -34,26 +34,14 @@ def of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path
     """Degrees and minutes (N,) as degrees."""
     degrees = degrees_and_minutes(numbers)
     wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{numbers[row]:.10g} in {row_in_words(log, row)} has 60 minutes or more: is the unit deg?",
-            file=file,
-            path=path,
-        )
+    _refuse_value(wrong, numbers, log, file, path, behind=" has 60 minutes or more: is the unit deg?")
     return degrees
 
 
 def of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
     """Rates of turn (N,) as messages of AIS have them, in deg/min."""
-    wrong = ~np.isnan(numbers) & ~((numbers >= -128) & (numbers <= 127))
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise DataError(
-            f"{numbers[row]:.10g} in {row_in_words(log, row)} is none of -128 to 127, as AIS has: is the unit deg/min?",
-            file=file,
-            path=path,
-        )
+    why = " is none of -128 to 127, as AIS has: is the unit deg/min?"
+    _refuse_value((numbers < -128) | (numbers > 127), numbers, log, file, path, behind=why)
     return rate_of_ais(numbers)
 
 
@@ -61,17 +49,10 @@ def of_parts(
     parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
 ) -> NDArray[np.float64]:
     """Degrees, minutes and seconds (N,), of columns of these names, as degrees."""
-    degrees = degrees_in_parts(parts)
+    why = ", 60 or more: are these minutes or seconds?"
     for name, part in zip(names[1:], parts[1:], strict=True):
-        wrong = np.abs(part) >= 60.0
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise DataError(
-                f"{name!r} is {part[row]:.10g} in {row_in_words(log, row)}, 60 or more: are these minutes or seconds?",
-                file=file,
-                path=path,
-            )
-    return degrees
+        _refuse_value(np.abs(part) >= 60.0, part, log, file, path, f"{name!r} is ", why)
+    return degrees_in_parts(parts)
 
 
 def of_quaternion(
@@ -79,13 +60,26 @@ def of_quaternion(
 ) -> NDArray[np.float64]:
     """Quaternions (4, N), of columns of these names, as yaw angles [rad]."""
     size = quaternion_size(parts)
+    said, why = ", ".join(map(repr, names)), ", and a quaternion has 1: are these x, y, z, w?"
     wrong = (size > 0) & (np.abs(size - 1.0) > OFF_ONE)
+    _refuse_value(wrong, size, log, file, path, f"{said} have the size ", why, digits=4)
+    return quaternion_yaw(parts)
+
+
+def _refuse_value(
+    wrong: NDArray[np.bool_],
+    values: NDArray[np.float64],
+    log: pd.DataFrame,
+    file: Path,
+    path: str,
+    before: str = "",
+    behind: str = "",
+    digits: int = 10,
+) -> None:
+    """Raise DataError where values (N,) are wrong: the first of them and its row, with words before and behind."""
     if wrong.any():
         row = int(np.argmax(wrong))
-        said = ", ".join(map(repr, names))
-        place = f"{said} have the size {size[row]:.4g} in {row_in_words(log, row)}"
-        raise DataError(f"{place}, and a quaternion has 1: are these x, y, z, w?", file=file, path=path)
-    return quaternion_yaw(parts)
+        raise DataError(f"{before}{values[row]:.{digits}g} in {row_in_words(log, row)}{behind}", file=file, path=path)
 
 
 def row_in_words(log: pd.DataFrame, place: int) -> str:

@@ -134,8 +134,7 @@ def _match_in_order(state: State, names: Sequence[str], columns: Sequence[Sugges
         return dict.fromkeys(names, columns[0])
     if len(names) == 1:
         rest = ", ".join(map(repr, sources[1:]))
-        sentence = f"{names[0]} is {sources[0]!r}, not {rest}"
-        state.find("several columns for one command", sources, 0.6, sentence)
+        state.find("several columns for one command", sources, 0.6, f"{names[0]} is {sources[0]!r}, not {rest}")
         return {names[0]: columns[0]}
     by_number = _with_numbers(names, columns)
     return by_number or _ask_about_commands(state, names, columns, "Their names do not say which is which")
@@ -195,8 +194,12 @@ def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Sugg
     if seen != right:
         extra["sign"] = -1
         sides = ("starboard", "port") if seen > 0 else ("port", "starboard")
-        sentence = f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[1]}"
-        state.find(kind, (one.source,), one.confidence, sentence)
+        state.find(
+            kind,
+            (one.source,),
+            one.confidence,
+            f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[1]}",
+        )
     return replace(one, extra=extra)
 
 

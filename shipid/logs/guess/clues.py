@@ -280,8 +280,10 @@ class State:
         """Ask where a name has a unit that is not known here; return whether it does."""
         said = "" if name in self.scaled or name in self.units else unknown_unit(name)
         if said:
-            words = f"{name!r} says {said!r}, no unit that is known here: write `unit` and `factor`"
-            self.ask((about,), f"{words}. {unit} is a guess")
+            self.ask(
+                (about,),
+                f"{name!r} says {said!r}, no unit that is known here: write `unit` and `factor`. {unit} is a guess",
+            )
         return said != ""
 
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:

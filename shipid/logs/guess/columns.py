@@ -160,8 +160,12 @@ def _report_run_parts(state: State, source: GuessFiles) -> None:
     said = [f"column {column!r} says them"] if column else []
     said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []
     state.taken.update({column} if column else ())
-    sentence = f"{source.held} runs in {len(source.files)} file{'s' * (len(source.files) > 1)}: {' and '.join(said)}"
-    state.find("several runs in a file", (column,) if column else (), 0.9, sentence)
+    state.find(
+        "several runs in a file",
+        (column,) if column else (),
+        0.9,
+        f"{source.held} runs in {len(source.files)} file{'s' * (len(source.files) > 1)}: {' and '.join(said)}",
+    )
 
 
 def _choose_other_columns(state: State) -> None:

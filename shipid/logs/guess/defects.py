@@ -65,11 +65,13 @@ def _held_positions(state: State) -> None:
     share = float(some.sum()) / len(state.t)
     if share > HELD_SHARE:
         late = float(np.mean(some)) / 2 * float(np.median(np.diff(state.t)))
-        sentence = (
+        state.find(
+            "held positions",
+            tuple(places),
+            0.9,
             f"in {100 * share:.0f} % of the rows the position repeats the row before while the heading goes on: a "
-            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap"
+            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap",
         )
-        state.find("held positions", tuple(places), 0.9, sentence)
 
 
 def defects_of_rows(state: State, sniffed: LogTable) -> None:
@@ -84,10 +86,12 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
             )
         share = float(np.median([evidence.interpolated_share(state.columns[name]) for name in moving]))
         if share > 0.2:
-            sentence = (
-                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
+            state.find(
+                "interpolated from a slower log",
+                tuple(moving),
+                0.9,
+                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated",
             )
-            state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
     _held_positions(state)
     for column in state.suggestions:
         values = state.columns[column.source]
@@ -96,21 +100,28 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
             ordered = len(np.unique(values)) <= ORDERED
             if 0.05 < top < 0.9 and evidence.maximum_visits(values) >= VISITS and not ordered:
                 rows = f"{100 * top:.0f} % of the rows of {column.source!r}"
-                sentence = f"{rows} have exactly the largest value, {values.max():g}"
-                state.find("clipped", (column.source,), 0.7, sentence)
+                state.find("clipped", (column.source,), 0.7, f"{rows} have exactly the largest value, {values.max():g}")
         elif column.name in MEASURED:
             limits = [limit for limit in (values.max(), values.min()) if _piles_up(values, float(limit))]
             if limits:
                 most = ", ".join(f"{limit:g}" for limit in limits)
                 share = float(np.mean(np.isin(values, limits)))
-                sentence = f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it"
-                state.find("clipped", (column.source,), 0.7, sentence)
+                state.find(
+                    "clipped",
+                    (column.source,),
+                    0.7,
+                    f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it",
+                )
     steps = np.diff(sniffed.t)
     holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
     holes = max(holes - sniffed.seams, 0)
     if holes:
-        sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
-        state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
+        state.find(
+            "holes in time",
+            (sniffed.clock["from"],),
+            0.99,
+            f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s",
+        )
     missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
     if missing and not sniffed.scattered:  # no sentence says everything
         state.find(
@@ -265,8 +276,11 @@ def _ask_for_set_clock(state: State) -> None:
     for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
         times = " comes ".join(clock_text(state, float(state.t[row + one])) for one in (0, 1))
         times += rollover_words(steps[row])
-        words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
-        state.ask(("clock", "t"), f"{words}Then split the log there")
+        state.ask(
+            ("clock", "t"),
+            f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
+            f"Then split the log there",
+        )
 
 
 def _arm_or_delay(state: State, path: Complex) -> Complex:
@@ -359,8 +373,12 @@ def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> 
     repair: dict[str, Any]
     if stay and state.joined:
         count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
-        sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
-        state.find("position jumps", (), 0.9, sentence)
+        state.find(
+            "position jumps",
+            (),
+            0.9,
+            f"the position jumps {count} of the files and does not come back: `data check` shows where",
+        )
     elif stay:
         words = ", ".join(
             f"{clock_text(state, start)} to {clock_text(state, end)} ({far:.0f} m)" for start, end, far in stay[:6]
@@ -535,8 +553,9 @@ def defects_of_spikes(state: State) -> None:
     places = [one for one in state.suggestions if one.name in POSITIONS and one.source in state.spikes]
     if places:
         rows = np.unique(np.concatenate([state.spikes[one.source][0] for one in places]))
-        words = f"the position leaves and comes back {_row_times(state, rows)}"
-        state.find("position spikes", (), 0.9, words, OF_POSITIONS)
+        state.find(
+            "position spikes", (), 0.9, f"the position leaves and comes back {_row_times(state, rows)}", OF_POSITIONS
+        )
     for one in state.suggestions:
         if one.name in SPIKY and one.source in state.spikes:
             rows, size = state.spikes[one.source]

@@ -54,8 +54,12 @@ def choose_twins(state: State, r: np.ndarray) -> None:
 def _say_sides(state: State, pair: tuple[str, str], effect: float) -> None:
     """Say so where more of the port screw turns the ship to port; effect: t value of port less starboard."""
     if effect < 0:
-        sentence = f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?"
-        state.find("sides of the screws", pair, 0.6, sentence)
+        state.find(
+            "sides of the screws",
+            pair,
+            0.6,
+            f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?",
+        )
 
 
 def twin_columns(state: State) -> list[tuple[str, str]]:

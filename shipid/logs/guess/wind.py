@@ -109,10 +109,12 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
         state.ask(("V_w",), f"is {speed!r} in {best.unit}? The motion of the ship fits {rivals} nearly as well")
     how = {"apparent": f" in {best.unit}, {best.direction!r}"}.get(best.kind, "")
     turned = f"while the ship turns, {WORDS[best.kind]}{how}, changes by {left[best]:.2g} m/s (RMS)"
-    sentence = (
-        f"{turned}, and as {WORDS[drafted.kind]} in {drafted.unit}, {drafted.direction!r}, by {left[drafted]:.2g}"
+    state.find(
+        "kind of wind",
+        (speed, angle),
+        0.8,
+        f"{turned}, and as {WORDS[drafted.kind]} in {drafted.unit}, {drafted.direction!r}, by {left[drafted]:.2g}",
     )
-    state.find("kind of wind", (speed, angle), 0.8, sentence)
     return best, turned
 
 
