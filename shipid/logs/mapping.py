@@ -284,11 +284,11 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
             for key, entry in raw["columns"].items()
         }
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
+    clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     _check_mapped_columns(mapping, file)
     _check_missing(mapping, file)
     _check_instants(mapping, file)
     _check_segments(mapping, file)
-    clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
     for index, repair in enumerate(mapping.repair):
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
@@ -490,7 +490,6 @@ def _parse_repairs(raw: Any, file: Path) -> Iterator[Repair]:
 
 
 def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
-    _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     columns = mapping.columns
     mapped = (
         *required_columns().keys() - {"t"},
@@ -563,12 +562,12 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
                 file=file,
                 path=f"columns.{name}",
             )
-    for pair in (("latitude", "longitude"), ("speed", "course"), ("u", "v")):
+    for pair in (("latitude", "longitude"), ("speed", "course")):
         missing = set(pair) - columns.keys()
-        if len(missing) == 1 and (pair != ("u", "v") or mapping.estimate is None):
-            message = f"missing: {' and '.join(pair)} belong together"
-            if pair != ("u", "v"):
-                raise DocumentError(message, file=file, path=f"columns.{missing.pop()}")
+        if len(missing) == 1:
+            raise DocumentError(
+                f"missing: {' and '.join(pair)} belong together", file=file, path=f"columns.{missing.pop()}"
+            )
     for name in sorted(required_columns().keys() - {"t"} - columns.keys()):
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue

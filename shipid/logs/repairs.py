@@ -243,8 +243,7 @@ def take_earlier(rows: pd.DataFrame, repair: Latency) -> Outcome:
     Rows whose t + d lies outside the stretch are removed.
     """
     t = rows["t"].to_numpy()
-    broken = (rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1
-    stretch = np.cumsum(broken)
+    stretch = _stretch_number(rows)
     psi = rows["psi"].to_numpy()
     names = {"position": ("north", "east"), "heading": ("psi",), "yaw rate": ("r",), "velocity": ("u", "v")}[
         repair.signal

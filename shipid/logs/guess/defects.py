@@ -298,8 +298,7 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
     if delay is not None and delay.explained > by_arm:
         _find_late(state, "position", "velocity", delay)
         instants = state.t - delay.seconds
-        moved = [np.interp(instants, state.t, part) for part in (path.real, path.imag)]
-        late = np.asarray(moved[0] + 1j * moved[1])
+        late = np.interp(instants, state.t, path)
         known = np.flatnonzero((instants >= state.t[0]) & (instants <= state.t[-1]))[[0, -1]]
         for row, beyond in ((known[0], slice(None, known[0])), (known[1], slice(known[1], None))):
             late[beyond] = late[row] + state.position[beyond] - state.position[row]  # or a path that stands still jumps
