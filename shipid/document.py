@@ -82,8 +82,9 @@ def find_document(name: str | Path, kind: str, relative_to: Path | None = None) 
         for place in places:
             if os.path.isfile(place):  # a name that is too long is none
                 return place
-        fault = "is a folder: name a document in it" if any(map(os.path.isdir, places)) else "no such file"
-        raise DocumentError(fault, file=name)
+        raise DocumentError(
+            "is a folder: name a document in it" if any(map(os.path.isdir, places)) else "no such file", file=name
+        )
     available = bundled_documents(kind)
     if name not in available:
         label, draft = DRAFTS[kind]

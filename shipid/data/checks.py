@@ -252,10 +252,8 @@ def measure_delay(stretches: Iterable[tuple[Array, Plane, Plane]]) -> Delay | No
     for t, signal, total in stretches:
         width = min(max(WINDOW_SECONDS, 4 * usual), (t[-1] - t[0]) / 6)
         first = np.arange(t[0] + longest, t[-1] - longest - width, max(width / 4, least))
-        changes.append(_complex_at(t, signal, first + width) - _complex_at(t, signal, first))
-        moved = [
-            _complex_at(t, total, first + width - delay) - _complex_at(t, total, first - delay) for delay in delays
-        ]
+        changes.append(np.interp(first + width, t, signal) - np.interp(first, t, signal))
+        moved = [np.interp(first + width - delay, t, total) - np.interp(first - delay, t, total) for delay in delays]
         integrals.append(np.array(moved))
         variances.append(np.full(len(first), 2 * (white_noise_of(signal.real) ** 2 + white_noise_of(signal.imag) ** 2)))
     change, integrated = np.concatenate(changes), np.concatenate(integrals, axis=1)
@@ -281,10 +279,6 @@ def _misfit(change: Plane, integrated: Plane) -> Array:
     power = np.maximum((np.abs(integrated) ** 2).sum(axis=1), 1e-30)
     scale = np.maximum((integrated.conj() * change).real.sum(axis=1), 0.0)
     return np.asarray(np.abs(change - (scale / power)[:, None] * integrated))
-
-
-def _complex_at(t: Array, values: Plane, instants: Array) -> Plane:
-    return np.interp(instants, t, values.real) + 1j * np.interp(instants, t, values.imag)
 
 
 def _check_path(stretches: list[pd.DataFrame]) -> Iterator[dict[str, Any]]:

@@ -31,11 +31,15 @@ def fetch_log(name: str) -> Path:
             raise DataError("the mapping names no file in a data folder", file=name, path="source.file")
         file = Path(folder) / source.file
         if not (file.is_file() if source.runs is None else file.is_dir()):
-            message = f"not there: put the log there, or unset {FOLDER_VARIABLE} to download it ({source.url})"
-            raise DataError(message, file=file)
+            raise DataError(
+                f"not there: put the log there, or unset {FOLDER_VARIABLE} to download it ({source.url})", file=file
+            )
         if source.sha256 not in (None, log_digest(mapping, file)):
-            message = f"not the published file (sha256 differs from that of {name!r}): fetch it anew from {source.url}"
-            raise DataError(message, file=file, path="source.sha256")
+            raise DataError(
+                f"not the published file (sha256 differs from that of {name!r}): fetch it anew from {source.url}",
+                file=file,
+                path="source.sha256",
+            )
         return file
     if source.url is None or source.sha256 is None:
         raise DataError(
@@ -44,8 +48,11 @@ def fetch_log(name: str) -> Path:
             path="source.url",
         )
     if source.runs is not None:
-        message = f"several files, not downloaded: get them from {source.url} and set {FOLDER_VARIABLE} to their folder"
-        raise DataError(message, file=name, path="source.url")
+        raise DataError(
+            f"several files, not downloaded: get them from {source.url} and set {FOLDER_VARIABLE} to their folder",
+            file=name,
+            path="source.url",
+        )
     return _download_log(name, source.url, source.sha256, source.file)
 
 
@@ -58,13 +65,20 @@ def _download_log(name: str, url: str, sha256: str, file: str | None) -> Path:
     try:
         return Path(pooch.retrieve(url, f"sha256:{sha256}", fname=f"{stem}-{url.rpartition('/')[2]}", path=cache))
     except ValueError:  # pooch's word for a wrong checksum; it has already removed the download
-        message = f"what came is not the published file (sha256 differs): try again, or set {FOLDER_VARIABLE}"
-        raise DataError(message, file=url, path="source.sha256") from None
+        raise DataError(
+            f"what came is not the published file (sha256 differs): try again, or set {FOLDER_VARIABLE}",
+            file=url,
+            path="source.sha256",
+        ) from None
     except OSError as error:  # requests' errors are OSErrors too, without a number
         if error.errno or isinstance(error, PermissionError):
-            message = (
+            raise DataError(
                 f"no log can be kept there ({error.strerror or 'Permission denied'}): set XDG_CACHE_HOME to a folder "
-            )
-            raise DataError(f"{message}that can, or {FOLDER_VARIABLE} to one with the log", file=cache) from None
-        message = f"cannot be downloaded ({type(error).__name__}): go online, or set {FOLDER_VARIABLE} to a folder "
-        raise DataError(f"{message}that holds {file or 'the log'}", file=url) from None
+                f"that can, or {FOLDER_VARIABLE} to one with the log",
+                file=cache,
+            ) from None
+        raise DataError(
+            f"cannot be downloaded ({type(error).__name__}): go online, or set {FOLDER_VARIABLE} to a folder "
+            f"that holds {file or 'the log'}",
+            file=url,
+        ) from None

@@ -34,22 +34,14 @@ def of_minutes(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path
     """Degrees and minutes (N,) as degrees."""
     degrees = degrees_and_minutes(numbers)
     wrong = np.isfinite(numbers) & ~np.isfinite(degrees)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        message = f"{numbers[row]:.10g} in {row_in_words(log, row)} has 60 minutes or more: is the unit deg?"
-        raise DataError(message, file=file, path=path)
+    _refuse_value(wrong, numbers, log, file, path, behind=" has 60 minutes or more: is the unit deg?")
     return degrees
 
 
 def of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: str) -> NDArray[np.float64]:
     """Rates of turn (N,) as messages of AIS have them, in deg/min."""
-    wrong = ~np.isnan(numbers) & ~((numbers >= -128) & (numbers <= 127))
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        message = (
-            f"{numbers[row]:.10g} in {row_in_words(log, row)} is none of -128 to 127, as AIS has: is the unit deg/min?"
-        )
-        raise DataError(message, file=file, path=path)
+    why = " is none of -128 to 127, as AIS has: is the unit deg/min?"
+    _refuse_value((numbers < -128) | (numbers > 127), numbers, log, file, path, behind=why)
     return rate_of_ais(numbers)
 
 
@@ -57,16 +49,10 @@ def of_parts(
     parts: list[NDArray[np.float64]], names: tuple[str, ...], log: pd.DataFrame, file: Path, path: str
 ) -> NDArray[np.float64]:
     """Degrees, minutes and seconds (N,), of columns of these names, as degrees."""
-    degrees = degrees_in_parts(parts)
+    why = ", 60 or more: are these minutes or seconds?"
     for name, part in zip(names[1:], parts[1:], strict=True):
-        wrong = np.abs(part) >= 60.0
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            message = (
-                f"{name!r} is {part[row]:.10g} in {row_in_words(log, row)}, 60 or more: are these minutes or seconds?"
-            )
-            raise DataError(message, file=file, path=path)
-    return degrees
+        _refuse_value(np.abs(part) >= 60.0, part, log, file, path, f"{name!r} is ", why)
+    return degrees_in_parts(parts)
 
 
 def of_quaternion(
@@ -74,14 +60,26 @@ def of_quaternion(
 ) -> NDArray[np.float64]:
     """Quaternions (4, N), of columns of these names, as yaw angles [rad]."""
     size = quaternion_size(parts)
+    said, why = ", ".join(map(repr, names)), ", and a quaternion has 1: are these x, y, z, w?"
     wrong = (size > 0) & (np.abs(size - 1.0) > OFF_ONE)
+    _refuse_value(wrong, size, log, file, path, f"{said} have the size ", why, digits=4)
+    return quaternion_yaw(parts)
+
+
+def _refuse_value(
+    wrong: NDArray[np.bool_],
+    values: NDArray[np.float64],
+    log: pd.DataFrame,
+    file: Path,
+    path: str,
+    before: str = "",
+    behind: str = "",
+    digits: int = 10,
+) -> None:
+    """Raise DataError where values (N,) are wrong: the first of them and its row, with words before and behind."""
     if wrong.any():
         row = int(np.argmax(wrong))
-        said = ", ".join(map(repr, names))
-        place = f"{said} have the size {size[row]:.4g} in {row_in_words(log, row)}"
-        message = f"{place}, and a quaternion has 1: are these x, y, z, w?"
-        raise DataError(message, file=file, path=path)
-    return quaternion_yaw(parts)
+        raise DataError(f"{before}{values[row]:.{digits}g} in {row_in_words(log, row)}{behind}", file=file, path=path)
 
 
 def row_in_words(log: pd.DataFrame, place: int) -> str:
@@ -115,18 +113,22 @@ def parse_numbers(
         numbers = column.to_numpy(dtype=np.float64, na_value=np.nan)
         infinite = np.flatnonzero(np.isinf(numbers))
         if len(infinite):
-            message = f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)"
-            raise DataError(message, file=file, path=row_in_words(log, infinite[0]))
+            raise DataError(
+                f"{numbers[infinite[0]]} is no number (column {source!r}; {len(infinite)} such rows)",
+                file=file,
+                path=row_in_words(log, infinite[0]),
+            )
         return numbers
     read = form if isinstance(form, TableFormat) else TextFormat()
     text = column.fillna("").astype(str).str.strip()
     missing = text.isin(read.missing)
     if read.decimal == "," and read.thousands is None and (grouped := _row_of_thousands_mark(text)) is not None:
-        message = (
+        raise DataError(
             f"{text.iloc[grouped]!r} has a point, and the decimal is a comma (column {source!r}): is it a mark of "
-            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there"
+            "thousands? Write [format] thousands = '.'. Is it the decimal of this column? Write a comma there",
+            file=file,
+            path=row_in_words(log, grouped),
         )
-        raise DataError(message, file=file, path=row_in_words(log, grouped))
     plain = in_points(text, read.decimal, read.thousands).mask(missing)
     numbers = pd.to_numeric(plain, errors="coerce").to_numpy(dtype=np.float64, copy=True)
     if units and np.any(~np.isfinite(numbers) & ~missing.to_numpy()):
@@ -134,20 +136,22 @@ def parse_numbers(
         own = behind.map(lambda one: any(is_unit(one, unit) for unit in units)).to_numpy(dtype=bool)
         other = np.flatnonzero(behind.ne("").to_numpy() & ~own & ~missing.to_numpy())
         if len(other) and not sides:
-            message = (
+            raise DataError(
                 f"{text.iloc[other[0]]!r} is not in {units[0]}, as the mapping has it (column {source!r}; {len(other)} "
-                "such rows): write one unit in the whole column"
+                "such rows): write one unit in the whole column",
+                file=file,
+                path=row_in_words(log, other[0]),
             )
-            raise DataError(message, file=file, path=row_in_words(log, other[0]))
         north = behind.where(own, "").map(north_reference)
         if {"T", "M"} <= {*north}:
             kind = {"T": "true", "M": "magnetic"}[north[north.ne("")].iloc[0]]
             other = np.flatnonzero(north.isin({"T", "M"} - {kind[0].upper()}))
-            message = (
+            raise DataError(
                 f"{text.iloc[other[0]]!r} is not of {kind} north, as those before it (column {source!r}; {len(other)} "
-                "such rows): write one north in the whole column"
+                "such rows): write one north in the whole column",
+                file=file,
+                path=row_in_words(log, other[0]),
             )
-            raise DataError(message, file=file, path=row_in_words(log, other[0]))
         text = bare.where(own, text)
         missing |= text.isin(read.missing)
         plain = in_points(text, read.decimal, read.thousands).mask(missing)

@@ -42,8 +42,11 @@ def common_instants(
     if len(shared) < 2:
         late, early = (pick(spans, key=lambda name: spans[name][end]) for pick, end in ((max, 0), (min, -1)))
         begin, end = format_moment(first), format_moment(last)
-        message = f"columns share no time: {late!r} begins at {begin}, {early!r} ends at {end}"
-        raise DataError(message, file=file, path=f"columns.{late}")
+        raise DataError(
+            f"columns share no time: {late!r} begins at {begin}, {early!r} ends at {end}",
+            file=file,
+            path=f"columns.{late}",
+        )
     return shared
 
 
@@ -106,8 +109,11 @@ def close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[p
         if not missing.any():
             continue
         if max_gap is None:
-            message = f"no number in {int(missing.sum())} rows of {name!r}: set max_gap to interpolate short gaps"
-            raise DataError(message, file=file, path=f"{row_in_words(rows, int(np.argmax(missing)))}, clock.max_gap")
+            raise DataError(
+                f"no number in {int(missing.sum())} rows of {name!r}: set max_gap to interpolate short gaps",
+                file=file,
+                path=f"{row_in_words(rows, int(np.argmax(missing)))}, clock.max_gap",
+            )
         before = np.maximum.accumulate(np.where(missing, -np.inf, t))
         after = np.minimum.accumulate(np.where(missing, np.inf, t)[::-1])[::-1]
         short = missing & (after - before <= longest)
@@ -127,8 +133,11 @@ def close_gaps(rows: pd.DataFrame, max_gap: float | None, file: Path) -> tuple[p
         message += ": orders written only where they change are held with [clock] step" * is_command(worst)
         raise DataError(message, file=file, path="clock.max_gap")
     if longest < np.median(np.diff(t)):
-        message = f"{max_gap:g} s is shorter than the step of the log, {np.median(np.diff(t)):g} s"
-        raise DataError(message, file=file, path="clock.max_gap")
+        raise DataError(
+            f"{max_gap:g} s is shorter than the step of the log, {np.median(np.diff(t)):g} s",
+            file=file,
+            path="clock.max_gap",
+        )
     broken = np.append(False, np.diff(kept) > longest)
     if broken.any():
         note = f"gaps longer than {max_gap:g} s"

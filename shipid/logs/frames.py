@@ -119,8 +119,11 @@ def project_positions(
             reached = (
                 f"{values[wrong[0]]:.6g} deg at {format_moment(rows['t'].iloc[wrong[0]])}, one of {len(wrong)} rows"
             )
-            message = f"{reached}: is the unit right? List what stands for a missing value in [format] missing"
-            raise DataError(message, file=file, path=f"columns.{name}")
+            raise DataError(
+                f"{reached}: is the unit right? List what stands for a missing value in [format] missing",
+                file=file,
+                path=f"columns.{name}",
+            )
     known = np.flatnonzero(np.isfinite(latitude) & np.isfinite(longitude))
     if mapping.origin is not None:
         origin = mapping.origin.latitude, mapping.origin.longitude

@@ -146,8 +146,9 @@ def import_log(
             _distinct_runs(piece for run, part in each for piece in _split_runs(part, run)), ignore_index=True
         )
     elif mapping.source.runs is None:
-        segments = mapping.segment or (_whole_segment(rows, mapping, source),)
-        frame, outside = _cut_into_runs(rows, segments, to_si(mapping.clock.unit, "t"), source)
+        unit, t = to_si(mapping.clock.unit, "t"), rows["t"]
+        whole = Segment(run=source.stem, start=t.iloc[0] / unit, end=t.iloc[-1] / unit)
+        frame, outside = _cut_into_runs(rows, mapping.segment or (whole,), unit, source)
         repairs += outside
     else:
         frame = pd.concat([_name_run(part.rows, run) for run, part in each], ignore_index=True)
@@ -161,8 +162,11 @@ def run_files(source: LogSource, log: Path) -> dict[str, Path]:
     """Run -> file: every file of the folder that fits `source.runs`; without that pattern, the log itself."""
     if source.runs is None:
         if log.is_dir():
-            fault = 'cannot be read: a folder, and the mapping reads one file; for a file a run write runs = "*.csv"'
-            raise DataError(fault, file=log, path="source.runs")
+            raise DataError(
+                'cannot be read: a folder, and the mapping reads one file; for a file a run write runs = "*.csv"',
+                file=log,
+                path="source.runs",
+            )
         return {log.stem: log}
     if not log.is_dir():
         fault = "is a file, and the mapping takes a folder of runs" if log.is_file() else "there is no such folder"
@@ -267,8 +271,11 @@ def _check_breaks(mapping: Mapping, t: Array, off: tuple[str, ...], file: Path) 
     for index, repair in enumerate(mapping.repair if alone else ()):
         for start, end in repair.intervals if isinstance(repair, Break) and repair.enabled else ():
             if end < t[0] or start > t[-1]:
-                message = f"{format_span(start, end)} is not in the log, which has {format_span(t[0], t[-1])}"
-                raise DataError(message, file=file, path=f"repair.{index}.intervals")
+                raise DataError(
+                    f"{format_span(start, end)} is not in the log, which has {format_span(t[0], t[-1])}",
+                    file=file,
+                    path=f"repair.{index}.intervals",
+                )
 
 
 def _run_texts(log: pd.DataFrame, source: str, file: Path) -> NDArray[np.object_]:
@@ -445,11 +452,6 @@ def _estimate_velocities(rows: pd.DataFrame, mapping: Mapping, file: Path) -> tu
     note = f"innovations {np.sqrt(squares / len(rows)):.2f} times as large as the noise declared (1 if it fits)"
     records = [{"kind": "estimated", "column": ", ".join(lacking), "count": len(rows), "note": note}]
     return pd.concat(parts, ignore_index=True), records
-
-
-def _whole_segment(rows: pd.DataFrame, mapping: Mapping, file: Path) -> Segment:
-    unit = to_si(mapping.clock.unit, "t")
-    return Segment(run=file.stem, start=rows["t"].iloc[0] / unit, end=rows["t"].iloc[-1] / unit)
 
 
 def _cut_into_runs(

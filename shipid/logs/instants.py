@@ -132,8 +132,11 @@ def even_instants(t: NDArray[np.float64], every: float, log: pd.DataFrame, file:
     wrong = (off > rounding + every) | (np.diff(even, prepend=-np.inf) <= 0)
     if np.any(wrong):
         row = int(np.argmax(wrong))
-        message = f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate"
-        raise DataError(message, file=file, path=f"{row_in_words(log, row)}, clock.every")
+        raise DataError(
+            f"the time is {off[row]:.3g} s from rows every {every:g} s: the clock has another rate",
+            file=file,
+            path=f"{row_in_words(log, row)}, clock.every",
+        )
     return even
 
 

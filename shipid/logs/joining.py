@@ -60,8 +60,11 @@ def _check_alike(datasets: Mapping[Path, Dataset]) -> None:
         for here, there, place in ((wanted, one, file), (one, wanted, first)):
             lacking = [name for name in here.commands if name not in there.commands]
             if lacking:
-                sentence = f"no command {', '.join(lacking)}, which {first.name if place is file else file.name} has"
-                raise DataError(f"{sentence}: name the columns alike in both mappings, and import again", file=place)
+                raise DataError(
+                    f"no command {', '.join(lacking)}, which {first.name if place is file else file.name} has"
+                    f": name the columns alike in both mappings, and import again",
+                    file=place,
+                )
         vessels = {str(data.metadata["vessel"]) for data in (wanted, one) if data.metadata.get("vessel")}
         if len(vessels) > 1:
             raise DataError(f"of another vessel than {first.name}: {' and '.join(sorted(vessels))}", file=file)
@@ -78,8 +81,11 @@ def _check_copies(datasets: Mapping[Path, Dataset]) -> None:
             run = datasets[file].frame["run"]
             shares = rows[file].isin(rows[other]).groupby(run).sum() / run.groupby(run).size()
             if shares.max() > COPIED:
-                copied = f"run {shares.idxmax()!r} has {percent_text(shares.max())} of its rows from {other.name}"
-                raise DataError(f"{copied}: a copy would train on what it tests; leave one of them out", file=file)
+                raise DataError(
+                    f"run {shares.idxmax()!r} has {percent_text(shares.max())} of its rows from {other.name}"
+                    f": a copy would train on what it tests; leave one of them out",
+                    file=file,
+                )
 
 
 def _common_columns(datasets: Mapping[Path, Dataset], notes: list[str]) -> list[str]:
@@ -141,8 +147,11 @@ def _check_no_overlap(file: Path, one: Dataset) -> None:
     over = np.flatnonzero(spans["max"].cummax().to_numpy()[:-1] >= spans["min"].to_numpy()[1:])
     if len(over):
         name = spans.index[over[0] + 1]
-        sentence = f"run {name!r} shares moments with another, and the other datasets have a clock for each run"
-        raise DataError(f"{sentence}: cut the segments of this mapping apart, and import again", file=file)
+        raise DataError(
+            f"run {name!r} shares moments with another, and the other datasets have a clock for each run"
+            f": cut the segments of this mapping apart, and import again",
+            file=file,
+        )
 
 
 def _origin_offset(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float, float, float]:
@@ -153,8 +162,12 @@ def _origin_offset(datasets: Mapping[Path, Dataset], file: Path) -> tuple[float,
         return 0.0, 0.0, 0.0
     if not here or not there:
         bare = file if here is None else first
-        sentence = "positions have no origin on the Earth, those of the other datasets have"
-        raise DataError(f"{sentence}: import all with latitude and longitude, or none", file=bare, path="origin")
+        raise DataError(
+            "positions have no origin on the Earth, those of the other datasets have"
+            ": import all with latitude and longitude, or none",
+            file=bare,
+            path="origin",
+        )
     from pymap3d import geodetic2ned
 
     places = here["latitude"], here["longitude"], there["latitude"], there["longitude"]

@@ -284,11 +284,11 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
             for key, entry in raw["columns"].items()
         }
     mapping: Mapping = document.parse_model(Mapping, {**raw, **parts}, file)
+    clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     _check_mapped_columns(mapping, file)
     _check_missing(mapping, file)
     _check_instants(mapping, file)
     _check_segments(mapping, file)
-    clock = _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     repairable = [*mapping.columns, *(name for name, other in REPLACED.items() if other in mapping.columns)]
     for index, repair in enumerate(mapping.repair):
         for column in repair.columns if isinstance(repair, ColumnRepair) else ():
@@ -299,13 +299,19 @@ def parse_mapping(raw: document.Document, file: Path) -> Mapping:
                     path=f"repair.{index}.columns",
                 )
             if isinstance(repair, ColumnRepair) and repair.of_inputs and column not in mapping.columns:
-                message = f"{column!r} is made of columns that this repair mends: write two repairs"
-                raise DocumentError(message, file=file, path=f"repair.{index}.columns")
+                raise DocumentError(
+                    f"{column!r} is made of columns that this repair mends: write two repairs",
+                    file=file,
+                    path=f"repair.{index}.columns",
+                )
             if isinstance(repair, WrapInterpolation) and not (
                 column in mapping.columns and mapping.columns[column].wrap
             ):
-                message = f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair"
-                raise DocumentError(message, file=file, path=f"repair.{index}.columns")
+                raise DocumentError(
+                    f"{column!r} does not wrap: write wrap = true in its column, or take it off this repair",
+                    file=file,
+                    path=f"repair.{index}.columns",
+                )
     converted = [_in_si(repair, clock, file, f"repair.{index}.unit") for index, repair in enumerate(mapping.repair)]
     return mapping.model_copy(update={"repair": tuple(converted)})
 
@@ -484,7 +490,6 @@ def _parse_repairs(raw: Any, file: Path) -> Iterator[Repair]:
 
 
 def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
-    _unit_factor(mapping.clock.unit, "s", file, "clock.unit")
     columns = mapping.columns
     mapped = (
         *required_columns().keys() - {"t"},
@@ -499,23 +504,38 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
             raise DocumentError(f"unknown column: {suggest_name(name, mapped)} ({hint})", file=file, path=path)
         _unit_factor(column.unit, unit, file, f"{path}.unit")
         if column.unit == "ddmm" and name not in ("latitude", "longitude"):
-            message = "only latitude and longitude are in degrees and minutes: write deg or rad"
-            raise DocumentError(message, file=file, path=f"{path}.unit")
+            raise DocumentError(
+                "only latitude and longitude are in degrees and minutes: write deg or rad",
+                file=file,
+                path=f"{path}.unit",
+            )
         if column.unit == "ais" and name != "r":
-            message = "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min"
-            raise DocumentError(message, file=file, path=f"{path}.unit")
+            raise DocumentError(
+                "only the yaw rate r is in numbers of AIS: write rad/s, deg/s or deg/min",
+                file=file,
+                path=f"{path}.unit",
+            )
         four = not isinstance(column.source, str) and len(column.source) == 4
         if four != (column.unit == "quaternion") or (four and name != "psi"):
-            message = "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi"
-            raise DocumentError(message, file=file, path=f"{path}.unit")
+            raise DocumentError(
+                "a quaternion is the heading, from four columns: write from = [x, y, z, w] and this unit for psi",
+                file=file,
+                path=f"{path}.unit",
+            )
         if not (four or isinstance(column.source, str)) and (
             name not in ("latitude", "longitude") or column.unit != "deg"
         ):
-            message = "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column"
-            raise DocumentError(message, file=file, path=f"{path}.from")
+            raise DocumentError(
+                "only a latitude or longitude in deg is written in degrees, minutes and seconds: name one column",
+                file=file,
+                path=f"{path}.from",
+            )
         if (column.direction is None) == (name == "beta_w"):
-            message = "must be 'towards' or 'from' for beta_w, and belongs to no other column"
-            raise DocumentError(message, file=file, path=f"{path}.direction")
+            raise DocumentError(
+                "must be 'towards' or 'from' for beta_w, and belongs to no other column",
+                file=file,
+                path=f"{path}.direction",
+            )
         if column.wrap and unit != "rad":
             raise DocumentError("only a column in rad or deg can wrap: remove wrap", file=file, path=f"{path}.wrap")
         if column.relative and name != "beta_w":
@@ -542,12 +562,12 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
                 file=file,
                 path=f"columns.{name}",
             )
-    for pair in (("latitude", "longitude"), ("speed", "course"), ("u", "v")):
+    for pair in (("latitude", "longitude"), ("speed", "course")):
         missing = set(pair) - columns.keys()
-        if len(missing) == 1 and (pair != ("u", "v") or mapping.estimate is None):
-            message = f"missing: {' and '.join(pair)} belong together"
-            if pair != ("u", "v"):
-                raise DocumentError(message, file=file, path=f"columns.{missing.pop()}")
+        if len(missing) == 1:
+            raise DocumentError(
+                f"missing: {' and '.join(pair)} belong together", file=file, path=f"columns.{missing.pop()}"
+            )
     for name in sorted(required_columns().keys() - {"t"} - columns.keys()):
         if REPLACED.get(name) in columns or (name in ESTIMATED and mapping.estimate is not None):
             continue
@@ -573,8 +593,11 @@ def _check_missing(mapping: Mapping, file: Path) -> None:
     for index, repair in enumerate(mapping.repair):
         moves = isinstance(repair, LeverArm) and repair.moves != "position" and not {"u", "v"} <= set(lacking)
         if moves and "r" in lacking:
-            message = 'velocities are moved by r, which is estimated afterwards: write moves = "position"'
-            raise DocumentError(message, file=file, path=f"repair.{index}.moves")
+            raise DocumentError(
+                'velocities are moved by r, which is estimated afterwards: write moves = "position"',
+                file=file,
+                path=f"repair.{index}.moves",
+            )
 
 
 def _check_instants(mapping: Mapping, file: Path) -> None:
@@ -582,8 +605,9 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
     for name, column in mapping.columns.items():
         path = f"columns.{name}"
         if column.file is not None and column.file not in mapping.file:
-            message = f"no [file.{column.file}]: {suggest_name(column.file, mapping.file)}"
-            raise DocumentError(message, file=file, path=f"{path}.file")
+            raise DocumentError(
+                f"no [file.{column.file}]: {suggest_name(column.file, mapping.file)}", file=file, path=f"{path}.file"
+            )
         if column.interpolation == "angle" and (INPUTS.get(name) or unit_of_column(name)) != "rad":
             raise DocumentError(
                 "only a column in rad or deg can be interpolated as an angle: use linear or previous",
@@ -591,24 +615,34 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
                 path=f"{path}.interpolation",
             )
         if column.interpolation is not None and not mapping.resamples:
-            message = "nothing is interpolated at other instants: set [clock] step, a latency or a file"
-            raise DocumentError(message, file=file, path=f"{path}.interpolation")
+            raise DocumentError(
+                "nothing is interpolated at other instants: set [clock] step, a latency or a file",
+                file=file,
+                path=f"{path}.interpolation",
+            )
     for name, entry in mapping.file.items():
         _unit_factor(entry.clock.unit, "s", file, f"file.{name}.clock.unit")
     clocks: dict[str, Clock | FileClock] = {"clock": mapping.clock}
     clocks |= {f"file.{name}.clock": entry.clock for name, entry in mapping.file.items()}
     for path, clock in clocks.items():
         if clock.date is not None and clock.unit != "date":
-            message = (
-                f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'"
+            raise DocumentError(
+                f"a column of dates is used only with the unit 'date', not with {clock.unit!r}: write unit = 'date'",
+                file=file,
+                path=f"{path}.date",
             )
-            raise DocumentError(message, file=file, path=f"{path}.date")
         if not isinstance(clock.source, str) and clock.unit != "date":
-            message = "hour, minute and second in several columns are a time of day: write unit = 'date'"
-            raise DocumentError(message, file=file, path=f"{path}.unit")
+            raise DocumentError(
+                "hour, minute and second in several columns are a time of day: write unit = 'date'",
+                file=file,
+                path=f"{path}.unit",
+            )
     if mapping.resamples and mapping.clock.max_gap is None:
-        message = "missing: columns are interpolated at other instants, so set the longest gap"
-        raise DocumentError(message, file=file, path="clock.max_gap")
+        raise DocumentError(
+            "missing: columns are interpolated at other instants, so set the longest gap",
+            file=file,
+            path="clock.max_gap",
+        )
     if mapping.source.runs is not None and mapping.file:
         raise DocumentError(
             "source.runs reads one run from each file, [file.*] several files for one run: remove one of them",
@@ -622,15 +656,22 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             path="segment",
         )
     if mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None:
-        message = "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]"
-        raise DocumentError(message, file=file, path="parts")
+        raise DocumentError(
+            "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]",
+            file=file,
+            path="parts",
+        )
     if mapping.parts is not None and mapping.segment:
-        message = "both [parts] and segments say where runs begin: remove one of them"
-        raise DocumentError(message, file=file, path="parts")
+        raise DocumentError(
+            "both [parts] and segments say where runs begin: remove one of them", file=file, path="parts"
+        )
     for index, repair in enumerate(mapping.repair):
         if isinstance(repair, WrapInterpolation) and mapping.resamples:
-            message = "cannot see false samples after resampling: import without step, file and latency"
-            raise DocumentError(message, file=file, path=f"repair.{index}.kind")
+            raise DocumentError(
+                "cannot see false samples after resampling: import without step, file and latency",
+                file=file,
+                path=f"repair.{index}.kind",
+            )
 
 
 def _check_segments(mapping: Mapping, file: Path) -> None:
@@ -670,6 +711,5 @@ def _unit_factor(unit: str, si: str, file: Path, path: str) -> float:
         share = ""
         if unit in ("%", "percent", "pct") and "rev/s" in UNITS[si]:
             share = '; of a share of full speed write `unit = "rev/s"` and, as `factor`, the rev/s of 1 %'
-        message = f"unknown unit {unit!r}: valid here: {', '.join(UNITS[si])}{share}"
-        raise DocumentError(message, file=file, path=path)
+        raise DocumentError(f"unknown unit {unit!r}: valid here: {', '.join(UNITS[si])}{share}", file=file, path=path)
     return UNITS[si][unit]

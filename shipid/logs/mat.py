@@ -32,13 +32,15 @@ def read_mat(file: Path, _: MatFormat, clock: str, *__: object) -> pd.DataFrame:
         variables = loadmat(file, simplify_cells=True)
         vectors, further = dict(_numeric_vectors(variables)), list(_no_vectors(variables))
     except NotImplementedError:
-        message = "a MATLAB file of version 7.3: save it with save(..., '-v7')"
-        raise DataError(message, file=file, path="format.kind") from None
+        raise DataError(
+            "a MATLAB file of version 7.3: save it with save(..., '-v7')", file=file, path="format.kind"
+        ) from None
     except (OSError, MemoryError):  # of the system, whatever is in the file
         raise
     except Exception as error:  # scipy defines no error class: a damaged file raises any of a dozen
-        message = f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind"
-        raise DataError(message, file=file, path="format.kind") from None
+        raise DataError(
+            f"not a MATLAB file, or damaged ({type(error).__name__}): set [format] kind", file=file, path="format.kind"
+        ) from None
     other = {name: f"{what}: {remedy}" if remedy else what for name, what, remedy in further}
     if not vectors:
         first = next(iter(other), None)

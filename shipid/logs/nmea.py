@@ -56,8 +56,7 @@ def read_nmea(file: Path, form: NmeaFormat, _: str, progress: Callable[[float], 
             try:
                 heard.hear(line)
             except ValueError as error:
-                message = f"{error}: set [format] time = 'fix'"
-                raise DataError(message, file=file, path=f"row {number}") from None
+                raise DataError(f"{error}: set [format] time = 'fix'", file=file, path=f"row {number}") from None
     if not heard.said:
         raise DataError(heard.nothing(), file=file, path="format.kind")
     table = heard.table()

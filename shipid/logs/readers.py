@@ -68,8 +68,9 @@ def read_log_table(
             table = READERS[form.kind].read(file, form, clock, progress)
     except OSError as error:
         if error.errno is None:  # of a library, not of the system
-            message = f"no file of kind {form.kind!r}, or damaged: set [format] kind"
-            raise DataError(message, file=file, path="format.kind") from None
+            raise DataError(
+                f"no file of kind {form.kind!r}, or damaged: set [format] kind", file=file, path="format.kind"
+            ) from None
         raise DataError(f"cannot be read ({error.strerror})", file=file) from None
     if len(table) < 2:
         raise DataError(f"a header and {len(table)} rows: a log needs two rows or more", file=file)
@@ -102,8 +103,7 @@ def refuse_power_cut(content: bytes, file: Path) -> None:
     lines = content.splitlines()
     damaged = [number for number, line in enumerate(lines, start=1) if b"\0" in line]
     if damaged and len(damaged) < len(lines) / 2 and not re.search(rb"[\x01-\x08\x0e-\x1a]", content):
-        message = "holds NUL bytes, as after a power cut: remove them"
-        raise DataError(message, file=file, path=f"line {damaged[0]}")
+        raise DataError("holds NUL bytes, as after a power cut: remove them", file=file, path=f"line {damaged[0]}")
 
 
 def _read_text(file: Path, form: TextFormat, *_: object) -> pd.DataFrame:
@@ -148,13 +148,19 @@ def parse_text(source: Path | io.StringIO, form: TextFormat, file: Path) -> pd.D
             check_width(width, file)
             table = _read_cells(source, form, width)
     except UnicodeDecodeError as error:
-        message = f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252"
-        raise DataError(message, file=file, path="format.encoding") from None
+        raise DataError(
+            f"not {form.encoding} text (byte {error.start}): set the encoding it was saved in, often cp1252",
+            file=file,
+            path="format.encoding",
+        ) from None
     except pd.errors.EmptyDataError:
         raise _no_rows_error(form, file) from None
     except (pd.errors.ParserError, ValueError) as error:
-        message = f"not a table with this separator ({error}): check separator and skip_rows"
-        raise DataError(message, file=file, path="format.separator") from None
+        raise DataError(
+            f"not a table with this separator ({error}): check separator and skip_rows",
+            file=file,
+            path="format.separator",
+        ) from None
     blank = np.ones(len(table), dtype=bool)
     for name in table:
         blank &= (table[name].isna() | table[name].str.strip().eq("")).to_numpy()
@@ -211,8 +217,9 @@ def _name_columns(table: pd.DataFrame, form: TextFormat, file: Path) -> tuple[li
     width = max((index + 1 for index, one in enumerate(filled) if one), default=1)
     if form.names is not None:
         if len(form.names) != width and len(form.names) != table.shape[1]:
-            message = f"{len(form.names)} names for the {width} columns of the log"
-            raise DataError(message, file=file, path="format.names")
+            raise DataError(
+                f"{len(form.names)} names for the {width} columns of the log", file=file, path="format.names"
+            )
         names = [*form.names, *[""] * (table.shape[1] - len(form.names))]
         return names, table
     if form.header:
@@ -235,8 +242,11 @@ def _without_headers(
     lines = _line_numbers(table.index[again], source, form, file)
     if form.ragged == "refuse":
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
-        message = f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'"
-        raise DataError(message, file=file, path=f"line {lines[0]}")
+        raise DataError(
+            f"repeats the header{more}: remove the line, split the log there, or set [format] ragged = 'drop'",
+            file=file,
+            path=f"line {lines[0]}",
+        )
     return table.loc[~again], lines
 
 
@@ -256,8 +266,12 @@ def _without_ragged(
         wrong |= table.iloc[:, index].fillna("").str.strip().ne("").to_numpy()
     lines = _line_numbers(table.index[wrong], source, form, file)
     if len(lines) > len(table) / 2:
-        message = f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
-        raise DataError(f"{message}than the header: check separator and skip_rows", file=file, path="format.separator")
+        raise DataError(
+            f"not a table with this separator: {len(lines)} of {len(table)} lines have another number of cells "
+            f"than the header: check separator and skip_rows",
+            file=file,
+            path="format.separator",
+        )
     if lines and form.ragged == "refuse":
         first = int(np.argmax(wrong))
         row = table.iloc[first]
@@ -265,10 +279,11 @@ def _without_ragged(
         cells = short.get(int(table.index[first]), int(filled.nonzero()[0].max()) + 1)
         count = len(named) if not beyond or cells < beyond[0] else beyond[0]
         more = f" ({len(lines)} such lines)" if len(lines) > 1 else ""
-        message = (
-            f"{cells} cells, where the header has {count}{more}: correct the line, or set [format] ragged = 'drop'"
+        raise DataError(
+            f"{cells} cells, where the header has {count}{more}: correct the line, or set [format] ragged = 'drop'",
+            file=file,
+            path=f"line {lines[0]}",
         )
-        raise DataError(message, file=file, path=f"line {lines[0]}")
     return (table.loc[~wrong] if lines else table), lines
 
 
@@ -312,8 +327,9 @@ def _numbered_rows(source: Path | io.StringIO, form: TextFormat, file: Path) -> 
                 yield numbers[0], row
                 numbers.clear()
         except csv.Error as error:
-            message = f"a cell without an end ({error}): is its closing quote lacking?"
-            raise DataError(message, file=file, path=f"line {numbers[0]}") from None
+            raise DataError(
+                f"a cell without an end ({error}): is its closing quote lacking?", file=file, path=f"line {numbers[0]}"
+            ) from None
 
 
 def _large_text(

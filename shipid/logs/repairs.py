@@ -171,8 +171,11 @@ def remove_spikes(rows: pd.DataFrame, repair: Despike) -> Outcome:
     step = float(np.median(np.diff(t)))
     width = 2 * round(repair.window / 2 / step) + 1
     if width == 1:
-        message = f"its window, {repair.window:g} s, holds one row, which is its own median"
-        raise DataError(f"{message}: rows are {step:.3g} s apart, give {2 * step:.3g} s or more", path="repair.despike")
+        raise DataError(
+            f"its window, {repair.window:g} s, holds one row, which is its own median"
+            f": rows are {step:.3g} s apart, give {2 * step:.3g} s or more",
+            path="repair.despike",
+        )
     stretch, healed = _stretch_number(rows), {}
     for name in repair.columns:
         pieces = rows[name].interpolate(limit_area="inside").groupby(stretch)
@@ -240,8 +243,7 @@ def take_earlier(rows: pd.DataFrame, repair: Latency) -> Outcome:
     Rows whose t + d lies outside the stretch are removed.
     """
     t = rows["t"].to_numpy()
-    broken = (rows["flags"].to_numpy() >> FLAGS.index(BREAK)) & 1
-    stretch = np.cumsum(broken)
+    stretch = _stretch_number(rows)
     psi = rows["psi"].to_numpy()
     names = {"position": ("north", "east"), "heading": ("psi",), "yaw rate": ("r",), "velocity": ("u", "v")}[
         repair.signal
@@ -320,8 +322,11 @@ def apply_repairs(
             except DataError as error:
                 raise DataError(error.message, file=file, path=error.path) from None
             if outcome.rows.empty:
-                message = f"no row is left ({outcome.note}): change it, or leave it out with --without {repair.kind}"
-                raise DataError(message, file=file, path=f"repair.{repair.kind}")
+                raise DataError(
+                    f"no row is left ({outcome.note}): change it, or leave it out with --without {repair.kind}",
+                    file=file,
+                    path=f"repair.{repair.kind}",
+                )
             bit = 1 << FLAGS.index(repair.kind)
             flags = outcome.rows["flags"].to_numpy() | np.where(outcome.touched, bit, 0)
             rows, count, note = outcome.rows.assign(flags=flags), outcome.count, outcome.note

@@ -115,14 +115,19 @@ def _open_workbook(file: Path) -> CalamineWorkbook:
     try:
         from python_calamine import CalamineError, CalamineWorkbook
     except ImportError:
-        message = "a workbook needs python-calamine: pip install 'shipid[sheet]', or save its sheet as CSV"
-        raise DataError(message, file=file, path="format.kind") from None
+        raise DataError(
+            "a workbook needs python-calamine: pip install 'shipid[sheet]', or save its sheet as CSV",
+            file=file,
+            path="format.kind",
+        ) from None
     try:
         with zipfile.ZipFile(file) as packed:
             size = sum(part.file_size for part in packed.infolist())
         if size > LARGEST:
-            message = f"a workbook of {size / 1e9:.1f} GB once unpacked: save its sheet as CSV, which is read by parts"
-            raise DataError(message, file=file)
+            raise DataError(
+                f"a workbook of {size / 1e9:.1f} GB once unpacked: save its sheet as CSV, which is read by parts",
+                file=file,
+            )
         return CalamineWorkbook.from_filelike(io.BytesIO(file.read_bytes()))  # by content, whatever its name is
     except (CalamineError, zipfile.BadZipFile, ValueError) as error:
         raise _damaged_workbook(error, file) from None

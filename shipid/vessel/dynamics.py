@@ -380,8 +380,10 @@ def _component_arrays(key: str, block: Mapping[str, Any]) -> tuple[dict[str, int
     try:
         return dict.fromkeys(columns, 1), np.column_stack([np.array(values, float) for values in columns.values()])
     except (AttributeError, TypeError, ValueError):
-        message = f"components of {key} must return a table, argument -> numbers (C,), equally many"
-        raise ShipidError(f"{message}, not {columns!r}{definition_location(term.components)}") from None
+        raise ShipidError(
+            f"components of {key} must return a table, argument -> numbers (C,), equally many"
+            f", not {columns!r}{definition_location(term.components)}"
+        ) from None
 
 
 def _term_wrench(key: str, available: Mapping[str, SX], keywords: Mapping[str, Any], entries: Mapping[str, Any]) -> SX:

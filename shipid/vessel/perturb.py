@@ -64,10 +64,6 @@ class PerturbationRule:
 WITHOUT = 'a rule changes numbers; a whole term goes by structure = {"wind.off" = true} of the family'
 
 
-def _removed_paths(patterns: list[str], base: Vessel, file: Any, where: str) -> dict[str, Any]:
-    return dict.fromkeys(select_paths(patterns, base.parameters, file, where))
-
-
 def _checked_values(values: Mapping[str, float], base: Vessel, file: Any, where: str) -> Mapping[str, float]:
     unknown = next((path for path in values if path not in base.parameters), None)
     if unknown is not None:
@@ -93,7 +89,7 @@ RULES: dict[str, PerturbationRule] = {
     "remove": PerturbationRule(
         list[str],
         lambda _number, _none, _u: 0.0,
-        places=_removed_paths,
+        places=lambda patterns, base, file, where: dict.fromkeys(select_paths(patterns, base.parameters, file, where)),
         note="paths whose value becomes 0; * and [order >= 3]",
     ),
     "set": PerturbationRule(
@@ -138,7 +134,7 @@ class Perturbation(CheckedModel, BaseModel):
         """Check the keys and values of rules, so that a complaint names key and value."""
         if isinstance(raw, cls):
             return raw
-        return perturbation_model().model_validate(raw).model_dump(exclude_unset=True)
+        return _block_model(tuple(RULES.items())).model_validate(raw).model_dump(exclude_unset=True)
 
     @model_validator(mode="after")
     def _one_meaning(self) -> Perturbation:
@@ -171,14 +167,9 @@ class Perturbation(CheckedModel, BaseModel):
         return any(RULES[key].drawn(argument) for key, argument in self.given.items())
 
 
-def perturbation_model() -> type[BaseModel]:
-    """Pydantic model of a `[[family.perturb]]` block: the keys of all rules with the types of their arguments."""
-    return _block_model(tuple(RULES.items()))
-
-
 @cache
 def _block_model(rules: tuple[tuple[str, PerturbationRule], ...]) -> type[BaseModel]:
-    """Model of a block whose keys are these rules."""
+    """Model of a `[[family.perturb]]` block whose keys are these rules, with the types of their arguments."""
     fields: dict[str, Any] = {
         key: (Annotated[rule.argument | None, Field(description=rule.note)], None) for key, rule in rules
     }
@@ -342,8 +333,9 @@ def change_structure(family: Family, base: Vessel) -> Vessel:
     try:
         return base.with_values(family.structure) if family.structure else base
     except DocumentError as error:
-        words = f"{error.path}: {error.message}" if error.path else error.message
-        raise DocumentError(words, path=f"family.{family.name}.structure") from None
+        raise DocumentError(
+            f"{error.path}: {error.message}" if error.path else error.message, path=f"family.{family.name}.structure"
+        ) from None
 
 
 Step = tuple[str, Callable[[float, Any, float], float], Any, str | None]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from shipid.logs.guess.clues import LIKELY, State, Suggestion, unit_of_another
 from shipid.logs.guess.words import name_parts, number_in_name, side_in_name, words_of_side
-from shipid.physics.signals import is_command, is_shaft, is_steering, signal_of, signal_row
+from shipid.physics.signals import SIGNALS, is_command, is_shaft, is_steering, signal_of
 from shipid.simulation.approach import Controls
 from shipid.vessel.load import Vessel
 
@@ -134,8 +134,7 @@ def _match_in_order(state: State, names: Sequence[str], columns: Sequence[Sugges
         return dict.fromkeys(names, columns[0])
     if len(names) == 1:
         rest = ", ".join(map(repr, sources[1:]))
-        sentence = f"{names[0]} is {sources[0]!r}, not {rest}"
-        state.find("several columns for one command", sources, 0.6, sentence)
+        state.find("several columns for one command", sources, 0.6, f"{names[0]} is {sources[0]!r}, not {rest}")
         return {names[0]: columns[0]}
     by_number = _with_numbers(names, columns)
     return by_number or _ask_about_commands(state, names, columns, "Their names do not say which is which")
@@ -195,8 +194,12 @@ def _with_sign(state: State, one: Suggestion, helm: Mapping[str, float]) -> Sugg
     if seen != right:
         extra["sign"] = -1
         sides = ("starboard", "port") if seen > 0 else ("port", "starboard")
-        sentence = f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[1]}"
-        state.find(kind, (one.source,), one.confidence, sentence)
+        state.find(
+            kind,
+            (one.source,),
+            one.confidence,
+            f"positive {one.source!r} turns to {sides[0]}; {one.name} of the vessel to {sides[1]}",
+        )
     return replace(one, extra=extra)
 
 
@@ -223,7 +226,9 @@ def _missing_command(state: State, name: str, idle: set[str], vessel: Vessel) ->
     if name in idle and is_shaft(name) and state.suggestions:
         why = f"no column of the log is {name}: taken as stopped"
         state.find("command not logged", (), GUESSED, why)
-        yield Suggestion(name, state.suggestions[0].source, _quoted_command(name), GUESSED, why, {"factor": 0.0})
+        yield Suggestion(
+            name, state.suggestions[0].source, SIGNALS[signal_of(name)].read_in, GUESSED, why, {"factor": 0.0}
+        )
         return
     state.ask((signal_of(name),), f"which column is {name}? {vessel.name} needs it")
 
@@ -246,15 +251,5 @@ def _lateral_position(name: str, vessel: Vessel) -> float:
 
 def _side_or_place(name: str, vessel: Vessel) -> str:
     """Side or end that the name of a command says, else the side on which the vessel has it; empty where neither."""
-    return _place_in_name(name) or _side_of_component(name, vessel)
-
-
-def _side_of_component(name: str, vessel: Vessel) -> str:
     y = _lateral_position(name, vessel)
-    return "port" if y < 0 else "starboard" if y > 0 else ""
-
-
-def _quoted_command(name: str) -> str:
-    row = signal_row(name)
-    assert row is not None
-    return row.read_in
+    return _place_in_name(name) or ("port" if y < 0 else "starboard" if y > 0 else "")

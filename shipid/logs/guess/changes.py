@@ -41,8 +41,6 @@ class ScalePart:
 
 def ask_for_changes(state: State) -> None:
     """Ask where the scale or the sign of velocities, a yaw rate or an angle that steers is another one in a part."""
-    if state.position is None or state.psi is None:
-        return
     sources = {one.name: one.source for one in state.suggestions}
     pairs: list[tuple[tuple[str, ...], str, Array | Complex, Array | Complex]] = []
     if state.velocity is not None:
@@ -96,10 +94,10 @@ def other_part(seen: Complex, ran: Complex) -> ScalePart | None:
 
 def _ask_for_angle(state: State, name: str, source: str) -> None:
     """Ask where an angle turns the ship to the other side, or many times as fast, from some row on."""
-    r = state.r if state.r is not None else np.gradient(np.asarray(state.psi), state.t)
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
     rows, design, change = evidence.yaw_regression(state.t, r, state.columns[source], state.part)
     seen = state.chosen
-    speed = np.abs(seen.change(np.asarray(state.position))) / (state.t[seen.last] - state.t[seen.first])
+    speed = np.abs(seen.change(state.position)) / (state.t[seen.last] - state.t[seen.first])
     makes_way = np.interp(rows, seen.first, speed) > MAKES_WAY * np.percentile(speed, 90)  # else thrust turns her
     rows, design, change = rows[makes_way], design[makes_way], change[makes_way]
     whole = evidence.solve_least_squares(design, change)[2]
@@ -122,7 +120,7 @@ def _ask_for_angle(state: State, name: str, source: str) -> None:
 def _ask_for_shaft(state: State, name: str, source: str) -> None:
     """Ask where the numbers of a shaft are at once some 6, 10 or 60 times as many, for the same way of the ship."""
     size = np.abs(state.columns[source])
-    way = np.abs(state.chosen.change(np.asarray(state.position)))
+    way = np.abs(state.chosen.change(state.position))
     turns = np.abs(state.chosen.change(evidence.integrate_rate(state.t, state.columns[source])))
     driven = np.flatnonzero((way > UNDER_WAY * np.median(way)) & (turns > 0.0))
     if len(driven) < SPLITS:

@@ -147,13 +147,17 @@ def _in_columns(
     if day is not None:
         written = column_called(table, day) if isinstance(day, str) else date_texts([columns[name] for name in day])
         texts = join_date_and_time(written, texts)
-    since = parse_dates(texts)
-    if not np.isfinite(since).all():
-        return None
     keys = {"from": times, "unit": "date"} | ({"date": day} if day is not None else {})
-    if np.all(np.diff(since) > 0):
-        return keys, since
-    rate = _even_rate(since)
+    return _rising_clock(keys, parse_dates(texts))
+
+
+def _rising_clock(keys: dict[str, Any], t: Array) -> tuple[dict[str, Any], Array] | None:
+    """The clock with these keys and times (N,) [s], at an even rate where it is rounded; None if it does not rise."""
+    if not np.isfinite(t).all():
+        return None
+    if np.all(np.diff(t) > 0):
+        return keys, t
+    rate = _even_rate(t)
     return None if rate is None else (keys | {"every": rate[0]}, rate[1])
 
 
@@ -220,15 +224,9 @@ def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) ->
             return with_date
         since = parse_dates(column) if is_clock(name) or _looks_dated(column) else np.full(len(table), np.nan)
         times[name] = since
-        if not np.isfinite(since).all():
-            called += [name] if is_clock(name) else []
-            continue
-        if np.all(np.diff(since) > 0):
-            return {"from": name, "unit": "date"}, since
-        rate = _even_rate(since)
-        if rate is not None:
-            return {"from": name, "unit": "date", "every": rate[0]}, rate[1]
-        called.append(name)
+        if clock := _rising_clock({"from": name, "unit": "date"}, since):
+            return clock
+        called += [name] if is_clock(name) or np.isfinite(since).all() else []
     in_columns = _in_columns(table, columns, _date_column(table, columns))
     if in_columns is not None:
         return in_columns
@@ -246,7 +244,8 @@ def _choose_clock(table: pd.DataFrame, columns: dict[str, Array], file: Path) ->
                 fault = _unreadable_time(table, name, times[name]) or _clock_fault(times[name])
                 raise DataError(f"no column can be the clock: {name!r} {fault}", file=file)
     faulty = [name for name in called if name not in rising and _nearly_rises({**times, **columns}[name])]
-    others = [] if faulty else [name for name in rising if not _is_row_counter(columns[name])]  # a total rises, too
+    counters = [name for name in rising if np.all(np.diff(columns[name]) == 1.0) and columns[name][0] in (0.0, 1.0)]
+    others = [] if faulty else [name for name in rising if name not in counters]  # a total rises, too
     candidates = [name for name in rising if name in called] or others
     unnamed = list(columns)[:1] if not called and all(name.isdecimal() for name in columns) else []
     rounded = [name for name in called or unnamed if name in finite and name not in rising]
@@ -379,13 +378,7 @@ def _with_date(table: pd.DataFrame, columns: dict[str, Array], name: str) -> tup
         return None
     of_date = column_called(table, day) if isinstance(day, str) else date_texts([columns[one] for one in day])
     t = parse_dates(join_date_and_time(of_date, column_called(table, name)))
-    keys = {"from": name, "unit": "date", "date": day}
-    if not np.isfinite(t).all():
-        return None
-    if np.all(np.diff(t) > 0):
-        return keys, t
-    rate = _even_rate(t)
-    return None if rate is None else (keys | {"every": rate[0]}, rate[1])
+    return _rising_clock({"from": name, "unit": "date", "date": day}, t)
 
 
 def is_clock(name: str) -> bool:
@@ -437,7 +430,9 @@ def _unit_of_clock(name: str, values: Array) -> str:
     steps = np.diff(values)
     rising = steps[steps > 0]  # a rounded clock often stands
     short = len(rising) > 0 and float(np.median(rising)) < SHORT_DAY
-    dates = next((unit for unit in _calendar_units(parts) if DATES[unit][0] < values[0] < DATES[unit][1]), "")
+    calendar = "mjd" if {"mjd", "modified"} & {*parts} else ""  # of those in days the first that may be
+    units = sorted(EPOCHS, key=lambda unit: unit != calendar)
+    dates = next((unit for unit in units if DATES[unit][0] < values[0] < DATES[unit][1]), "")
     if dates and (written == "d" if written else short and ends in ("", "d")):
         return dates
     if written or ends not in ("", "s"):
@@ -453,12 +448,6 @@ def _unit_of_clock(name: str, values: Array) -> str:
         step = 0.0 if slow else float(np.median(steps))
         return next((unit for unit, (least, far) in FINE.items() if values[0] > least or step >= far), "ms")
     return "s"
-
-
-def _calendar_units(parts: tuple[str, ...]) -> list[str]:
-    """Units of clocks in days that count from a date, first the one that a name with these parts says."""
-    said = "mjd" if {"mjd", "modified"} & {*parts} else ""
-    return sorted(EPOCHS, key=lambda unit: unit != said)
 
 
 def _wrapping_clock_unit(values: Array) -> str | None:
@@ -529,10 +518,6 @@ def _roundest_number(value: float, slack: float) -> float:
         if inverse and abs(1 / inverse - value) <= slack:
             return 1.0 / inverse
     return value
-
-
-def _is_row_counter(values: Array) -> bool:
-    return bool(np.all(np.diff(values) == 1.0) and values[0] in (0.0, 1.0))
 
 
 def _unreadable_time(table: pd.DataFrame, name: str, values: Array) -> str:

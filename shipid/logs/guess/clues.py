@@ -173,7 +173,7 @@ class State:
     commands : of the vessel, where it is known. turning : column that steers -> sign that turns the ship to starboard.
     astern : whether the ship goes astern nearly always. changed : columns of the dataset with another unit or sign in a
     part of the log.
-    position : north + i east [m]. psi : heading [rad]. r : yaw rate [rad/s].
+    position, psi : north + i east [m], heading [rad]; from `choose_pose` on. r : yaw rate [rad/s].
     velocity : earth-fixed, north + i east [m/s]. body : u + i v [m/s].
     """
 
@@ -197,8 +197,8 @@ class State:
     turning: dict[str, float] = field(default_factory=dict)
     astern: bool = False
     changed: set[str] = field(default_factory=set)
-    position: Complex | None = None
-    psi: Array | None = None
+    position: Complex = field(init=False)
+    psi: Array = field(init=False)
     r: Array | None = None
     velocity: Complex | None = None
     body: Complex | None = None
@@ -280,8 +280,10 @@ class State:
         """Ask where a name has a unit that is not known here; return whether it does."""
         said = "" if name in self.scaled or name in self.units else unknown_unit(name)
         if said:
-            words = f"{name!r} says {said!r}, no unit that is known here: write `unit` and `factor`"
-            self.ask((about,), f"{words}. {unit} is a guess")
+            self.ask(
+                (about,),
+                f"{name!r} says {said!r}, no unit that is known here: write `unit` and `factor`. {unit} is a guess",
+            )
         return said != ""
 
     def suggest(self, name: str, source: str, unit: str, confidence: float, why: str, **extra: Any) -> None:

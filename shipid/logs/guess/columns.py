@@ -43,9 +43,7 @@ from shipid.physics.signals import rows_of_role
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-BOTH_SIDES = 0.2  # of all turning, that is to the lesser side, at least: then a trim by the loss of speed is no heel
 IN_BURSTS = 0.1  # usual step over mean step of a clock, at most, where no window is without a hole
-HEELS, LEVEL = 0.8, 0.4  # correlation with the turning, at least and at most
 
 
 @dataclass(frozen=True)
@@ -134,8 +132,9 @@ def guess(
     check_clock(state, np.inf if vessel is None else vessel.document.get("particulars", {}).get("L_pp", np.inf))
     for doubt in sniffed.doubts:
         state.ask(("clock", "t"), doubt)
-    if sniffed.clock["unit"] != "date":
-        _ask_for_clock(state, str(sniffed.clock["from"]))
+    clock = str(sniffed.clock["from"])
+    if sniffed.clock["unit"] != "date" and not (is_clock(clock) or state.numbered):
+        state.ask(("clock",), f"no column is called a clock: {clock!r} rises from row to row. Is it the time?")
     if state.r is None:
         choose_yaw_rate(state)
     choose_commands(state)
@@ -154,19 +153,17 @@ def guess(
     return Guess(source, tuple(state.suggestions), tuple(state.findings), tuple(state.questions), left)
 
 
-def _ask_for_clock(state: State, name: str) -> None:
-    """Ask whether a column is the clock that only rises, and has another name."""
-    if not (is_clock(name) or state.numbered):
-        state.ask(("clock",), f"no column is called a clock: {name!r} rises from row to row. Is it the time?")
-
-
 def _report_run_parts(state: State, source: GuessFiles) -> None:
     column, pause = source.parts.get("from"), source.parts.get("pause")
     said = [f"column {column!r} says them"] if column else []
     said += [f"the clock pauses for more than {pause:g} s between them"] if pause else []
     state.taken.update({column} if column else ())
-    sentence = f"{source.held} runs in {len(source.files)} file{'s' * (len(source.files) > 1)}: {' and '.join(said)}"
-    state.find("several runs in a file", (column,) if column else (), 0.9, sentence)
+    state.find(
+        "several runs in a file",
+        (column,) if column else (),
+        0.9,
+        f"{source.held} runs in {len(source.files)} file{'s' * (len(source.files) > 1)}: {' and '.join(said)}",
+    )
 
 
 def _choose_other_columns(state: State) -> None:
@@ -178,27 +175,6 @@ def _choose_other_columns(state: State) -> None:
             unit, sign = likely_unit(state, name, meaning), "by its name; the log does not show its sign"
             state.ask_for_unit(meaning, name, unit)
             state.suggest(meaning, name, unit, 0.5, "by its name" if meaning in further else sign)
-    _ask_roll_and_pitch(state)
-
-
-def _ask_roll_and_pitch(state: State) -> None:
-    """Ask where the pitch follows the turning to both sides, as a ship heels, and the roll does not."""
-    source = {one.name: one.source for one in state.suggestions if one.name in ("phi", "theta")}
-    if len(source) < 2 or state.psi is None:
-        return
-    turning = state.chosen.change(state.psi).real
-    to_sides = float(np.sum(turning[turning > 0])), -float(np.sum(turning[turning < 0]))
-    if min(to_sides) <= BOTH_SIDES * sum(to_sides):
-        return
-    follows = {}
-    for meaning, name in source.items():
-        held = state.chosen.change(evidence.integrate_rate(state.t, state.columns[name])).real
-        size = float(np.std(held) * np.std(turning))
-        follows[meaning] = abs(float(np.mean((held - held.mean()) * (turning - turning.mean())))) / max(size, 1e-12)
-    if follows["theta"] > HEELS > LEVEL > follows["phi"]:
-        said = f"{source['theta']!r} follows the turning of the ship, as her heel does (correlation "
-        said += f"{follows['theta']:.2f}), and {source['phi']!r} does not ({follows['phi']:.2f})"
-        state.ask(("phi", "theta"), f"are {source['phi']!r} and {source['theta']!r} exchanged? {said}")
 
 
 def _is_steep(state: State, name: str, meaning: str) -> bool:

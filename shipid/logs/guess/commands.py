@@ -51,7 +51,7 @@ NEAR = 15.0  # times from that: a unit further off is doubted
 
 def choose_commands(state: State) -> None:
     """Choose angles that steer, then shafts and pitches; without any, throttles of two sides."""
-    r = state.r if state.r is not None else np.gradient(state.psi, state.t) if state.psi is not None else None
+    r = state.r if state.r is not None else np.gradient(state.psi, state.t)
     used: dict[str, int] = {}
     azimuth = _choose_steering(state, r, used)
     _choose_thrust(state, azimuth, used)
@@ -59,13 +59,13 @@ def choose_commands(state: State) -> None:
         choose_twins(state, r)
 
 
-def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> bool:
+def _choose_steering(state: State, r: Array, used: dict[str, int]) -> bool:
     """Choose the columns that steer, with their sign; return whether one is of an azimuth unit."""
     angles = _columns_named_for(state, [signal for signal in rows_of_role("command") if is_steering(signal)])
     turned = {name for name, signal in angles if _centre_angle(state, name, signal)}
-    power = {name: 0.0 if r is None else state.effect(r, state.columns[name]) for name in state.eligible()}
+    power = {name: state.effect(r, state.columns[name]) for name in state.eligible()}
     by_name = bool(angles)
-    if not angles and r is not None:
+    if not angles:
         # an order is held at its largest value; a response such as roll is not
         screws = _screw_columns(state)
         strength = {
@@ -83,7 +83,7 @@ def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> boo
         followed = 0.0
         why = "by its name; it is not seen to turn the ship, so that its sign is not known"
         confidence = 0.5 if by_name else 0.4
-        if by_name and abs(effect) <= SEEN and r is not None:
+        if by_name and abs(effect) <= SEEN:
             span = float(np.median(state.t[state.chosen.last] - state.t[state.chosen.first]))
             followed = evidence.order_correlation(state.t, r, state.columns[name], span)
             if abs(followed) > FOLLOWED:
@@ -92,8 +92,11 @@ def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> boo
                 followed = 0.0
         if state.astern and signal == "delta":
             effect = -effect
-            words = "the ship goes astern, and a rudder is taken to turn her the other way there"
-            state.ask((signal,), f"{words}: is {name!r} positive to {'starboard' if effect > 0 else 'port'}?")
+            state.ask(
+                (signal,),
+                "the ship goes astern, and a rudder is taken to turn her the other way there"
+                f": is {name!r} positive to {'starboard' if effect > 0 else 'port'}?",
+            )
         if abs(effect) > SEEN:
             state.turning[name] = float(np.sign(effect))
             confidence = 0.95 if by_name else 0.55
@@ -104,8 +107,12 @@ def _choose_steering(state: State, r: Array | None, used: dict[str, int]) -> boo
             why = f"positive turns the ship to {sides[0]} ({seen})"
             if (effect > 0) != (SIGNALS[signal].turns > 0):  # an azimuth is taken for one aft of the origin
                 extra["sign"] = -1
-                sentence = f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}"
-                state.find("wrong sign of rudder", (name,), confidence, sentence)
+                state.find(
+                    "wrong sign of rudder",
+                    (name,),
+                    confidence,
+                    f"positive {name!r} turns to {sides[0]} ({seen}); here to {sides[1]}",
+                )
         share = _ask_for_share(state, name, signal, unit)
         if share or (signal == "delta" and name not in turned and _ask_for_side(state, name, r)):
             confidence, why = 0.3, f"by its name; up to {float(np.abs(state.columns[name]).max()):.4g}"
@@ -132,8 +139,11 @@ def _ask_if_opposite(state: State) -> None:
         sides = state.side_of(port.source), state.side_of(starboard.source)
         same = signal_of(port.name) == signal_of(starboard.name) and sides == ("port", "starboard")
         if same and state.turning[port.source] != state.turning[starboard.source]:
-            count = f"{port.source!r} and {starboard.source!r} are seen to turn the ship to opposite sides"
-            state.ask((port.name, starboard.name), f"{count}: do they count so, or is the sign of one wrong?")
+            state.ask(
+                (port.name, starboard.name),
+                f"{port.source!r} and {starboard.source!r} are seen to turn the ship to opposite sides"
+                f": do they count so, or is the sign of one wrong?",
+            )
 
 
 def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
@@ -151,24 +161,33 @@ def _ask_for_share(state: State, name: str, signal: str, unit: str) -> str:
         return " in a unit that is not known"
     others = next((one.unit for one in state.suggestions if one.name == "psi"), None)
     if unit == "rad" and (others == "deg" or top == 1.0) and top <= 1.0:
-        text = f"{name!r}, up to {top:.4g}, has no unit: rad, deg, or a share (-1 to 1) of the largest angle?"
-        state.ask((signal,), f"{text} rad is a guess")
+        state.ask(
+            (signal,),
+            f"{name!r}, up to {top:.4g}, has no unit: rad, deg, or a share (-1 to 1) of the largest angle?"
+            f" rad is a guess",
+        )
     elif signal == "delta" and top > LARGEST:
-        text = f"{name!r}, up to {top:.4g}, has no unit: deg, or per cent or per mille of the largest angle?"
-        state.ask((signal,), f"{text} deg is a guess")
+        state.ask(
+            (signal,),
+            f"{name!r}, up to {top:.4g}, has no unit: deg, or per cent or per mille of the largest angle?"
+            f" deg is a guess",
+        )
     return ""
 
 
-def _ask_for_side(state: State, name: str, r: Array | None) -> bool:
+def _ask_for_side(state: State, name: str, r: Array) -> bool:
     """Ask where a rudder angle is never negative and the ship turns to both sides; return whether it is so."""
     values = state.columns[name]
-    if r is None or values.min() < 0 or np.ptp(values) == 0:
+    if values.min() < 0 or np.ptp(values) == 0:
         return False
     sides = [float(np.sum(np.clip(sign * r, 0, None))) for sign in (1, -1)]
     if min(sides) < BOTH_SIDES * sum(sides):
         return False
-    text = f"{name!r} is never negative, but the ship turns to both sides: which column says the side of the rudder, "
-    state.ask(("delta",), f"{text}or which value is amidships (offset)?")
+    state.ask(
+        ("delta",),
+        f"{name!r} is never negative, but the ship turns to both sides: which column says the side of the rudder, "
+        f"or which value is amidships (offset)?",
+    )
     return True
 
 
@@ -179,8 +198,11 @@ def _ask_for_half_turn(state: State, name: str, unit: str, sign: int) -> None:
     if astern or np.mean(np.cos(turn * state.columns[name])) > ASTERN:
         return
     half = f"offset = {-sign * np.pi / turn:.9g} ({unit})"
-    words = f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
-    state.ask(("alpha",), f"{words} Then write {half}; here 0 is a thrust ahead")
+    state.ask(
+        ("alpha",),
+        f"{name!r} is about half a turn while the ship goes ahead: does it say where the water goes?"
+        f" Then write {half}; here 0 is a thrust ahead",
+    )
 
 
 def _screw_columns(state: State) -> set[str]:
@@ -271,8 +293,12 @@ def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
                 unit, confidence, why, extra = (_tunnel_unit if tunnel else _shaft_unit)(state, name)
                 if not tunnel and not azimuth and _runs_astern(state, name):
                     extra = {**extra, "sign": -1}
-                    sentence = f"{name!r} is negative while the ship goes ahead; here ahead is positive"
-                    state.find("wrong sign of the shaft", (name,), 0.9, sentence)
+                    state.find(
+                        "wrong sign of the shaft",
+                        (name,),
+                        0.9,
+                        f"{name!r} is negative while the ship goes ahead; here ahead is positive",
+                    )
             else:
                 written = unit_in_name(name, SIGNALS[signal].unit)
                 unit, confidence, extra = likely_unit(state, name, signal), 0.9 if written else 0.7, {}
@@ -284,8 +310,6 @@ def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
 
 
 def _runs_astern(state: State, name: str) -> bool:
-    if state.psi is None or state.position is None:
-        return False
     middle = (state.chosen.first + state.chosen.last) // 2
     ahead = (state.chosen.change(state.position) * np.exp(-1j * state.psi[middle])).real
     fast = ahead > UNDER_WAY * float(np.percentile(np.abs(ahead), 90))
@@ -327,14 +351,20 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
     if written is not None:
         far = off.get(written, 1.0)
         if written in off and far > NEAR and off[by_motion] < NEAR / 3 and by_motion != written:
-            sentence = (
+            state.find(
+                "unit of the shaft",
+                (name,),
+                0.6,
                 f"{name!r} says {written}, but the ship would run {far:.0f} times too far or too little in a turn"
+                f" of the shaft: it is read in {by_motion}",
             )
-            state.find("unit of the shaft", (name,), 0.6, f"{sentence} of the shaft: it is read in {by_motion}")
             return by_motion, 0.6, f"{why}; the way in a turn of the shaft says {by_motion}", {}
         if written in ("rpm", "rev/s") and top * to_si(written, "propeller.n") > GEARED and is_engine(name):
-            sentence = f"{name!r}, up to {top:.4g} {written}, is the speed of an engine: is there a gear?"
-            state.ask(("n",), f"{sentence} Write factor = 1 / its ratio")
+            state.ask(
+                ("n",),
+                f"{name!r}, up to {top:.4g} {written}, is the speed of an engine: is there a gear?"
+                f" Write factor = 1 / its ratio",
+            )
         return written, 0.9, why, {}
     if state.ask_for_unit("n", name, by_motion):
         return by_motion, 0.3, f"{why} in a unit that is not known", {}
@@ -353,7 +383,7 @@ def _shaft_unit(state: State, name: str) -> tuple[str, float, str, dict[str, Any
 
 def _off_advance(state: State, values: Array, unit: str) -> float:
     """How many times the way in a turn of the shaft, in turning radii, is off that of a usual ship."""
-    if state.psi is None or np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
+    if np.abs(values).max() * to_si(unit, "propeller.n") > FASTEST:
         return np.inf
     shaft = np.abs(values[(state.chosen.first + state.chosen.last) // 2]) * to_si(unit, "propeller.n")
     runs = shaft > RUNS * np.percentile(shaft, 95)

@@ -65,11 +65,13 @@ def _held_positions(state: State) -> None:
     share = float(some.sum()) / len(state.t)
     if share > HELD_SHARE:
         late = float(np.mean(some)) / 2 * float(np.median(np.diff(state.t)))
-        sentence = (
+        state.find(
+            "held positions",
+            tuple(places),
+            0.9,
             f"in {100 * share:.0f} % of the rows the position repeats the row before while the heading goes on: a "
-            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap"
+            f"slower receiver was held, on average {late:.2g} s late; leave these cells empty and set max_gap",
         )
-        state.find("held positions", tuple(places), 0.9, sentence)
 
 
 def defects_of_rows(state: State, sniffed: LogTable) -> None:
@@ -84,10 +86,12 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
             )
         share = float(np.median([evidence.interpolated_share(state.columns[name]) for name in moving]))
         if share > 0.2:
-            sentence = (
-                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated"
+            state.find(
+                "interpolated from a slower log",
+                tuple(moving),
+                0.9,
+                f"{100 * share:.0f} % of the rows lie exactly between their neighbours: a slower log was interpolated",
             )
-            state.find("interpolated from a slower log", tuple(moving), 0.9, sentence)
     _held_positions(state)
     for column in state.suggestions:
         values = state.columns[column.source]
@@ -96,21 +100,28 @@ def defects_of_rows(state: State, sniffed: LogTable) -> None:
             ordered = len(np.unique(values)) <= ORDERED
             if 0.05 < top < 0.9 and evidence.maximum_visits(values) >= VISITS and not ordered:
                 rows = f"{100 * top:.0f} % of the rows of {column.source!r}"
-                sentence = f"{rows} have exactly the largest value, {values.max():g}"
-                state.find("clipped", (column.source,), 0.7, sentence)
+                state.find("clipped", (column.source,), 0.7, f"{rows} have exactly the largest value, {values.max():g}")
         elif column.name in MEASURED:
             limits = [limit for limit in (values.max(), values.min()) if _piles_up(values, float(limit))]
             if limits:
                 most = ", ".join(f"{limit:g}" for limit in limits)
                 share = float(np.mean(np.isin(values, limits)))
-                sentence = f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it"
-                state.find("clipped", (column.source,), 0.7, sentence)
+                state.find(
+                    "clipped",
+                    (column.source,),
+                    0.7,
+                    f"{100 * share:.0f} % of the rows of {column.source!r} stop at {most}, and few come near it",
+                )
     steps = np.diff(sniffed.t)
     holes = int(np.sum(steps > evidence.GAP * np.median(steps)))
     holes = max(holes - sniffed.seams, 0)
     if holes:
-        sentence = f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s"
-        state.find("holes in time", (sniffed.clock["from"],), 0.99, sentence)
+        state.find(
+            "holes in time",
+            (sniffed.clock["from"],),
+            0.99,
+            f"{holes} steps are more than {evidence.GAP:g} times as long as the usual {np.median(steps):.3g} s",
+        )
     missing = [name for name in sniffed.columns if np.isnan(sniffed.columns[name]).any()]
     if missing and not sniffed.scattered:  # no sentence says everything
         state.find(
@@ -130,8 +141,6 @@ def _piles_up(values: Array, limit: float) -> bool:
 
 def defects_of_motion(state: State) -> None:
     """Report contradictions between position, heading, velocity and yaw rate."""
-    if state.psi is None:
-        return
     course = _ask_if_course(state)
     if state.r is not None:
         delay = None if course else _signal_delay(state, state.psi, evidence.integrate_rate(state.t, state.r))
@@ -139,13 +148,14 @@ def defects_of_motion(state: State) -> None:
             _find_late(state, "heading", "yaw rate", delay)
             # or the tests below would report the same delay again
             state.psi = np.interp(state.t + delay.seconds, state.t, state.psi)
-            if state.body is not None and not _is_earth_fixed(state):
+            earth = any(one.name == "speed" or (one.name == "u" and one.extra) for one in state.suggestions)
+            if state.body is not None and not earth:
                 state.velocity = np.asarray(state.body * np.exp(1j * state.psi))
         _factor_of_rate(state)
-    if state.position is not None and state.velocity is None:
+    if state.velocity is None:
         _report_position_jumps(state, _own_path(state), spikes=False)
         _report_heading_offset(state)
-    if state.velocity is None or state.position is None or state.body is None:
+    if state.velocity is None or state.body is None:
         return
     _ask_for_set_clock(state)
     path = evidence.integrate_rate(state.t, state.velocity)
@@ -155,7 +165,6 @@ def defects_of_motion(state: State) -> None:
 
 def _ask_if_course(state: State) -> bool:
     """Ask where the heading is a course: the column of one has its values, or the track; whether it is so."""
-    assert state.psi is not None
     place, heading = next((i, one) for i, one in enumerate(state.suggestions) if one.name == "psi")
     same = _same_as(state, heading.source)
     if same is not None:
@@ -174,7 +183,6 @@ def _ask_if_course(state: State) -> bool:
 
 def _same_as(state: State, heading: str) -> tuple[str, float] | None:
     """The column of a course that has the values of the heading where the ship turns, and in which share; else None."""
-    assert state.psi is not None
     turns = np.abs(state.chosen.change(state.psi).real) > TURN_SHOWS
     rows = ((state.chosen.first + state.chosen.last) // 2)[turns]
     if len(rows) < SEVERAL:
@@ -199,7 +207,7 @@ def _value_step(values: Array) -> float:
 
 def _turns_with_track(state: State) -> bool:
     """Whether the heading turns later than the yaw rate, and the track turns with it as with no heading in a turn."""
-    if state.r is None or state.position is None or state.psi is None:
+    if state.r is None:
         return False
     change = state.chosen.change
     ran, rate = change(evidence.integrate_rate(state.t, state.r)).real, change(state.r).real
@@ -231,7 +239,6 @@ def _slope_with_error(values: Array, by: Array) -> tuple[float, float]:
 
 def _factor_of_rate(state: State) -> None:
     """Report a yaw rate whose integral is the heading times another number, as of gon/s or of a gyro that is off."""
-    assert state.psi is not None
     assert state.r is not None
     source = next(one.source for one in state.suggestions if one.name == "r")
     seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integrate_rate(state.t, state.r))
@@ -248,7 +255,6 @@ def _factor_of_rate(state: State) -> None:
 
 def _own_path(state: State) -> Complex:
     """Path (N,) [m] by the medians of the steps of the position about each row, where no velocities are logged."""
-    assert state.position is not None
     steps = pd.Series(np.diff(state.t))
     rows = 2 * max(STEPS_ABOUT, round(0.5 * evidence.WINDOW / float(steps.median()))) + 1
     rates = np.diff(state.position) / steps.to_numpy()
@@ -261,7 +267,7 @@ def _own_path(state: State) -> Complex:
 
 def _ask_for_set_clock(state: State) -> None:
     """Ask where the clock leaves out a time in which the ship, that was under way, went no farther than in a row."""
-    if state.joined or state.velocity is None or state.position is None:
+    if state.joined or state.velocity is None:
         return
     steps, way = np.diff(state.t), np.abs(np.diff(state.position))
     usual, fast = float(np.median(steps)), np.abs(state.velocity)
@@ -270,14 +276,11 @@ def _ask_for_set_clock(state: State) -> None:
     for row in np.flatnonzero((steps > evidence.GAP * usual) & (way <= near) & (speed * steps > FARTHER * near))[:1]:
         times = " comes ".join(clock_text(state, float(state.t[row + one])) for one in (0, 1))
         times += rollover_words(steps[row])
-        words = f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
-        state.ask(("clock", "t"), f"{words}Then split the log there")
-
-
-def _is_earth_fixed(state: State) -> bool:
-    return any(
-        column.name in ("u", "speed") and (column.name == "speed" or column.extra) for column in state.suggestions
-    )
+        state.ask(
+            ("clock", "t"),
+            f"after {times}, but the ship went {way[row]:.2g} m, as from row to row: was the clock set forward? "
+            f"Then split the log there",
+        )
 
 
 def _arm_or_delay(state: State, path: Complex) -> Complex:
@@ -285,8 +288,6 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
 
     Returns the integrated velocities with this corrected, (N,).
     """
-    assert state.position is not None
-    assert state.psi is not None
     seen = state.chosen.change(state.position)
     ran = state.chosen.change(path)
     keep = evidence.windows_without_outliers(seen, ran)
@@ -297,8 +298,7 @@ def _arm_or_delay(state: State, path: Complex) -> Complex:
     if delay is not None and delay.explained > by_arm:
         _find_late(state, "position", "velocity", delay)
         instants = state.t - delay.seconds
-        moved = [np.interp(instants, state.t, part) for part in (path.real, path.imag)]
-        late = np.asarray(moved[0] + 1j * moved[1])
+        late = np.interp(instants, state.t, path)
         known = np.flatnonzero((instants >= state.t[0]) & (instants <= state.t[-1]))[[0, -1]]
         for row, beyond in ((known[0], slice(None, known[0])), (known[1], slice(known[1], None))):
             late[beyond] = late[row] + state.position[beyond] - state.position[row]  # or a path that stands still jumps
@@ -360,7 +360,6 @@ def _find_late(state: State, what: str, against: str, delay: Delay) -> None:
 
 def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> None:
     """Report where positions leave a path (N,) [m]; of velocities also where they come back: `spikes`."""
-    assert state.position is not None
     unit = to_si(state.clock_unit, "t")
     lost = [span for one in state.findings if one.kind == "no fix" and one.repair for span in one.repair["intervals"]]
     places = [
@@ -373,8 +372,12 @@ def _report_position_jumps(state: State, path: Complex, spikes: bool = True) -> 
     repair: dict[str, Any]
     if stay and state.joined:
         count = f"at {len(stay)} place{'s' * (len(stay) > 1)}"
-        sentence = f"the position jumps {count} of the files and does not come back: `data check` shows where"
-        state.find("position jumps", (), 0.9, sentence)
+        state.find(
+            "position jumps",
+            (),
+            0.9,
+            f"the position jumps {count} of the files and does not come back: `data check` shows where",
+        )
     elif stay:
         words = ", ".join(
             f"{clock_text(state, start)} to {clock_text(state, end)} ({far:.0f} m)" for start, end, far in stay[:6]
@@ -393,7 +396,6 @@ def clock_text(state: State, t: float) -> str:
 
 
 def _report_heading_offset(state: State) -> None:
-    assert state.psi is not None
     angle, error, current = _off_on_all_courses(state)
     if error < CLEAR:
         why = f"on all courses the way leaves the heading by {np.degrees(angle):+.1f} deg (+- {np.degrees(error):.1f})"
@@ -421,8 +423,6 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
 
     Over each window: way across the heading = tan(off) * (way along it) + arm * (turn) + (current across).
     """
-    assert state.psi is not None
-    assert state.position is not None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     psi = state.chosen.change(evidence.integrate_rate(state.t, state.psi)).real / span
     north = np.exp(-1j * psi)
@@ -552,8 +552,9 @@ def defects_of_spikes(state: State) -> None:
     places = [one for one in state.suggestions if one.name in POSITIONS and one.source in state.spikes]
     if places:
         rows = np.unique(np.concatenate([state.spikes[one.source][0] for one in places]))
-        words = f"the position leaves and comes back {_row_times(state, rows)}"
-        state.find("position spikes", (), 0.9, words, OF_POSITIONS)
+        state.find(
+            "position spikes", (), 0.9, f"the position leaves and comes back {_row_times(state, rows)}", OF_POSITIONS
+        )
     for one in state.suggestions:
         if one.name in SPIKY and one.source in state.spikes:
             rows, size = state.spikes[one.source]

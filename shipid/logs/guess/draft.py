@@ -182,12 +182,11 @@ def _column_lines(guess: Guess) -> Iterator[str]:
     findings = [finding for finding in guess.findings if finding.repair is None]
     if findings:
         yield ""
-        yield from (
-            f"# ! {finding.kind} ({_confidence_text(finding.confidence)}): {finding.sentence}" for finding in findings
-        )
+        yield from (f"# ! {_clue_text(finding)}" for finding in findings)
     for column in guess.columns:
-        sure = f"{_confidence_text(column.confidence)}{_column_remark(column)}"
-        yield f"\n[columns.{_toml_key(column.name)}]    # {sure}: {column.evidence}"
+        sure = f"{_confidence_text(column.confidence)}{', UNSURE' * (column.confidence < LIKELY)}"
+        key = f'"{column.name}"' if "." in column.name else column.name
+        yield f"\n[columns.{key}]    # {sure}: {column.evidence}"
         parts = guess.sniffed.in_parts.get(column.source, (column.source,))
         source = parts[0] if len(parts) == 1 else parts
         yield from _toml_lines({"from": source, "unit": column.unit, **column.extra})
@@ -197,16 +196,8 @@ def _column_lines(guess: Guess) -> Iterator[str]:
         yield from (f"# {words}" for words in unused)
 
 
-def _column_remark(column: Suggestion) -> str:
-    return ", UNSURE" if column.confidence < LIKELY else ""
-
-
 def _confidence_text(confidence: float) -> str:
     return f"{100 * confidence:.0f} %"
-
-
-def _toml_key(name: str) -> str:
-    return f'"{name}"' if "." in name else name
 
 
 def _estimate_lines(guess: Guess) -> Iterator[str]:
@@ -225,8 +216,8 @@ def _repair_lines(guess: Guess) -> Iterator[str]:
     for finding, repair in sorted(mendable, key=lambda entry: ORDER.index(entry[1]["kind"])):
         yield "\n[[repair]]"
         yield from _toml_lines(repair)
-        yield from _toml_lines({"enabled": finding.confidence >= ENABLED, "reason": _clue_lines(finding)})
+        yield from _toml_lines({"enabled": finding.confidence >= ENABLED, "reason": _clue_text(finding)})
 
 
-def _clue_lines(finding: Clue) -> str:
+def _clue_text(finding: Clue) -> str:
     return f"{finding.kind} ({_confidence_text(finding.confidence)}): {finding.sentence}"

@@ -25,8 +25,6 @@ SURE, UNSURE = 0.9, 0.6  # that it is no order: of what is unsure the repair is 
 
 def report_command_faults(state: State, sniffed: LogTable) -> None:
     """Report zeros, spikes and still stretches of commands, as they are in the log."""
-    if state.psi is None:
-        return
     for one in state.suggestions:
         if not is_command(one.name):
             continue

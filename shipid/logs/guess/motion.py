@@ -55,8 +55,6 @@ class Velocities:
 
 def choose_velocities(state: State) -> None:
     """Choose the two velocity columns, or speed and course over ground, whose integral fits the track best."""
-    assert state.position is not None
-    assert state.psi is not None
     seen = state.chosen.change(state.position)
     ranked = sorted(_velocity_hypotheses(state, seen), key=lambda entry: entry.cost)
     named = [entry for entry in ranked if entry.named >= 0.45 and entry.fit.left < NAMED_LEFT]
@@ -74,14 +72,17 @@ def choose_velocities(state: State) -> None:
     swapped = best.first in state.called("v") and best.second in state.called("u")
     if best.named < 0.45 and not state.numbered and not swapped:
         names = f"{best.first!r} and {best.second!r}"
-        sentence = f"{names} are not named as velocities, but their integral is the track"
-        state.find("velocities under other names", (best.first, best.second), 0.6, sentence)
+        state.find(
+            "velocities under other names",
+            (best.first, best.second),
+            0.6,
+            f"{names} are not named as velocities, but their integral is the track",
+        )
     _take_velocities(state, _side_of_sway(state, best, ranked, seen), ranked)
 
 
 def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
     """Yield every ordered pair of columns as earth-fixed, as body-fixed, and as body-fixed with v to port."""
-    assert state.psi is not None
     words = ("u", "v", "velocity_north", "velocity_east")
     named = [name for name in state.eligible() if any(name in state.called(word) for word in words)]
     free = named if len(named) >= 2 and not state.numbered else state.eligible(*words)[:20]
@@ -109,7 +110,6 @@ def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
 
 def _side_of_sway(state: State, best: Velocities, ranked: list[Velocities], seen: Complex) -> Velocities:
     """The hypothesis or its mirror: by the track with a free arm, else by a ship's drift out of her turn, v r < 0."""
-    assert state.psi is not None
     if best.frame == "earth":
         return best
     other = next(
@@ -157,7 +157,6 @@ def _window_means(state: State, values: Array) -> Array:
 
 def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -> None:
     fit, first, second, frame = best.fit, best.first, best.second, best.frame
-    assert state.psi is not None
     pair = {first, second}
     runner = min(
         (e.fit for e in ranked if e.frame != frame and {e.first, e.second} == pair),
@@ -185,15 +184,21 @@ def _take_velocities(state: State, best: Velocities, ranked: list[Velocities]) -
         if meaning_scores(first).get("u", 0.0) > meaning_scores(first).get(
             "velocity_north", 0.0
         ) and first in state.all_called("u"):
-            sentence = (
-                f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east"
+            state.find(
+                "earth-fixed velocities",
+                (first, second),
+                confidence,
+                f"{first!r} and {second!r} are named like body-fixed velocities, but are the rates of north and east",
             )
-            state.find("earth-fixed velocities", (first, second), confidence, sentence)
     else:
         extra = {}
         if frame == "mirrored":
-            sentence = f"{second!r} is positive to port: the track is met with its sign changed"
-            state.find("wrong sign of v", (second,), confidence, sentence)
+            state.find(
+                "wrong sign of v",
+                (second,),
+                confidence,
+                f"{second!r} is positive to port: the track is met with its sign changed",
+            )
             extra_v = {"sign": -1}
         if swapped:
             state.find(
@@ -238,8 +243,12 @@ def _fitted_speed_unit(fit: Fit, sources: tuple[str, str], state: State, quiet: 
     if unit != (written or (unit if quiet and unit in PLAIN else "m/s")) and abs(fit.scale / units[unit] - 1) < 0.08:
         word = "knots" if "kn" in (unit, written) else "speed unit"
         wanted = f"the name says {written}" if written else "nothing says so"
-        sentence = f"the track is {fit.scale:.3f} times the integral: {sources[0]!r} is in {unit} ({wanted})"
-        state.find(word, sources, 0.95, sentence)
+        state.find(
+            word,
+            sources,
+            0.95,
+            f"the track is {fit.scale:.3f} times the integral: {sources[0]!r} is in {unit} ({wanted})",
+        )
     elif written is not None and abs(fit.scale / units[unit] - 1) >= 0.08:
         unit = written
     return unit, abs(fit.scale / units[unit] - 1) > 0.004
@@ -265,13 +274,18 @@ def _report_factor(
     pair = " and ".join(repr(source) for source in sources)
     begins = f"the track is {fit.scale:.4g} times the integral of {pair} in {unit}"
     if (other := _clock_unit(state, fit.scale)) is not None:
-        why = f"{begins}: a clock in {other}, not {state.clock_unit}, or another unit of the positions would explain it"
-        state.find("clock unit", sources, 0.9, why)
+        state.find(
+            "clock unit",
+            sources,
+            0.9,
+            f"{begins}: a clock in {other}, not {state.clock_unit}, or another unit of the positions would explain it",
+        )
         state.ask(("t", *columns), f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}")
         return
     if not 1 / FAR <= fit.scale <= FAR:
-        sentence = f"{begins}: the unit of the clock, of the positions or of the speeds is another one"
-        state.find("factor", sources, 0.6, sentence)
+        state.find(
+            "factor", sources, 0.6, f"{begins}: the unit of the clock, of the positions or of the speeds is another one"
+        )
         state.ask(("t", *columns), f"are the units of the clock, of the positions and of {pair} right? {begins}")
         return
     per_knot = 1.0 / (UNITS["m/s"]["kn"] / UNITS["m/s"][unit])
@@ -302,7 +316,6 @@ def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
 
     bound : unexplained share of the track, at most.
     """
-    assert state.psi is not None
     speeds, courses = state.called("speed"), [name for name in state.called("course") if not is_order(name)]
     if state.numbered:
         speeds = courses = state.eligible()
@@ -350,7 +363,6 @@ def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
 
 def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str, fit: Fit) -> bool:
     """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course."""
-    assert state.psi is not None
     assert state.body is not None
     change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * state.psi)))
     keep = evidence.windows_without_outliers(seen, change)
@@ -361,8 +373,11 @@ def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str
     if not inward > INWARD:
         return False
     heading = next((one.source for one in state.suggestions if one.name == "psi"), "psi")
-    words = f"are {heading!r} and {course!r} exchanged? The ship moves along {heading!r}, and drifts into her turns"
-    state.ask(("psi", "course", "v"), f"{words}: no ship does. Then exchange them here")
+    state.ask(
+        ("psi", "course", "v"),
+        f"are {heading!r} and {course!r} exchanged? The ship moves along {heading!r}, and drifts into her turns"
+        f": no ship does. Then exchange them here",
+    )
     return True
 
 
@@ -370,8 +385,6 @@ def _as_track(
     state: State, fit: Fit, velocity: Complex, sources: tuple[str, ...], unit: str = "deg", along: str = ""
 ) -> tuple[Fit, Complex]:
     """Ask where the track is turned against velocities over ground (N,) [m/s]; return both as turned with it."""
-    assert state.position is not None
-    assert state.psi is not None
     seen, ran = (state.chosen.change(one) for one in (state.position, evidence.integrate_rate(state.t, velocity)))
     keep = evidence.windows_without_outliers(seen, ran) & (np.abs(ran) > 0.3 * np.percentile(np.abs(ran), 90))
     if keep.sum() < 20 or abs(complex(np.mean(ran[keep] / np.abs(ran[keep])))) > ONE_WAY:
@@ -402,8 +415,6 @@ def _as_track(
 
 def ship_pace(state: State) -> tuple[float, float]:
     """How fast the ship goes [m/s] and turns [m/s^2] by the drafted clock: nine of ten windows have less."""
-    assert state.position is not None
-    assert state.psi is not None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     speeds = np.abs(state.chosen.change(state.position)) / span
     rates = np.abs(state.chosen.change(state.psi)) / span
@@ -423,14 +434,15 @@ def check_clock(state: State, length: float = np.inf) -> None:
     if is_possible(state, length):
         return
     speed, across = ship_pace(state)
-    goes = f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
-    state.ask(("t", "north", "east"), f"{goes}: are the units of the clock and of the positions right?")
+    state.ask(
+        ("t", "north", "east"),
+        f"by the drafted clock, in {state.clock_unit}, the ship goes {speed:.3g} m/s and turns at {across:.3g} m/s^2"
+        f": are the units of the clock and of the positions right?",
+    )
 
 
 def _ask_clock_by_speed(state: State) -> bool:
     """Ask where a recorded speed along the heading gives the track only with a clock in another unit, as in minutes."""
-    assert state.psi is not None
-    assert state.position is not None
     seen, way = state.chosen.change(state.position), np.exp(1j * state.psi)
     for name in state.called("speed"):
         written = unit_in_name(name, "m/s")
@@ -442,8 +454,10 @@ def _ask_clock_by_speed(state: State) -> bool:
             other = _clock_unit(state, ratio)
             if other is not None:
                 begins = f"the track is {ratio:.4g} times the integral of {name!r} in {unit}"
-                why = f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}"
-                state.ask(("t", "north", "east"), why)
+                state.ask(
+                    ("t", "north", "east"),
+                    f"is the clock in {other}? The draft says {state.clock_unit}, with which {begins}",
+                )
                 return True
     return False
 
@@ -453,7 +467,6 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
 
     most : share of the heading's change that a column without a fitting name may leave unexplained.
     """
-    assert state.psi is not None
     change = state.chosen.change(state.psi)
     if float(np.std(change)) < np.radians(0.5):
         _rate_by_name(state)
@@ -479,8 +492,12 @@ def choose_yaw_rate(state: State, most: float = 0.3) -> None:
         ]
     if not candidates or (not by_name and candidates[0][0].left > most):
         if called and not state.numbered and called[0] in state.free():
-            sentence = f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used"
-            state.find("yaw rate does not fit", (called[0],), 0.6, sentence)
+            state.find(
+                "yaw rate does not fit",
+                (called[0],),
+                0.6,
+                f"{called[0]!r} is named as a yaw rate, but its integral is not the heading: it is not used",
+            )
         return
     fit, name, unit, _ = by_name[0] if by_name else candidates[0]
     extra: dict[str, Any] = {}
@@ -516,11 +533,14 @@ def _take_ais(state: State, change: Complex, name: str) -> None:
         return
     state.columns[name] = rates
     state.units[name] = "ais"
-    sentence = f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min"
-    state.find("unit of r", (name,), 0.9, sentence)
+    state.find("unit of r", (name,), 0.9, f"{name!r} has the numbers that AIS writes, 4.733 times the root of deg/min")
     if not known.all():
-        without = f"{name!r} is 127, -127 or -128 in {int((~known).sum())} rows, with which AIS says no rate"
-        state.find("missing values", (name,), 0.95, without)
+        state.find(
+            "missing values",
+            (name,),
+            0.95,
+            f"{name!r} is 127, -127 or -128 in {int((~known).sum())} rows, with which AIS says no rate",
+        )
 
 
 def _rate_candidates(state: State, change: Complex, names: list[str]) -> list[tuple[Fit, str, str, float]]:

@@ -116,8 +116,11 @@ def choose_pose(state: State, file: Path, frame: Frame | None = None) -> None:
             remedy = f"{lost!r} is {state.other[lost]}"
         raise DataError(f"no column can be the {missing}: {remedy}", file=file)
     if is_magnetic(best.heading):
-        how = f"{best.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
-        state.ask(("psi", "v"), f"{how} A `heading_offset` is one for all courses")
+        state.ask(
+            ("psi", "v"),
+            f"{best.heading!r} is of a magnetic compass: where are its variation and deviation taken out?"
+            f" A `heading_offset` is one for all courses",
+        )
     if best.misfit > POOR and not state.numbered:
         state.ask(
             ("psi", "north", "east", "u", "v", "r"),
@@ -180,8 +183,11 @@ def _ask_for_second(state: State, best: Pose, headings: list[str]) -> None:
         usual = float(np.median(apart))
         together = float(np.median(np.abs(apart - usual))) < ABREAST
         if ABREAST < abs(usual) < np.pi / 4 and together:
-            words = f"{best.heading!r} and {name!r} differ by {np.degrees(abs(usual)):.1f} deg: which is the heading? "
-            state.ask(("psi", "v"), f"{words}{best.heading!r} is drafted, as it keeps closer to the track")
+            state.ask(
+                ("psi", "v"),
+                f"{best.heading!r} and {name!r} differ by {np.degrees(abs(usual)):.1f} deg: which is the heading? "
+                f"{best.heading!r} is drafted, as it keeps closer to the track",
+            )
 
 
 def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
@@ -196,8 +202,12 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
     clockwise, mirror_like = frame in ("ned", "enu"), abs(best.mirrored) > abs(best.same)
     if best.misfit <= POOR and mirror_like != (frame == "enu"):
         others = ["enu"] if mirror_like else [name for name in get_args(Frame) if name != "enu"]
-        words = f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
-        raise DataError(f"{words} {' or '.join(others)}", file=file, path="--frame")
+        raise DataError(
+            f"the ship does not move as in {frame}: {best.north!r}, {best.east!r}, {best.heading!r} fit"
+            f" {' or '.join(others)}",
+            file=file,
+            path="--frame",
+        )
     given = replace(best, settled=f"--frame {frame}", counts=1 if clockwise else -1)
     if frame != "ned":
         given = _y_is_west(given, given.settled) if frame == "zup" else _x_is_east(given, given.settled)
@@ -444,8 +454,12 @@ def _accept_pose(state: State, best: Pose, sure: list[str]) -> None:
     agreement = max(abs(best.same), abs(best.mirrored))
     misnamed = not best.on_globe and best.settled in state.columns
     if misnamed and all(meaning_scores(one).get(way, 0.0) > 0.9 for one, way in ((north, "east"), (east, "north"))):
-        sentence = f"{best.settled!r} agrees with the track only with {north!r} as north and {east!r} as east"
-        state.find("north and east swapped", (north, east), agreement, sentence)
+        state.find(
+            "north and east swapped",
+            (north, east),
+            agreement,
+            f"{best.settled!r} agrees with the track only with {north!r} as north and {east!r} as east",
+        )
     _ask_frame(state, best, clear, compass, undecided, heading not in sure and not state.numbered)
     names = ("latitude", "longitude") if best.on_globe else ("north", "east")
     why = f"course over ground keeps to the heading (agreement {agreement:.3f} of 1)"
@@ -455,8 +469,12 @@ def _accept_pose(state: State, best: Pose, sure: list[str]) -> None:
         state.suggest(name, source, length, confidence, why, **more)
     if best.settled in state.columns and (best.east_sign < 0 or sign < 0):
         words = "counts clockwise from north" if meaning_scores(best.settled).get("course") else "is a speed to north"
-        sentence = f"{best.settled!r} {words}, and agrees with the track only with {north!r} as north"
-        state.find("frame by course or velocity", (north, east), 0.9, sentence)
+        state.find(
+            "frame by course or velocity",
+            (north, east),
+            0.9,
+            f"{best.settled!r} {words}, and agrees with the track only with {north!r} as north",
+        )
     if false.any():
         across = "360" if unit == "deg" else "2 pi"
         sentence = f"{int(false.sum())} steps of {heading!r} lie between two headings across {across}"
@@ -506,23 +524,43 @@ def _read_heading(state: State, best: Pose, psi: Array, mirrored: bool, clear: b
     if mirrored and quarter in (1, -1):
         confidence, compass = min(0.9, abs(best.mirrored)), _is_compass(heading)
         if best.on_globe or (clear and not compass) or quarter == -1 or best.settled:
-            sentence = f"{heading!r} counts to port from {'east' if quarter == 1 else 'west'}, as in mathematics"
-            state.find("heading counted from east", (heading,), abs(best.mirrored), sentence)
+            state.find(
+                "heading counted from east",
+                (heading,),
+                abs(best.mirrored),
+                f"{heading!r} counts to port from {'east' if quarter == 1 else 'west'}, as in mathematics",
+            )
             return _Reading(confidence, -1, 90.0 * quarter)
         if clear:
-            sentence = f"course and heading agree only with {north!r} as east and {east!r} as north"
-            state.find("north and east swapped", (north, east), abs(best.mirrored), sentence)
+            state.find(
+                "north and east swapped",
+                (north, east),
+                abs(best.mirrored),
+                f"course and heading agree only with {north!r} as east and {east!r} as north",
+            )
         elif not state.numbered and compass:
-            sentence = f"course and heading agree with {north!r} as east and {east!r} as north, as in many local frames"
-            state.find("x is east", (north, east), abs(best.mirrored), sentence)
+            state.find(
+                "x is east",
+                (north, east),
+                abs(best.mirrored),
+                f"course and heading agree with {north!r} as east and {east!r} as north, as in many local frames",
+            )
         return _Reading(confidence, swap=True)
     if mirrored:
-        sentence = f"{heading!r} rises where the course falls: it counts to port, or east is west"
-        state.find("heading counted to port", (heading,), abs(best.mirrored), sentence)
+        state.find(
+            "heading counted to port",
+            (heading,),
+            abs(best.mirrored),
+            f"{heading!r} rises where the course falls: it counts to port, or east is west",
+        )
         return _Reading(min(0.9, abs(best.mirrored)), -1, 90.0 * quarter)
     if quarter:
-        sentence = f"course and heading differ by {np.degrees(phase):.0f} deg: another zero of {heading!r} is taken"
-        state.find("zero of the heading", (heading,), abs(best.same), sentence)
+        state.find(
+            "zero of the heading",
+            (heading,),
+            abs(best.same),
+            f"course and heading differ by {np.degrees(phase):.0f} deg: another zero of {heading!r} is taken",
+        )
     misfits = 1.0 - abs(best.same), 1.0 - abs(best.mirrored)
     agreement = max(abs(best.same), abs(best.mirrored))
     confidence = float(np.clip(1.0 - 0.5 * min(misfits) / max(max(misfits), 1e-9), 0.5, 0.99))
@@ -545,8 +583,12 @@ def _of_astern(state: State, best: Pose, psi: Array, quarter: int) -> int:
     why = _astern_reason(state, best, psi)
     if why:
         state.astern = True
-        sentence = f"course and heading differ by about 180 deg: the ship goes astern, as {why}"
-        state.find("astern", (best.heading,), 0.8, sentence)
+        state.find(
+            "astern",
+            (best.heading,),
+            0.8,
+            f"course and heading differ by about 180 deg: the ship goes astern, as {why}",
+        )
         return 0
     words = f"does the ship go astern, or has {best.heading!r} another zero? If she goes astern, take the offset out"
     state.ask(("psi", "u", "v"), f"course and heading differ by about 180 deg: {words}")
@@ -613,8 +655,7 @@ def _sign_by_compass(state: State, best: Pose) -> Pose:
     names = " and ".join(f"{name!r} to {ways[name][name in state.negated]}" for name in turned)
     for name in turned:
         state.negate(name)
-    sentence = f"course and heading agree only if the log counts {names}"
-    state.find("sign of a position", turned, agreements[1], sentence)
+    state.find("sign of a position", turned, agreements[1], f"course and heading agree only if the log counts {names}")
     state.ask(("latitude", "longitude", "psi"), f"does the log count {names}? Else {best.heading!r} counts otherwise")
     same, other = (best.mirrored, best.same) if mirrored else (best.same, best.mirrored)
     if mirrored:
@@ -638,8 +679,12 @@ def _other_way(state: State, best: Pose) -> Pose:
             f"is {best.north!r} the longitude and {best.east!r} the latitude? Else {best.heading!r} counts to port",
         )
         return best
-    sentence = f"course and heading agree only with {best.north!r} as longitude and {best.east!r} as latitude"
-    state.find("latitude and longitude swapped", (best.north, best.east), abs(other.same), sentence)
+    state.find(
+        "latitude and longitude swapped",
+        (best.north, best.east),
+        abs(other.same),
+        f"course and heading agree only with {best.north!r} as longitude and {best.east!r} as latitude",
+    )
     return other
 
 
@@ -676,7 +721,9 @@ def _ask_frame(state: State, best: Pose, clear: bool, compass: bool, undecided: 
         and not best.counts
         and (unnamed or (lettered and not compass and not best.settled))
     ):
-        words = f"are {best.north!r} and {best.east!r} north and east, or the other way? Answer with --frame ned or enu"
-        state.ask(("psi", "north", "east"), words)
+        state.ask(
+            ("psi", "north", "east"),
+            f"are {best.north!r} and {best.east!r} north and east, or the other way? Answer with --frame ned or enu",
+        )
     if undecided and not (compass and (clear or best.on_globe)):
         state.ask(("psi",), f"the ship turns too little to show which way {best.heading!r} counts: to starboard?")

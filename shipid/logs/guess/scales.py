@@ -83,7 +83,7 @@ def _take_positions(state: State) -> None:
             fine = _angle_fraction(state, north, east)
             for name in (north, east):
                 _set_scale(state, name, fine, f"whole numbers of {PARTS[fine]}")
-        elif all(_is_ddmm(one) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
+        elif all(np.all(one % 100 < 60) for one in both) and both[0].max() < 9000 and both[1].max() < 18000:
             for name in (north, east):
                 state.columns[name] = degrees_and_minutes(state.columns[name])
                 state.spikes.pop(name, None)
@@ -91,8 +91,11 @@ def _take_positions(state: State) -> None:
             _take_sides(state, north, east)
             lettered = state.sides & {"N", "S"} and state.sides & {"E", "W"}
             if not lettered and min(state.columns[north].min(), state.columns[east].min()) >= 0:
-                words = f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
-                state.ask(("latitude", "longitude"), f"{words}If they are S or W, write sign = -1")
+                state.ask(
+                    ("latitude", "longitude"),
+                    f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
+                    f"If they are S or W, write sign = -1",
+                )
 
 
 def _has_unit(name: str, words: str) -> bool:
@@ -107,8 +110,10 @@ def _in_radians(state: State, north: str, east: str) -> bool:
         return False
     told = _position_unit_by_speed(state, north, east, [1.0, 1.0 / DEGREE])
     if told is None:
-        words = f"are {north!r} and {east!r} degrees, off West Africa, or radians?"
-        state.ask(("latitude", "longitude"), f"{words} deg is a guess")
+        state.ask(
+            ("latitude", "longitude"),
+            f"are {north!r} and {east!r} degrees, off West Africa, or radians? deg is a guess",
+        )
         return False
     return told[1] != 1.0 and told[3] < DOUBTED
 
@@ -126,12 +131,17 @@ def _angle_fraction(state: State, north: str, east: str) -> float:
     if told is not None:
         name, best, other, off = told
         if off > DOUBTED:
-            words = f"are {names} whole numbers of {PARTS[best]}, or of {PARTS[other]}?"
-            state.ask(("latitude", "longitude", "t"), f"{words} The speed {name!r} does not say it clearly")
+            state.ask(
+                ("latitude", "longitude", "t"),
+                f"are {names} whole numbers of {PARTS[best]}, or of {PARTS[other]}?"
+                f" The speed {name!r} does not say it clearly",
+            )
         return best
     last = [PARTS[fine] for fine in parts]
-    words = f"are {names} whole numbers of {', '.join(last[:-1])} or of {last[-1]}?"
-    state.ask(("latitude", "longitude", "t"), f"{words} {last[0]} is a guess")
+    state.ask(
+        ("latitude", "longitude", "t"),
+        f"are {names} whole numbers of {', '.join(last[:-1])} or of {last[-1]}? {last[0]} is a guess",
+    )
     return parts[0]
 
 
@@ -255,8 +265,11 @@ def _take_sides(state: State, north: str, east: str) -> None:
         if minus not in state.sides or state.columns[name].min() < 0:
             continue
         if plus in state.sides:
-            words = f"{name!r} is {plus} in some rows and {minus} in others, as columns of letters say"
-            state.ask(("latitude", "longitude"), f"{words}: write it as a number with a sign")
+            state.ask(
+                ("latitude", "longitude"),
+                f"{name!r} is {plus} in some rows and {minus} in others, as columns of letters say"
+                f": write it as a number with a sign",
+            )
             continue
         state.negate(name)
         state.find("sign of a position", (name,), 0.95, f"{name!r} has no sign, and a column of letters says {minus}")
@@ -289,8 +302,3 @@ def _whole_turn(values: Array) -> float | None:
 
 def _within_globe(both: Iterable[Array], factor: float) -> bool:
     return all(float(one.max()) * factor <= most for one, most in zip(both, (90.0, 360.0), strict=True))
-
-
-def _is_ddmm(values: Array) -> bool:
-    """Whether numbers, too large for degrees, are degrees and minutes, as in 6326.4 for 63 deg 26.4 min."""
-    return bool(np.all(values % 100 < 60))

@@ -18,8 +18,6 @@ TURNED = np.radians(6.0)  # by which the ship turns meanwhile
 
 def find_stuck(state: State) -> None:
     """Report a heading, yaw rate or course that stands still while the ship turns, with a break as the repair."""
-    if state.psi is None:
-        return
     for one in state.suggestions:
         if one.name not in ("psi", "r", "course"):
             continue
@@ -58,14 +56,12 @@ def _stuck_stretches(state: State, name: str, values: Array) -> Iterator[tuple[f
 
 def _turn_by_others(state: State, name: str, first: int, last: int) -> float:
     """By how much [rad] the rest of the log says that the ship turned, beyond what the column itself says."""
-    assert state.psi is not None
     if name == "psi":
         if state.r is None:
             return 0.0
         span = slice(first, last + 1)
         return float(np.real(integrate_rate(state.t[span], state.r[span])[-1]))
     turned = float(state.psi[last] - state.psi[first])
-    if name == "course":
+    if name == "course" or state.r is None:
         return turned
-    assert state.r is not None
     return turned - float(state.r[first]) * float(state.t[last] - state.t[first])

@@ -18,10 +18,8 @@ REST, STILL, ALIKE = 0.05, 5, 0.02  # of the usual speed; windows at rest; of th
 CONFIDENCE = 0.5
 
 
-def choose_twins(state: State, r: np.ndarray | None) -> None:
+def choose_twins(state: State, r: np.ndarray) -> None:
     """Suggest shaft speeds from one pair of free columns, port and starboard, whose difference turns the ship."""
-    if r is None:
-        return
     found = {
         pair: state.effect(r, state.columns[pair[0]] - state.columns[pair[1]])
         for pair in twin_columns(state)
@@ -56,8 +54,12 @@ def choose_twins(state: State, r: np.ndarray | None) -> None:
 def _say_sides(state: State, pair: tuple[str, str], effect: float) -> None:
     """Say so where more of the port screw turns the ship to port; effect: t value of port less starboard."""
     if effect < 0:
-        sentence = f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?"
-        state.find("sides of the screws", pair, 0.6, sentence)
+        state.find(
+            "sides of the screws",
+            pair,
+            0.6,
+            f"more of {pair[0]!r} turns the ship to port: are the sides swapped, or the yaw rate's sign?",
+        )
 
 
 def twin_columns(state: State) -> list[tuple[str, str]]:
@@ -85,8 +87,6 @@ def _may_be_a_throttle(name: str) -> bool:
 
 def _at_rest(state: State, pair: tuple[str, str]) -> dict[str, float] | None:
     """Side -> value of its column at rest; None if the ship always moves, or values differ."""
-    if state.position is None:
-        return None
     span = state.t[state.chosen.last] - state.t[state.chosen.first]
     speed = np.abs(state.chosen.change(state.position)) / span
     still = state.chosen.first[speed < REST * np.quantile(speed, 0.9)]

@@ -76,7 +76,7 @@ def _wind_kind_of_names(speed: str, angle: str) -> tuple[Kind, str]:
 
 def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[Reading, str]:
     """The reading in which the wind stands still while the ship turns, and why; the drafted one where none does."""
-    if state.psi is None or state.velocity is None:
+    if state.velocity is None:
         return drafted, ""
     size = state.columns[speed]
     beta = state.columns[angle] * to_si(likely_unit(state, angle, "beta_w"), "beta_w")
@@ -109,10 +109,12 @@ def _by_motion(state: State, speed: str, angle: str, drafted: Reading) -> tuple[
         state.ask(("V_w",), f"is {speed!r} in {best.unit}? The motion of the ship fits {rivals} nearly as well")
     how = {"apparent": f" in {best.unit}, {best.direction!r}"}.get(best.kind, "")
     turned = f"while the ship turns, {WORDS[best.kind]}{how}, changes by {left[best]:.2g} m/s (RMS)"
-    sentence = (
-        f"{turned}, and as {WORDS[drafted.kind]} in {drafted.unit}, {drafted.direction!r}, by {left[drafted]:.2g}"
+    state.find(
+        "kind of wind",
+        (speed, angle),
+        0.8,
+        f"{turned}, and as {WORDS[drafted.kind]} in {drafted.unit}, {drafted.direction!r}, by {left[drafted]:.2g}",
     )
-    state.find("kind of wind", (speed, angle), 0.8, sentence)
     return best, turned
 
 
@@ -125,7 +127,6 @@ def _turning_parts(t: Array, psi: Array) -> list[slice]:
 
 def _over_ground(state: State, reading: Reading, size: Array, beta: Array) -> Complex:
     """The true wind (N,) [m/s] towards which it blows, north + i east, as one reading has it."""
-    assert state.psi is not None
     assert state.velocity is not None
     way = -1.0 if reading.direction == "from" else 1.0
     wind = way * size * np.exp(1j * beta)

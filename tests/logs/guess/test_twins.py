@@ -49,8 +49,8 @@ def craft(seed: int) -> pd.DataFrame:
 
 def guessed(log: pd.DataFrame, columns: dict[str, np.ndarray]) -> State:
     t = log["t"].to_numpy()
-    position = log["north"].to_numpy() + 1j * log["east"].to_numpy()
-    state = State(t, "s", columns, row_windows(t), position=position, psi=log["psi"].to_numpy(), r=log["r"].to_numpy())
+    state = State(t, "s", columns, row_windows(t), r=log["r"].to_numpy())
+    state.position, state.psi = (log["north"] + 1j * log["east"]).to_numpy(), log["psi"].to_numpy()
     choose_commands(state)
     return state
 
