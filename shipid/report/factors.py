@@ -37,8 +37,8 @@ MODEL_COLUMNS = {
     "rms [m]": "A_rms",
     "A along [m]": "A_along",
     "A across [m]": "A_across",
-    "training windows diverged [1]": "diverged_training",
-    "test windows diverged [1]": "diverged_test",
+    "diverged in training [1]": "diverged_training",
+    "diverged in the test [1]": "diverged_test",
     "status": "status",
     "what it is": "description",
 }

@@ -300,6 +300,8 @@ def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) 
         np.pad(values[rows][:, few], ((0, 1), (0, 0)), constant_values=np.nan).T.ravel()  # a gap between two members
         for values in (np.broadcast_to(t[:, None], north.shape), north, east, heading)
     ]
+    track, spans = make_line("members", every[2], every[1], ["member"], **thin), [np.ptp(east), np.ptp(north)]
+    flat = min(spans) < max(spans) / 3  # on equal axes a strip
     levels = np.quantile(heading[rows], list(SPREAD_QUANTILES), axis=1)
     turns = [
         make_line("members", every[0], every[3], ["member"], **thin),
@@ -314,11 +316,14 @@ def spread_figure(interval: float, motion: Mapping[str, Floats], diverged: int) 
         takeaway=f"After {t[-1]:.4g} s half of {counted_text(count, 'member')} are within "
         f"{distance_text(np.quantile(away, 0.5))} of the median position, nine in ten within "
         f"{distance_text(np.quantile(away, 0.9))}; {diverged or 'none'} diverged.",
-        how="One start, the same orders. The lines are those of a few members, the quantiles those of all.",
+        how="One start, the same orders. The lines are those of a few members, the quantiles those of all."
+        + (" Each axis of the tracks has a scale of its own." if flat else ""),
         alternative="Tracks and headings of the members.",
         height=420,
         draw=lambda: [
-            make_chart([make_line("members", every[2], every[1], ["member"], **thin)], "east [m]", "north [m]"),
+            make_plot([track], *(make_axis(name, nticks=6) for name in ("east [m]", "north [m]")))
+            if flat
+            else make_chart([track], "east [m]", "north [m]"),
             make_plot(turns, make_axis("time [s]", nticks=6), zero_axis("heading [deg]", nticks=6)),
         ],
         chips=[Chip("member", "members", MUTED, width=1), Chip("q", "5, 50, 95 %", category_colour(0))],

@@ -29,7 +29,7 @@ from shipid.report.figure import (
     make_line,
 )
 from shipid.report.page import Section
-from shipid.report.selection import close_styles, close_up_models, figure_sizes, in_words
+from shipid.report.selection import close_styles, close_up_models, family_words, figure_sizes, in_words
 from shipid.report.wording import counted_text, metres_text
 
 MOST_POINTS = 40  # of a path or of the outline of a band
@@ -70,7 +70,8 @@ def glance_figure(content: ReportContent) -> PageFigure | None:
         takeaway=f"At the horizon {in_words(key[0])} with {counted_text(key[2], 'run')} errs here by "
         f"{metres_text(_end_error(window, key))}, the middle one of {len(windows)} windows on this page.",
         how=f"{window.run} from t = {window.t:g} s, in the axes of the ship at that instant (11). The outline is to "
-        "scale, at the start and where the ship truly was at the end.",
+        "scale, at the start and where the ship truly was at the end."
+        + family_words(content, content.cells.family[content.cells.model.eq(key[0])]),
         alternative="The true path of one test window, the predicted path and its band.",
         height=400,
         draw=lambda: [draw_window(content, window, [key])],

@@ -39,6 +39,7 @@ from shipid.report.selection import (
     data_driven,
     errors_alone,
     errors_over_seeds,
+    family_words,
     in_words,
     model_chips,
     model_styles,
@@ -52,7 +53,7 @@ from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names,
 
 HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
-NAME_HEIGHT = 13  # of a row [px]
+NAME_HEIGHT, ROW_HEIGHT = 13, 21  # least of a name, and of a row where there is room for all [px]
 INSIDE = HEIGHT - MAP_MARGIN["t"] - MAP_MARGIN["b"]
 ROUND_DIGITS = (1, 2, 3, 5, 7)  # of the ticks of A
 ERROR_STATISTICS = {  # of the position error -> its column in the cells and of constant u, v, r, title of the axis
@@ -67,7 +68,8 @@ ERROR_STATISTICS = {  # of the position error -> its column in the cells and of 
 class CellMap(NamedTuple):
     """What a map shows.
 
-    rows : model, family, A [m], y (square root of A; models without A above), short (name beside the row), by A.
+    rows : model, family, A [m], y (square root of A, moved where rows would touch; models without A above), short (name
+        beside the row), by A.
     cells : model, N_D (0: the physics alone), family, A, y, low and high (reach below and above y), H [m], worse (not
         below that without physics), words (of the hover box).
     """
@@ -88,7 +90,9 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour and number are H, the "
-        "mean error over the horizon, mean over seeds. At N_D = 0 is the physics alone, whose H is A."
+        "mean error over the horizon, mean over seeds. At N_D = 0 is the physics alone, whose H is A: that number "
+        "counts where rows that would touch are moved apart."
+        + family_words(content, rows.family)
         + (hatched if cells.worse.any() else "")
         + words_on_left_out(content)
         + _not_on_map(content)
@@ -134,7 +138,7 @@ def map_of_cells(content: ReportContent, *, with_physics: bool = True) -> CellMa
 
 
 def _rows_of_map(content: ReportContent) -> pd.DataFrame:
-    """The models of the cells as `CellMap.rows`; of several methods on the same physics the first."""
+    """The models of the cells as `CellMap.rows`, rows apart; of several methods on the same physics the first."""
     frame = overview_models(content)
     frame = frame[~same_physics(frame)].reset_index(drop=True)
     top = math.sqrt(max(float(frame.A.max(skipna=True)), 1e-3)) if frame.A.notna().any() else 1.0
@@ -142,7 +146,9 @@ def _rows_of_map(content: ReportContent) -> pd.DataFrame:
     parts = [str(name).partition(" + ") for name in frame.model]
     alike = len({method for _, _, method in parts}) == 1
     short = [foundation for foundation, _, _ in parts] if alike else frame.model
-    return frame.assign(y=np.sqrt(frame.A).where(frame.A.notna(), strips), short=short)
+    y = np.sqrt(frame.A).where(frame.A.notna(), strips)
+    gap = float(np.ptp(y)) * min(ROW_HEIGHT / INSIDE, 1 / max(len(y) - 1, 1))
+    return frame.assign(y=spread_places(y.tolist(), gap, float(y.max())), short=short)
 
 
 def _cell_words(cells: Sequence[dict[Hashable, Any]], row: Any) -> str:
@@ -220,7 +226,7 @@ def _ticks_of_map(rows: pd.DataFrame, low: float) -> dict[str, list[Any]]:
     largest = float(rows.A.max())
     decades = range(math.floor(math.log10(max(largest, 1e-6))) - 1, math.ceil(math.log10(max(largest, 1e-6))) + 1)
     ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
-    values = [tick for tick in ticks if max(low**2, largest / 40) <= tick <= largest]
+    values = [tick for tick in ticks if max(low, 0.0) ** 2 <= tick <= largest and tick >= largest / 40]
     return {"tickvals": list(np.sqrt(values)), "ticktext": [f"{value:g}" for value in values]}
 
 

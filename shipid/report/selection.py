@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -82,6 +82,13 @@ def overview_models(content: ReportContent) -> pd.DataFrame:
     if len(frame) > MOST_MODELS:
         frame = frame[frame.model.isin(content.models.model) | (frame.family == DATA_DRIVEN)]
     return frame.reset_index(drop=True)
+
+
+def family_words(content: ReportContent, families: Iterable[str]) -> str:
+    """What each family of models is, as sentences; empty where that is not known."""
+    known = content.models.dropna(subset="description").groupby("family")["description"].first()
+    named = [name for name in dict.fromkeys(families) if name in known.index and name != DATA_DRIVEN]
+    return "".join(f" {name}: {known[name]}." for name in named)
 
 
 def words_on_left_out(content: ReportContent) -> str:

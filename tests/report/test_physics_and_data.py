@@ -48,6 +48,26 @@ def test_every_cell_lies_at_its_accuracy_and_size(simulation):
     assert numbers.textfont.color[0].startswith("var(--on-heat-")
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_rows_of_nearly_equal_A_are_legible_and_in_order(simulation, seed):
+    """By drawn A, some nearly equal: every row has room for its number, and rows rise with A."""
+    rng = np.random.default_rng(seed)
+    names = [f"m-{number}" for number in range(12)]
+    A = np.sort(rng.choice([1.0, 1.001, 2.5, 9.0, 9.01, 20.0], len(names)) * rng.uniform(1.0, 1.002, len(names)))
+    frames = {}
+    for key, every in (("cells", simulation.cells), ("models", simulation.models)):
+        one, pure = every[every.model.eq("moderate-1")], every[every.A.isna()]
+        many = [one.assign(model=name, A=a) for name, a in zip(names, A, strict=True)]
+        frames[key] = pd.concat([*many, pure], ignore_index=True)
+    panel = flat(replace(simulation, **frames))
+    bars = panel.data[0]
+    high = (580 - panel.layout.margin.t - panel.layout.margin.b) / np.ptp(panel.layout.yaxis.range)
+    assert min(bars.y) * high > 14
+    of = {re.match(r"<b>(.*?)</b>", words)[1]: base for words, base in zip(bars.customdata, bars.base, strict=True)}
+    assert [of[name] for name in names] == sorted(of[name] for name in names)
+    assert any("m-0" in note.text for note in panel.layout.annotations)
+
+
 def test_rows_do_not_cover_each_other(simulation):
     bars = flat(simulation).data[0]
     edges = sorted({(base, base + y) for y, base in zip(bars.y, bars.base, strict=True)})
