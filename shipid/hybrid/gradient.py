@@ -248,7 +248,7 @@ def _gather_trials(running: list[_RunningStack]) -> dict[Trial, tuple[float, int
     for members, training in running:
         parts = zip(members, training.losses(), training.best.epochs.tolist(), training.layers(), strict=True)
         for one, loss, epochs, layers in parts:
-            error = float(loss) * np.square(one.basis).mean() * one.basis.shape[1] + one.floor
+            error = float(loss) * np.square(one.basis).sum() / len(one.basis) + one.floor
             ended[one.trial].append((one.fold, error, epochs, one.networks(layers)))
     return {
         trial: (
