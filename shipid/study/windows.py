@@ -37,7 +37,7 @@ class StudyWindows:
         The future of test windows is NaN unless they went out `with_truth`.
     keys : a row a window: run, instant [s, clock of the run], split (`train` or `test`), fold (in which it validates,
         -1 for the test). folds : (training, validation) indices of each fold, which share no moment.
-    physics : foundation -> its path (T, S, 2) [m] in the frame (11); zeros without physics.
+    physics : foundation -> its path (T, S, 2) [m] in the frame (11); zeros without physics; as in `PreparedStudy`.
     """
 
     windows: Windows
