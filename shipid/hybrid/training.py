@@ -176,8 +176,7 @@ def _stack_losses(made: Tensor, targets: Tensor, mirrored: bool) -> Tensor:
 
 def mirrored_outputs(made: Tensor) -> Tensor:
     """Outputs (..., n, 2 r), x made even and y odd, of those of inputs and then of their images (..., 2 n, 2 r)."""
-    sign = torch.ones(made.shape[-1], device=made.device)
-    sign[len(sign) // 2 :] = -1.0
+    sign = torch.tensor([1.0, -1.0], device=made.device).repeat_interleave(made.shape[-1] // 2)
     plain, image = made.chunk(2, dim=-2)
     return (plain + sign * image) / 2
 
@@ -412,7 +411,4 @@ def _mirrored_loss(
 ) -> Tensor:
     """Mean squared error (1,) of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
     past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
-    made = network(past, now)
-    if len(seen) == 2:
-        made = mirrored_outputs(made)
-    return (made - outputs).square().mean()[None]
+    return _stack_losses(network(past, now)[None], outputs[None], len(seen) == 2)
