@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from urllib.parse import unquote, urldefrag, urlsplit
 
+import pandas as pd
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -159,6 +160,19 @@ def test_a_command_writes_its_record(records: ModuleType, tmp_path: Path, monkey
     assert all(f"\n- {key}: " in text for key in records.HEAD)
     assert records.main("none", sys.executable, "-c", "raise SystemExit(3)") == 3
     assert not (tmp_path / "none.md").exists()
+
+
+def test_the_grid_of_the_paper_is_drawn_and_counted() -> None:
+    """Figures 8, 9 and 10 of a grid with several amounts; sentences count what its rows say."""
+    grid = load(DOCS / "paper_grid.py")
+    drawn = grid.figures_page().partition("## `path-drawn`")[2]
+    assert drawn.count("Plotly.newPlot") == 3
+    errors = {("moderate-1", 10): 2.0, ("moderate-1", 30): 1.0, ("none", 10): 3.0, ("none", 30): 2.5}
+    rows = [{"model": model, "N_D": N_D, "A": 4.0, "H": H, "H_90": 2 * H} for (model, N_D), H in errors.items()]
+    said = " ".join(grid.counts_of_findings(pd.DataFrame(rows)))
+    assert "S2: H is lower at 30 runs than at 10 for 2 of 2 models." in said
+    assert "S1, N_D = 30: 1 of 1 moderate models have a lower H than none." in said
+    assert "S6: 1 models have a lower H with 10 runs than none with 30." in said
 
 
 def test_the_readme_is_short_and_its_files_are_there() -> None:

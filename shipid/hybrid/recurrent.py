@@ -122,14 +122,16 @@ class RecurrentProblem(PathProblem):
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the error of the networks of the folds, and the most epochs of one."""
-        networks = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
-        self.trained[number] = tuple(network for network, _ in networks)
-        losses = []
-        for network, (_, validation) in zip(self.trained[number], self.task.folds, strict=True):
-            here, instants = self.rows(validation), self.instants.select(validation)
-            predicted = network.predict(here, instants, self.task.commands)
-            losses.append(mean_squared_error(predicted, self.targets[:, validation]))
-        return float(np.mean(losses)), point, max(epochs for _, epochs in networks)
+        trained = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
+        self.trained[number] = tuple(network for network, _ in trained)
+        losses = [
+            mean_squared_error(
+                network.predict(self.rows(watched), self.instants.select(watched), self.task.commands),
+                self.targets[:, watched],
+            )
+            for network, (_, watched) in zip(self.trained[number], self.task.folds, strict=True)
+        ]
+        return float(np.mean(losses)), point, max(epochs for _, epochs in trained)
 
     def corrector(self, best: Sequence[Row]) -> Any:
         """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
@@ -167,8 +169,7 @@ class RecurrentProblem(PathProblem):
         method = self.method
         length = Length(method.epochs, method.batch, method.patience)
         layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
-        scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
-        return GatedNetwork(reader, scaled, self.basis), epochs
+        return GatedNetwork(reader, layers, self.basis * scale), epochs
 
 
 class Recurrent(SearchedAlone):

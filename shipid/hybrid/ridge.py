@@ -351,10 +351,7 @@ def _ridges_for_all(ridges: Sequence[float], share: float, chosen: Index) -> Ind
 
 def _tables_of_windows(tables: Mapping[str, Mapping[str, Array]], windows: Index) -> dict[str, dict[str, Array]]:
     """Tables with the chosen windows alone; arrays that several tables share stay shared."""
-    chosen: dict[int, Array] = {}
-    for table in tables.values():
-        for values in table.values():
-            chosen.setdefault(id(values), values[windows])
+    chosen = {id(values): values[windows] for table in tables.values() for values in table.values()}
     return {key: {name: chosen[id(values)] for name, values in table.items()} for key, table in tables.items()}
 
 

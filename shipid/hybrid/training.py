@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice, pairwise
-from math import ceil, cos, pi
+from math import ceil, cos, pi, prod
 
 import numpy as np
 import torch
@@ -176,8 +176,7 @@ def _stack_losses(made: Tensor, targets: Tensor, mirrored: bool) -> Tensor:
 
 def mirrored_outputs(made: Tensor) -> Tensor:
     """Outputs (..., n, 2 r), x made even and y odd, of those of inputs and then of their images (..., 2 n, 2 r)."""
-    sign = torch.ones(made.shape[-1], device=made.device)
-    sign[len(sign) // 2 :] = -1.0
+    sign = torch.tensor([1.0, -1.0], device=made.device).repeat_interleave(made.shape[-1] // 2)
     plain, image = made.chunk(2, dim=-2)
     return (plain + sign * image) / 2
 
@@ -290,14 +289,16 @@ class BestEpochs:
             self.running &= self.waited < self.patience
 
 
+def split_layers(flat: Tensor, shapes: Sequence[tuple[int, ...]]) -> list[Tensor]:
+    """Split flat weights (K, P) into views (K, ...) of these shapes."""
+    pieces = torch.split(flat, [prod(shape) for shape in shapes], dim=1)
+    return [piece.view(-1, *shape) for piece, shape in zip(pieces, shapes, strict=True)]
+
+
 def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
     """Split flat weights (K, P) into views: weights (K, i, o) and biases (K, 1, o) of each layer."""
-    views, start = [], 0
-    for i, o in pairwise(widths):
-        middle, end = start + i * o, start + i * o + o
-        views.append((flat[:, start:middle].view(-1, i, o), flat[:, None, middle:end]))
-        start = end
-    return views
+    views = split_layers(flat, [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))])
+    return list(zip(views[::2], views[1::2], strict=True))
 
 
 def draw_dropout(
@@ -394,8 +395,8 @@ def _first_weights(shapes: Shapes, units: int, generator: torch.Generator) -> Te
 
 def _layers_by_name(weights: Tensor, shapes: Shapes) -> dict[str, Tensor]:
     """Layers by name, in the memory of weights (1, P)."""
-    pieces = torch.split(weights[0], [int(np.prod(shape)) for shape in shapes.values()])
-    return {name: piece.view(shape) for (name, shape), piece in zip(shapes.items(), pieces, strict=True)}
+    pieces = split_layers(weights, list(shapes.values()))
+    return {name: piece[0] for name, piece in zip(shapes, pieces, strict=True)}
 
 
 def gated_outputs(layers: Mapping[str, Tensor], past: Tensor, now: Tensor) -> Tensor:
@@ -412,7 +413,4 @@ def _mirrored_loss(
 ) -> Tensor:
     """Mean squared error (1,) of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
     past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
-    made = network(past, now)
-    if len(seen) == 2:
-        made = mirrored_outputs(made)
-    return (made - outputs).square().mean()[None]
+    return _stack_losses(network(past, now)[None], outputs[None], len(seen) == 2)

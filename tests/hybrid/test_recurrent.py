@@ -25,8 +25,7 @@ def test_home_a_force_of_past_orders():
     assert here.removed(fitted(Recurrent(trials=1), here)) > 0.8
 
 
-def test_the_arrays_say_what_pytorch_says():
-    """The unit in plain arrays is torch's GRU."""
+def test_the_layers_by_name_are_a_gru_of_pytorch():
     rng = np.random.default_rng(0)
     gru = torch.nn.GRU(3, 4).double()
     names = dict(zip(("W_i", "W_h", "b_i", "b_h"), gru.parameters(), strict=True))
