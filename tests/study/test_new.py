@@ -167,7 +167,7 @@ def test_the_test_run_holds_the_past_of_the_method(tmp_path: Path) -> None:
     """Of runs of drawn lengths, some hold the horizon but not the past before it: none of these is set aside."""
     random = np.random.default_rng(0)
     dataset = trial(12, 150.0)
-    ends = dict(zip(dataset.runs, random.choice([30.0, 150.0], 12, p=[0.25, 0.75]), strict=True))
+    ends = dict(zip(dataset.runs, random.choice([25.0, 150.0], 12, p=[0.25, 0.75]), strict=True))
     frame = dataset.frame
     begin = frame.groupby("run")["t"].transform("min")
     kept = frame[frame["t"] - begin <= frame["run"].map(ends)].reset_index(drop=True)
