@@ -11,7 +11,7 @@ Candes, Ramdas and Tibshirani, "Predictive inference with the jackknife+" (Annal
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,24 +24,31 @@ from shipid.hybrid.bands import (
     LEVELS,
     TRAITS,
     Bands,
+    FastMotion,
+    fast_power,
     nearest_distances,
     path_chords,
     prediction_traits,
     split_along_track,
     track_directions,
 )
+from shipid.hybrid.features import MOTIONS
 from shipid.metrics import Array, vector_lengths
 
-FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
+FLOOR = 0.2  # of the greatest scale: the motion of waves early in the horizon does not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
 TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
+FEWEST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
+CALM = 0.01  # of the mean square of a fast motion: less is calm
+FAST_POWERS = (1.0, 0.75, 0.5, 0.25)  # of fast motion, tried in turn: errors in proportion to waves have 1
+WIDER = 1.1  # times the band without, that growth with fast motion may cost on average under the law of training
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
 
 @dataclass(frozen=True)
-class _RunShares:
+class RunShares:
     """Windows (S,) sorted into G runs.
 
     place : index of the run of each window. weight : of each window, (S,), the same sum for each run, 1 in all.
@@ -71,6 +78,7 @@ def calibrate_bands(
     names: Sequence[str],
     step: float,
     kinds: Mapping[str, str] | None = None,
+    past: Mapping[str, Array] | None = None,
 ) -> Bands | None:
     """Calibrate bands; None where fewer than three runs have errors.
 
@@ -79,14 +87,16 @@ def calibrate_bands(
     future : true paths (T, S, 2) [m] in the frame (11). run : name of the run of each window, (S,).
     columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
     step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
+    past : name -> (P, S), as predictions will have it.
     """
     chosen = _pick_over_runs(run, np.all(np.isfinite(left_out), axis=(0, 2)))
-    runs = _shares_of_runs(run[chosen])
+    runs = shares_of_runs(run[chosen])
     if runs.count < FEWEST:
         return None
     errors = left_out[:, chosen]
     paths = future[:, chosen] - errors
-    columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r"}}
+    before = {name: values[:, chosen] for name, values in (past or {}).items() if name in MOTIONS}
+    columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r", *before}}
     centres, spread, away = _training_distances(runs, np.stack([columns[name] for name in names], axis=1))
     far = max(float(away.max()), 1e-9)
     length = max(float(vector_lengths(path_chords(paths)).sum(axis=0) @ runs.weight), 1e-9)
@@ -98,22 +108,27 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
-    judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
-    fits = [_fit_scores(runs, apart, normal, circle) for circle in (True, False)]
-    radii = [band_radii(one.scores.max(axis=0), runs) for one in fits]
-    circle, ellipse = (
-        float(np.sqrt(one.scale[:, 0] * one.scale[:, 1]).mean()) * radius[judged]
-        for one, radius in zip(fits, radii, strict=True)
-    )
-    better = int(ellipse < TIGHTER * circle)
-    fitted, whole = fits[better], radii[better]
+    fitted, whole, plain = _better_shape(runs, apart, normal, np.ones(len(chosen)))
+    fast = None
+    for motion in _fast_motions(runs, columns, before):
+        wide = motion.growth(columns, before)
+        trial = _better_shape(runs, apart / wide[:, None], normal, wide)
+        if trial[2] <= WIDER * plain:
+            (fitted, whole, _), fast, apart = trial, motion, apart / wide[:, None]
+            break
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
-    reach, of = fitted.scores.max(axis=0), of[runs.place]
-    by_kind = [  # of too few runs no band is promised, whatever is here
-        band_radii(reach[of == kind], _shares_of_runs(runs.place[of == kind])) if count >= FEWEST else whole
-        for kind, count in known.items()
-    ]
+    of, growth = of[runs.place], np.exp(normal @ fitted.slopes)
+    by_kind, scales = [], []
+    for kind, count in known.items():  # of too few runs no band is promised, whatever is here
+        mine = of == kind
+        radii, scale = whole, fitted.scale
+        if count >= FEWEST:
+            same = shares_of_runs(runs.place[mine])
+            scale, scores = _scale_errors(same, apart[:, mine], fitted.circle)
+            radii = band_radii(scores.max(axis=0) / growth[mine], same)
+        by_kind.append(radii)
+        scales.append(scale)
     return Bands(
         runs=runs.count,
         along=fitted.scale[:, 0],
@@ -132,10 +147,50 @@ def calibrate_bands(
         length=length,
         kinds=known,
         by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
+        scales=np.reshape(scales, (len(known), *fitted.scale.shape)),
+        fast=fast,
     )
 
 
-def band_radii(scores: Array, runs: _RunShares) -> Array:
+def _better_shape(runs: RunShares, apart: Array, normal: Array, wide: Array) -> tuple[_ScoreFit, Array, float]:
+    """Circle or ellipse, its radii (99,), and its mean size [m] over windows that are wider (S,) than usual."""
+    judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
+    found = []
+    for circle in (True, False):
+        fit = _fit_scores(runs, apart, normal, circle)
+        radii = band_radii(fit.scores.max(axis=0), runs)
+        found.append((fit, radii, float(np.sqrt(fit.scale[:, 0] * fit.scale[:, 1]).mean()) * float(radii[judged])))
+    fit, radii, size = found[int(found[1][2] < TIGHTER * found[0][2])]
+    return fit, radii, size * float(runs.weight @ (wide * np.exp(normal @ fit.slopes)))
+
+
+def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Iterator[FastMotion]:
+    """Growths with fast motion that may be tried, the strongest first; none where it cannot be told from manoeuvres.
+
+    Its level is the sum of logarithms that tells a common factor of all of them best: weights C^-1 1 for covariance C.
+    """
+    rows = len(past.get("u", ()))
+    if rows < FEWEST_ROWS:
+        return
+    power = fast_power(columns, past, rows)
+    floor = CALM * (runs.weight @ power)
+    if not (floor > 0).all():
+        return
+    logs = np.log(power + floor)
+    apart = logs - runs.weight @ logs
+    covariance = (runs.weight[:, None] * apart).T @ apart
+    weights = np.linalg.solve(
+        covariance + 0.02 * np.trace(covariance) / len(floor) * np.eye(len(floor)), np.ones(len(floor))
+    )
+    weights /= 2 * weights.sum()  # half the logarithm of a square
+    level = logs @ weights
+    order = np.argsort(level)
+    usual = float(np.interp(0.5, np.cumsum(runs.weight[order]), level[order]))
+    for power_ in FAST_POWERS:
+        yield FastMotion(rows, power_ * weights, floor, power_ * usual)
+
+
+def band_radii(scores: Array, runs: RunShares) -> Array:
     """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs."""
     order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
@@ -150,7 +205,7 @@ def band_radii(scores: Array, runs: _RunShares) -> Array:
     return np.asarray(np.maximum.accumulate(np.interp(wanted, at, scores[order])))
 
 
-def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
+def _ranks_among_others(order: NDArray[np.int64], runs: RunShares) -> Array:
     """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
     below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
@@ -161,7 +216,7 @@ def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
     return np.asarray(np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0))
 
 
-def _intraclass_correlation(ranks: Array, runs: _RunShares) -> float:
+def _intraclass_correlation(ranks: Array, runs: RunShares) -> float:
     """How alike the windows of one run are, 0 to 1: share of the variance of their ranks that lies between runs."""
     means = runs.means(ranks)
     within = float(runs.weight @ (ranks - means[runs.place]) ** 2)
@@ -176,22 +231,27 @@ def _intraclass_correlation(ranks: Array, runs: _RunShares) -> float:
 class _ScoreFit:
     """Scale (T, 2) [m] along and across, slopes (5,) of the growth, and scores (T, S) by the other runs alone."""
 
+    circle: bool
     scale: Array
     slopes: Array
     scores: Array
 
 
-def _fit_scores(runs: _RunShares, apart: Array, normal: Array, circle: bool) -> _ScoreFit:
+def _fit_scores(runs: RunShares, apart: Array, normal: Array, circle: bool) -> _ScoreFit:
     """Scale and growth from all runs, and scores of each run by those of the others."""
+    scale, plain = _scale_errors(runs, apart, circle)
+    slopes, without = _growth_slopes(runs, normal, plain.max(axis=0))
+    return _ScoreFit(circle, scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+
+
+def _scale_errors(runs: RunShares, apart: Array, circle: bool) -> tuple[Array, Array]:
+    """Scale (T, 2) [m] from all runs, and errors (T, S) over the scale of the other runs."""
     if circle:
         apart = np.broadcast_to(vector_lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
     means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
     total = means.sum(axis=0)
-    scale = _floor_scale(total / runs.count)
     others = _floor_scale((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
-    plain = vector_lengths(apart / others)
-    slopes, without = _growth_slopes(runs, normal, plain.max(axis=0))
-    return _ScoreFit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+    return _floor_scale(total / runs.count), vector_lengths(apart / others)
 
 
 def _floor_scale(scale: Array) -> Array:
@@ -200,7 +260,7 @@ def _floor_scale(scale: Array) -> Array:
     return np.asarray(np.maximum(scale, np.maximum(FLOOR * most, 1e-9)), dtype=float)
 
 
-def _growth_slopes(runs: _RunShares, normal: Array, scores: Array) -> tuple[Array, Array]:
+def _growth_slopes(runs: RunShares, normal: Array, scores: Array) -> tuple[Array, Array]:
     """Slopes (5,) of the logarithm of scores (S,) over traits, from all runs, and without each run, (G, 5).
 
     Ridge regression in which every run counts as one sample. The distance from training makes no band narrower.
@@ -226,7 +286,7 @@ def _growth_slopes(runs: _RunShares, normal: Array, scores: Array) -> tuple[Arra
     return solved(product, right), np.stack(without)
 
 
-def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, Array]:
+def _training_distances(runs: RunShares, points: Array) -> tuple[Array, Array, Array]:
     """Centres (m, d) of training windows (S, d), spread (d,) of each column, and distances (S,) from other runs."""
     deviation = np.sqrt(runs.weight @ (points - runs.weight @ points) ** 2)
     spread = np.maximum(deviation, np.maximum(1e-3 * np.abs(points).max(axis=0), 1e-9))
@@ -247,7 +307,8 @@ def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[
     return np.sort(np.concatenate([rows[:0], *parts]))
 
 
-def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:
+def shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> RunShares:
+    """Windows sorted by the names of their runs, (S,)."""
     known, place = np.unique(names, return_inverse=True)
     sizes = np.bincount(place, minlength=len(known))
-    return _RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
+    return RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))

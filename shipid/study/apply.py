@@ -195,7 +195,7 @@ def predict_instants(predictor: Predictor, instants: Instants, band: BandSetting
     alone = predictor.alone(instants)
     predicted = predictor.predict(instants, alone)
     region = None if band is None else predictor.band(predicted, instants, band.level, kind=band.kind)
-    outside = np.asarray(predictor.outside({**instants.columns, **instants.estimates}))
+    outside = predictor.raise_alarm(instants)
     columns = {name: instants.columns[name] for name in ("t", "north", "east", "psi")}
     return Forecast(predicted, alone if predictor.vessel else np.full_like(alone, np.nan), region, outside, columns)
 
