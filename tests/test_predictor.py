@@ -85,7 +85,7 @@ def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
     np.testing.assert_array_equal(prediction.paths, predictor.predict(instants))
     assert prediction.region.along.shape == prediction.paths.shape[:2]
     assert (prediction.region.radius > 0).all()
-    np.testing.assert_array_equal(prediction.outside, predictor.outside(instants.columns))
+    np.testing.assert_array_equal(prediction.outside, predictor.raise_alarm(instants))
     alone = predictor.predict(instants, level=0.7, pointwise=True)
     assert alone.region.radius.mean() < prediction.region.radius.mean()
     with pytest.raises(DataError, match="a band of 90 % needs 9 runs or more to calibrate it: there are"):

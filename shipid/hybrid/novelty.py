@@ -122,8 +122,8 @@ def calibrate_alarm(
 
 
 def _middle_and_root(moments: Array, count: int) -> tuple[Array, Array]:
-    """Mean (d,) and root (d, d) of the inverse covariance, as if one more run had seen all inputs independent."""
+    """Mean (d,) and root (d, d) of the inverse covariance, as if a tenth of a run had seen all inputs independent."""
     middle = moments[0, 1:]
-    covariance = moments[1:, 1:] - np.outer(middle, middle) + np.eye(len(middle)) / count
+    covariance = moments[1:, 1:] - np.outer(middle, middle) + np.eye(len(middle)) / (10 * count)
     values, axes = np.linalg.eigh(covariance)
     return middle, np.asarray(axes / np.sqrt(values))

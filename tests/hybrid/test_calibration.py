@@ -11,7 +11,7 @@ from shipid.hybrid.calibration import (
     _fit_scores,
     _growth_slopes,
     _intraclass_correlation,
-    _shares_of_runs,
+    shares_of_runs,
     band_radii,
     calibrate_bands,
 )
@@ -29,7 +29,7 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
     for _ in range(rounds):
         shared, single = rng.standard_normal((count + 20, 1)), rng.standard_normal((count + 20, windows))
         scores = np.exp(np.sqrt(alike) * shared + np.sqrt(1 - alike) * single)
-        radius = band_radii(scores[:count].ravel(), _shares_of_runs(place))[AT]
+        radius = band_radii(scores[:count].ravel(), shares_of_runs(place))[AT]
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
@@ -41,16 +41,16 @@ def test_how_alike_windows_are_is_the_intraclass_correlation(count: int, windows
     rng = np.random.default_rng(count)
     values = 2.0 * rng.standard_normal((count, 1)) + rng.standard_normal((count, windows))
     F = f_oneway(*values).statistic
-    alike = _intraclass_correlation(values.ravel(), _shares_of_runs(np.repeat(np.arange(count), windows)))
+    alike = _intraclass_correlation(values.ravel(), shares_of_runs(np.repeat(np.arange(count), windows)))
     assert alike == pytest.approx(max(F - 1, 0) / (F - 1 + windows))
     assert (
-        _intraclass_correlation(np.ones(6), _shares_of_runs(np.repeat(np.arange(3), 2))) == 1.0
+        _intraclass_correlation(np.ones(6), shares_of_runs(np.repeat(np.arange(3), 2))) == 1.0
     )  # nothing differs: a run is one window
 
 
 def test_one_window_a_run_is_the_order_statistic() -> None:
     scores = np.arange(1.0, 20.0)  # 19 runs: the 18th of 19 holds a share of 18 / 20 of new ones
-    radius = band_radii(scores, _shares_of_runs(np.arange(19)))
+    radius = band_radii(scores, shares_of_runs(np.arange(19)))
     assert 17.5 <= radius[89] <= 18.5
     assert radius[94] == pytest.approx(19.0, abs=0.5)
     assert (np.diff(radius) >= 0).all()
@@ -115,7 +115,7 @@ def test_runs_without_errors_do_not_calibrate() -> None:
 def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> None:
     """Errors of one run three times as large: its scores are three times as large, those of the others smaller."""
     rng = np.random.default_rng(4)
-    of = _shares_of_runs(np.repeat(np.arange(6), 8))
+    of = shares_of_runs(np.repeat(np.arange(6), 8))
     apart, mine = rng.uniform(0.5, 2.0, (5, 48, 2)), of.place == 2
     larger = np.where(mine[:, None], 3.0, 1.0) * apart
     still = np.zeros((48, 5))  # no traits: no growth
@@ -127,7 +127,7 @@ def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> N
 def test_slopes_without_a_run_are_those_of_the_other_runs() -> None:
     """A ridge regression by least squares with rows that stand for the prior; every run counts as one sample."""
     rng, place = np.random.default_rng(4), np.repeat(np.arange(4), [3, 9, 5, 7])
-    runs, traits = _shares_of_runs(place), rng.standard_normal((24, 5))
+    runs, traits = shares_of_runs(place), rng.standard_normal((24, 5))
     scores = np.exp(0.4 * traits[:, 0] + 0.3 * traits[:, 4] + 0.2 * rng.standard_normal(24))
     slopes, without = _growth_slopes(runs, traits, scores)
     target = np.log(scores)
