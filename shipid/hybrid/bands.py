@@ -61,7 +61,7 @@ class FastMotion(StoredData):
     """Growth of a band with motion that is faster than manoeuvres, such as that of waves: errors grow in proportion.
 
     past : rows before the instant that are looked at. weights, floor : (9,) of the logarithm of each of `fast_power`;
-    the weights sum to one half or less. usual : level of half of the training: below it nothing becomes narrower.
+    the weights sum to one half or less. usual : level below which nothing changes.
     """
 
     past: int

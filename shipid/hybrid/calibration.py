@@ -35,12 +35,13 @@ from shipid.hybrid.bands import (
 from shipid.hybrid.features import MOTIONS
 from shipid.metrics import Array, vector_lengths
 
-FLOOR = 0.2  # of the greatest scale: the motion of waves early in the horizon does not decide about a path
+FLOOR = 0.3  # of the greatest scale: the motion of waves early in the horizon does not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
 TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
 FEWEST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
+USUAL = 0.3  # share of the training below the level from which a band grows
 CALM = 0.01  # of the mean square of a fast motion: less is calm
 FAST_POWERS = (1.0, 0.75, 0.5, 0.25)  # of fast motion, tried in turn: errors in proportion to waves have 1
 WIDER = 1.1  # times the band without, that growth with fast motion may cost on average under the law of training
@@ -185,7 +186,7 @@ def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[s
     weights /= 2 * weights.sum()  # half the logarithm of a square
     level = logs @ weights
     order = np.argsort(level)
-    usual = float(np.interp(0.5, np.cumsum(runs.weight[order]), level[order]))
+    usual = float(np.interp(USUAL, np.cumsum(runs.weight[order]), level[order]))
     for power_ in FAST_POWERS:
         yield FastMotion(rows, power_ * weights, floor, power_ * usual)
 

@@ -11,9 +11,9 @@ from shipid.hybrid.calibration import (
     _fit_scores,
     _growth_slopes,
     _intraclass_correlation,
-    shares_of_runs,
     band_radii,
     calibrate_bands,
+    shares_of_runs,
 )
 from tests.hybrid.runs import NAMES, made, runs
 
