@@ -236,7 +236,7 @@ class Predictor(DeployedMethod):
         known = {**instants.columns, **instants.estimates}
         if self.alarm is None:
             return self.outside(known)
-        raised = self.alarm.is_raised(self.alarm.table(self.physics, instants))
+        raised = self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
         return np.asarray(raised | replace(self, limits={"u": (-np.inf, np.inf)}).outside(known))
 
     def outside(self, columns: Mapping[str, Array]) -> Array:

@@ -1,6 +1,6 @@
 """Bands: a region around every step of a predicted path that holds the whole path, or each step, with a probability.
 
-The region at step k is an ellipse along and across the predicted track, or a circle, with half axes
+The region at step k is an ellipse along and across the predicted track, with half axes
 `radius(level) * scale[k] * growth`: how errors grow over the horizon, and how much harder this prediction is than
 others. The radius is calibrated on runs that no model saw: `shipid.hybrid.calibration`.
 """
@@ -80,7 +80,7 @@ class Bands(StoredData):
     """Calibrated bands of a predictor.
 
     runs : number of runs that calibrated it.
-    along, across : scale (T,) [m] of the errors along the predicted track and across it; equal for a circle.
+    along, across : scale (T,) [m] of the errors along the predicted track and across it.
     whole : (99,) radius for each of `LEVELS` that holds whole paths.
     steps : (99, T) the same for each step alone.
     names : columns in which the distance from training is measured. centres : (m, d) points of the training windows.

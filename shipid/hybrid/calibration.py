@@ -11,7 +11,7 @@ Candes, Ramdas and Tibshirani, "Predictive inference with the jackknife+" (Annal
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,11 +39,9 @@ FLOOR = 0.3  # of the greatest scale: the motion of waves early in the horizon d
 CENTRES = 128  # points of training that the distance is measured from, about
 PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
-TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
 FEWEST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
 USUAL = 0.3  # share of the training below the level from which a band grows
 CALM = 0.01  # of the mean square of a fast motion: less is calm
-FAST_POWERS = (1.0, 0.75, 0.5, 0.25)  # of fast motion, tried in turn: errors in proportion to waves have 1
 WIDER = 1.1  # times the band without, that growth with fast motion may cost on average under the law of training
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
@@ -109,14 +107,15 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
-    fitted, whole, plain = _better_shape(runs, apart, normal, np.ones(len(chosen)))
-    fast = None
-    for motion in _fast_motions(runs, columns, before):
+    fitted, motion = _fit_scores(runs, apart, normal), _fast_motion(runs, columns, before)
+    if motion is not None:
         wide = motion.growth(columns, before)
-        trial = _better_shape(runs, apart / wide[:, None], normal, wide)
-        if trial[2] <= WIDER * plain:
-            (fitted, whole, _), fast, apart = trial, motion, apart / wide[:, None]
-            break
+        trial = _fit_scores(runs, apart / wide[:, None], normal)
+        if trial.mean_size(runs, normal, wide) > WIDER * fitted.mean_size(runs, normal, np.ones(len(wide))):
+            motion = None
+        else:
+            fitted, apart = trial, apart / wide[:, None]
+    whole = band_radii(fitted.scores.max(axis=0), runs)
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     of, growth = of[runs.place], np.exp(normal @ fitted.slopes)
@@ -126,7 +125,7 @@ def calibrate_bands(
         radii, scale = whole, fitted.scale
         if count >= FEWEST:
             same = shares_of_runs(runs.place[mine])
-            scale, scores = _scale_errors(same, apart[:, mine], fitted.circle)
+            scale, scores = _scale_errors(same, apart[:, mine])
             radii = band_radii(scores.max(axis=0) / growth[mine], same)
         by_kind.append(radii)
         scales.append(scale)
@@ -149,34 +148,22 @@ def calibrate_bands(
         kinds=known,
         by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
         scales=np.reshape(scales, (len(known), *fitted.scale.shape)),
-        fast=fast,
+        fast=motion,
     )
 
 
-def _better_shape(runs: RunShares, apart: Array, normal: Array, wide: Array) -> tuple[_ScoreFit, Array, float]:
-    """Circle or ellipse, its radii (99,), and its mean size [m] over windows that are wider (S,) than usual."""
-    judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
-    found = []
-    for circle in (True, False):
-        fit = _fit_scores(runs, apart, normal, circle)
-        radii = band_radii(fit.scores.max(axis=0), runs)
-        found.append((fit, radii, float(np.sqrt(fit.scale[:, 0] * fit.scale[:, 1]).mean()) * float(radii[judged])))
-    fit, radii, size = found[int(found[1][2] < TIGHTER * found[0][2])]
-    return fit, radii, size * float(runs.weight @ (wide * np.exp(normal @ fit.slopes)))
-
-
-def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Iterator[FastMotion]:
-    """Growths with fast motion that may be tried, the strongest first; none where it cannot be told from manoeuvres.
+def _fast_motion(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> FastMotion | None:
+    """Growth in proportion to fast motion; None where it cannot be told from manoeuvres.
 
     Its level is the sum of logarithms that tells a common factor of all of them best: weights C^-1 1 for covariance C.
     """
     rows = len(past.get("u", ()))
     if rows < FEWEST_ROWS:
-        return
+        return None
     power = fast_power(columns, past, rows)
     floor = CALM * (runs.weight @ power)
     if not (floor > 0).all():
-        return
+        return None
     logs = np.log(power + floor)
     apart = logs - runs.weight @ logs
     covariance = (runs.weight[:, None] * apart).T @ apart
@@ -187,8 +174,7 @@ def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[s
     level = logs @ weights
     order = np.argsort(level)
     usual = float(np.interp(USUAL, np.cumsum(runs.weight[order]), level[order]))
-    for power_ in FAST_POWERS:
-        yield FastMotion(rows, power_ * weights, floor, power_ * usual)
+    return FastMotion(rows, weights, floor, usual)
 
 
 def band_radii(scores: Array, runs: RunShares) -> Array:
@@ -232,23 +218,27 @@ def _intraclass_correlation(ranks: Array, runs: RunShares) -> float:
 class _ScoreFit:
     """Scale (T, 2) [m] along and across, slopes (5,) of the growth, and scores (T, S) by the other runs alone."""
 
-    circle: bool
     scale: Array
     slopes: Array
     scores: Array
 
+    def mean_size(self, runs: RunShares, normal: Array, wide: Array) -> float:
+        """Mean size [m] of the band, of windows `wide` (S,) times as wide, at 0.9 or the highest level promised."""
+        judged = min(90, 100 * runs.count // (runs.count + 1)) - 1
+        radius = float(band_radii(self.scores.max(axis=0), runs)[judged])
+        scale = float(np.sqrt(self.scale[:, 0] * self.scale[:, 1]).mean())
+        return radius * scale * float(runs.weight @ (wide * np.exp(normal @ self.slopes)))
 
-def _fit_scores(runs: RunShares, apart: Array, normal: Array, circle: bool) -> _ScoreFit:
+
+def _fit_scores(runs: RunShares, apart: Array, normal: Array) -> _ScoreFit:
     """Scale and growth from all runs, and scores of each run by those of the others."""
-    scale, plain = _scale_errors(runs, apart, circle)
+    scale, plain = _scale_errors(runs, apart)
     slopes, without = _growth_slopes(runs, normal, plain.max(axis=0))
-    return _ScoreFit(circle, scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+    return _ScoreFit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
 
 
-def _scale_errors(runs: RunShares, apart: Array, circle: bool) -> tuple[Array, Array]:
+def _scale_errors(runs: RunShares, apart: Array) -> tuple[Array, Array]:
     """Scale (T, 2) [m] from all runs, and errors (T, S) over the scale of the other runs."""
-    if circle:
-        apart = np.broadcast_to(vector_lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
     means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
     total = means.sum(axis=0)
     others = _floor_scale((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)

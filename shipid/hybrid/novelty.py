@@ -48,10 +48,6 @@ class NoveltyAlarm(StoredData):
     high: Array
     slack: float
 
-    def table(self, physics: Physics, instants: Instants) -> dict[str, Array]:
-        """Return the inputs (S,) by name; DataError where a column or a part of the past is missing."""
-        return alarm_inputs(self.inputs, self.past, physics, instants)
-
     def is_raised(self, table: Mapping[str, Array]) -> NDArray[np.bool_]:
         """Whether the alarm is raised (S,), also where an input is not a number."""
         away = np.linalg.norm((select_inputs(table, self.names) - self.middle) @ self.root, axis=1)
