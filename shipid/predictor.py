@@ -50,7 +50,7 @@ Array = np.ndarray
 Part = TypeVar("Part", bound=StoredData)
 FORMAT = 6
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
-BANDS, ALARM = "bands.", "alarm."  # before the names of arrays of a band and an alarm in a saved predictor
+BANDS, ALARM_PARTS = "bands.", "alarm."  # before the names of arrays of a band and an alarm in a saved predictor
 MOST_HORIZON_STEPS = 100_000  # of a horizon and of a past
 
 
@@ -290,7 +290,7 @@ class Predictor(DeployedMethod):
         if target.is_dir():
             raise ResultError("is a folder: name a file to write", file=target)
         arrays["header"] = np.array(json.dumps(header, default=str))
-        for prefix, part in ((BANDS, self.bands), (ALARM, self.alarm)):
+        for prefix, part in ((BANDS, self.bands), (ALARM_PARTS, self.alarm)):
             if part is not None:
                 arrays |= {prefix + name: values for name, values in part.arrays().items()}
         write_arrays(target, arrays)  # not compressed: weights do not shrink
@@ -313,7 +313,7 @@ class Predictor(DeployedMethod):
             arrays = {str(name): np.asarray(values) for name, values in {**given}.items()}
         except (TypeError, ValueError) as error:
             raise DataError(f"the arrays {what} must be a table of arrays ({error})") from None
-        taken = next((name for name in arrays if name == "header" or name.startswith((BANDS, ALARM))), None)
+        taken = next((name for name in arrays if name == "header" or name.startswith((BANDS, ALARM_PARTS))), None)
         fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
         if fault:
             raise DataError(f"arrays {what}: {fault}")
@@ -370,7 +370,9 @@ class Predictor(DeployedMethod):
         try:
             known, vessel = _Header.model_validate(header), header["vessel"]
             bands = _read_part(Bands, BANDS, header.get("bands"), arrays)
-            alarm = _read_part(NoveltyAlarm, ALARM, header.get("alarm"), arrays)  # the arrays left are the method's
+            alarm = _read_part(
+                NoveltyAlarm, ALARM_PARTS, header.get("alarm"), arrays
+            )  # the arrays left are the method's
             loaded = cls(
                 physics=Physics(
                     None if vessel is None else check_document(vessel["document"], vessel["file"]),

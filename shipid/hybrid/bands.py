@@ -60,19 +60,16 @@ class Region:
 class FastMotion(StoredData):
     """Growth of a band with motion that is faster than manoeuvres, such as that of waves: errors grow in proportion.
 
-    past : rows before the instant that are looked at. weights, floor : (9,) of the logarithm of each of `fast_power`;
-    the weights sum to one half or less. usual : level below which nothing changes.
+    past : rows before the instant that are looked at. weights : (9,) of each of `fast_power` [1]: the band grows with
+    the root of their sum, from 1 on.
     """
 
     past: int
     weights: Array
-    floor: Array
-    usual: float
 
     def growth(self, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Array:
         """How much wider (S,) a band is, 1 or more."""
-        level = np.log(fast_power(columns, past, self.past) + self.floor) @ self.weights
-        return np.asarray(np.exp(np.maximum(level - self.usual, 0.0)))
+        return np.sqrt(np.maximum(fast_power(columns, past, self.past) @ self.weights, 1.0))
 
 
 @dataclass(frozen=True, eq=False)

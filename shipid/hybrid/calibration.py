@@ -11,7 +11,7 @@ Candes, Ramdas and Tibshirani, "Predictive inference with the jackknife+" (Annal
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -39,9 +39,8 @@ FLOOR = 0.3  # of the greatest scale: the motion of waves early in the horizon d
 CENTRES = 128  # points of training that the distance is measured from, about
 PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
-FEWEST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
-USUAL = 0.3  # share of the training below the level from which a band grows
-CALM = 0.01  # of the mean square of a fast motion: less is calm
+FEWEST_PAST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
+FROM_LEVELS = (0.2, 0.4, 0.55, 0.7, 0.8, 0.9)  # shares of the training with less fast motion than makes a band grow
 WIDER = 1.1  # times the band without, that growth with fast motion may cost on average under the law of training
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
@@ -107,14 +106,14 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
-    fitted, motion = _fit_scores(runs, apart, normal), _fast_motion(runs, columns, before)
-    if motion is not None:
-        wide = motion.growth(columns, before)
+    fitted, motion = _fit_scores(runs, apart, normal), None
+    widest = WIDER * fitted.mean_size(runs, normal, np.ones(len(chosen)))
+    for slower in _fast_motions(runs, columns, before):
+        wide = slower.growth(columns, before)
         trial = _fit_scores(runs, apart / wide[:, None], normal)
-        if trial.mean_size(runs, normal, wide) > WIDER * fitted.mean_size(runs, normal, np.ones(len(wide))):
-            motion = None
-        else:
-            fitted, apart = trial, apart / wide[:, None]
+        if trial.mean_size(runs, normal, wide) <= widest:
+            fitted, motion, apart = trial, slower, apart / wide[:, None]
+            break
     whole = band_radii(fitted.scores.max(axis=0), runs)
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
@@ -152,29 +151,16 @@ def calibrate_bands(
     )
 
 
-def _fast_motion(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> FastMotion | None:
-    """Growth in proportion to fast motion; None where it cannot be told from manoeuvres.
-
-    Its level is the sum of logarithms that tells a common factor of all of them best: weights C^-1 1 for covariance C.
-    """
+def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Iterator[FastMotion]:
+    """Growths in proportion to fast motion, from a low level on, then from higher ones; none where it is not known."""
     rows = len(past.get("u", ()))
-    if rows < FEWEST_ROWS:
-        return None
-    power = fast_power(columns, past, rows)
-    floor = CALM * (runs.weight @ power)
-    if not (floor > 0).all():
-        return None
-    logs = np.log(power + floor)
-    apart = logs - runs.weight @ logs
-    covariance = (runs.weight[:, None] * apart).T @ apart
-    weights = np.linalg.solve(
-        covariance + 0.02 * np.trace(covariance) / len(floor) * np.eye(len(floor)), np.ones(len(floor))
-    )
-    weights /= 2 * weights.sum()  # half the logarithm of a square
-    level = logs @ weights
+    power = fast_power(columns, past, rows) if rows >= FEWEST_PAST_ROWS else np.zeros((len(runs.place), 9))
+    mean = runs.weight @ power
+    weights = np.divide(1.0, mean, out=np.zeros(9), where=mean > 0)
+    level = power @ weights
     order = np.argsort(level)
-    usual = float(np.interp(USUAL, np.cumsum(runs.weight[order]), level[order]))
-    return FastMotion(rows, weights, floor, usual)
+    for share in FROM_LEVELS if mean.any() else ():
+        yield FastMotion(rows, weights / np.interp(share, np.cumsum(runs.weight[order]), level[order]))
 
 
 def band_radii(scores: Array, runs: RunShares) -> Array:

@@ -3,7 +3,7 @@
 It sees every input that a method may take, and whether an order has changed in the past that is given. Two scores are
 compared with those of runs left out of the training in turn: the distance from the middle of the training, with the
 inputs' covariance, and how far an order, or an input that was constant, lies outside its range. Smaller waves or less
-wind than in training are no alarm: such inputs lie near the middle.
+wind than in training are no alarm: such inputs lie near the middle. More wind widens the band by its distance instead.
 """
 
 from __future__ import annotations
@@ -95,6 +95,7 @@ def calibrate_alarm(
     varying = (name for name, values in table.items() if np.ptp(values) > range_rounding(values, values).max())
     names = tuple(name for name in varying if name not in ranges)
     limited = tuple(name for name in table if name not in names or input_group(name) == "command")
+    names = tuple(name for name in names if input_group(name) != "wind")
     values, bounded = select_inputs(table, names), select_inputs(table, limited)
     scale = np.sqrt(runs.weight @ (values - runs.weight @ values) ** 2)
     values = values / scale

@@ -96,9 +96,8 @@ def watchful(predictor, instants, rng):
     bands = predictor.bands
     if past:
         power = fast_power(instants.columns, instants.past, past)
-        floor, weights = 0.01 * power.mean(axis=0), rng.dirichlet(np.ones(9)) / 2
-        usual = float(np.median(np.log(power + floor) @ weights))
-        bands = replace(bands, fast=FastMotion(past, weights, floor, usual))
+        weights = rng.dirichlet(np.ones(9)) / np.maximum(power.mean(axis=0), 1e-9)
+        bands = replace(bands, fast=FastMotion(past, weights / np.median(power @ weights)))
     return replace(predictor, alarm=alarm, bands=bands)
 
 

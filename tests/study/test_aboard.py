@@ -168,7 +168,9 @@ def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(b
         said.append(any("by more than chance" in line for line in summary(played)))
     assert said == [False, True]
     ways = [" ".join(summary(replace(played, plan=plan))) for plan in (False, True)]
-    assert ["later orders were known in calibration" in text for text in ways] == [False, True], "known orders calibrated it"
+    assert ["later orders were known in calibration" in text for text in ways] == [False, True], (
+        "known orders calibrated it"
+    )
 
 
 def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
