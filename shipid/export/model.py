@@ -59,8 +59,8 @@ class ExportModel:
             raise ShipidError(
                 f"a predictor by the method {self.predictor.method} cannot be exported; these can: {', '.join(kinds)}"
             )
-        parts = [corrector, *filter(None, (bands, self.predictor.alarm))]
-        arrays = [array for part in parts for array in part.arrays().values()]
+        tables = [part.arrays() for part in (corrector, bands, self.predictor.alarm) if part is not None]
+        arrays = [array for table in tables for array in table.values()]
         count = sum(np.size(array) for array in arrays)
         if count > MOST_NUMBERS:
             raise ShipidError(

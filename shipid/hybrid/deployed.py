@@ -25,9 +25,9 @@ class DeployedMethod:
     commands : `held` at their value at the instant, or `known` over the horizon: instants then hold `planned`.
     causal : columns of a log that were interpolated between fixes: inputs hold the last fix, see `shipid.data.causal`.
     bands : None where no runs could calibrate them.
-    alarm : sees every input of the method; None where no runs could calibrate it: the limits then are the alarm.
     run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training, by which an
         observer has settled; 0 without one. An earlier instant is outside.
+    alarm : sees every input of the method; None where no runs could calibrate it: the limits then are the alarm.
     """
 
     physics: Physics
@@ -38,8 +38,8 @@ class DeployedMethod:
     commands: Commands = "held"
     causal: tuple[str, ...] = ()
     bands: Bands | None = field(default=None, repr=False)
-    alarm: NoveltyAlarm | None = field(default=None, repr=False)
     run_up: float = 0.0
+    alarm: NoveltyAlarm | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """A number of NumPy's becomes a plain one, as in `Physics`."""

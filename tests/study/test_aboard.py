@@ -51,9 +51,10 @@ def banded(tmp_path_factory):
     names = ("u", "r", "rudder.delta")
     bands = bands_of(rng, physics, instants, names, 1.0)
     bands = replace(bands, runs=10, kinds={"zigzag": 4}, by_kind=2 * bands.whole[None], far=100.0, slopes=np.zeros(5))
+    half = np.outer(np.arange(1, 5), [50.0, 30.0])
     fitted = Predictor(
         physics, "alone", UnchangedPath({}), {"rudder.delta": (-0.1, 0.1)}, {}, "known",
-        bands=replace(bands, along=50.0 * np.arange(1, 5), across=30.0 * np.arange(1, 5)),
+        bands=replace(bands, along=half[:, 0], across=half[:, 1], scales=half[None]),
     )  # fmt: skip
     return fitted, fitted.save(tmp_path_factory.mktemp("cell") / "banded.npz")
 
