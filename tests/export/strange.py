@@ -91,6 +91,8 @@ def watchful(predictor, instants, rng):
     past, run = predictor.past, np.array([f"M{i % 4}" for i in range(len(instants))])
     table = alarm_inputs(predictor.inputs, past, predictor.physics, instants)
     alarm = calibrate_alarm(predictor.inputs, past, table, run)
+    if alarm is None:  # of one instant
+        return predictor
     away = np.linalg.norm((np.stack([table[name] for name in alarm.names], axis=1) - alarm.middle) @ alarm.root, axis=1)
     alarm = replace(alarm, farthest=float(np.median(away)) * (1 + 1e-6), slack=0.3)
     bands = predictor.bands
