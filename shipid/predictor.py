@@ -8,7 +8,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, Self, get_args, overload
+from typing import Annotated, Any, NamedTuple, Self, TypeVar, get_args, overload
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -34,7 +34,9 @@ from shipid.hybrid.contract import fault_of_corrector, name_of_class
 from shipid.hybrid.deployed import DeployedMethod, reason_of_no_band
 from shipid.hybrid.method import Case, Index, Method, Task, fit_all, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
+from shipid.hybrid.novelty import NoveltyAlarm, alarm_inputs, calibrate_alarm
 from shipid.hybrid.physics import Physics, check_columns, check_instants
+from shipid.hybrid.stored import StoredData
 from shipid.metrics import vector_lengths
 from shipid.observer import AGE_COLUMN, Observer
 from shipid.physics.signals import SIGNALS, measurable_signals
@@ -45,9 +47,10 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import check_document
 
 Array = np.ndarray
-FORMAT = 5
+Part = TypeVar("Part", bound=StoredData)
+FORMAT = 6
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
-BANDS = "bands."  # before the names of arrays of a band in a saved predictor
+BANDS, ALARM_PARTS = "bands.", "alarm."  # before the names of arrays of a band and an alarm in a saved predictor
 MOST_HORIZON_STEPS = 100_000  # of a horizon and of a past
 
 
@@ -55,7 +58,7 @@ class BandedPrediction(NamedTuple):
     """A prediction with its band.
 
     paths : (T, S, 2) [m] in the frame (11). region : around every step, see `shipid.hybrid.bands.Region`.
-    outside : whether the instant (S,) lies outside what training has seen: there no band is promised.
+    outside : the alarm (S,), see `Predictor.raise_alarm`: there no band is promised.
     """
 
     paths: Array
@@ -137,7 +140,7 @@ class Predictor(DeployedMethod):
         return BandedPrediction(
             predicted,
             self.band(predicted, instants, level, pointwise=pointwise, kind=kind),
-            self.outside({**instants.columns, **instants.estimates}),
+            self.raise_alarm(instants),
         )
 
     def band(
@@ -149,7 +152,15 @@ class Predictor(DeployedMethod):
             instants.columns, bands.names, "the band was calibrated with this column, and the instants lack it"
         )
         paths = self._paths(paths, instants)
-        return bands.region(paths, instants.columns, self.physics.step, level, pointwise=pointwise, kind=kind)
+        return bands.region(
+            paths,
+            instants.columns,
+            self.physics.step,
+            level,
+            pointwise=pointwise,
+            kind=kind,
+            past=instants.past,
+        )
 
     def check_level(self, level: float, kind: str | None = None) -> Bands:
         """Return the bands; DataError, one sentence, where there are none of this level."""
@@ -216,6 +227,18 @@ class Predictor(DeployedMethod):
         _check_names_held(instants.planned, needed, "this command of the vessel is not among those planned")
         return instants
 
+    def raise_alarm(self, instants: Instants) -> Array:
+        """Return whether each instant (S,) is unlike those of training in any input of the method, also in its past.
+
+        Without a calibrated alarm, whether it is `outside` the limits. DataError as of `predict`.
+        """
+        instants = self._known(instants)
+        known = {**instants.columns, **instants.estimates}
+        if self.alarm is None:
+            return self.outside(known)
+        raised = self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
+        return np.asarray(raised | replace(self, limits={"u": (-np.inf, np.inf)}).outside(known))
+
     def outside(self, columns: Mapping[str, Array]) -> Array:
         """Return whether each instant (S,) is outside what training has seen, in any column; all are without limits.
 
@@ -262,13 +285,14 @@ class Predictor(DeployedMethod):
             "provenance": plain_values(self.provenance),
             "method": self.method,
             "corrector": corrector,
-            "bands": None if self.bands is None else self.bands.header(),
+            **{name: part and part.header() for name, part in (("bands", self.bands), ("alarm", self.alarm))},
         }
         if target.is_dir():
             raise ResultError("is a folder: name a file to write", file=target)
         arrays["header"] = np.array(json.dumps(header, default=str))
-        if self.bands is not None:
-            arrays |= {BANDS + name: values for name, values in self.bands.arrays().items()}
+        for prefix, part in ((BANDS, self.bands), (ALARM_PARTS, self.alarm)):
+            if part is not None:
+                arrays |= {prefix + name: values for name, values in part.arrays().items()}
         write_arrays(target, arrays)  # not compressed: weights do not shrink
         return target
 
@@ -289,7 +313,7 @@ class Predictor(DeployedMethod):
             arrays = {str(name): np.asarray(values) for name, values in {**given}.items()}
         except (TypeError, ValueError) as error:
             raise DataError(f"the arrays {what} must be a table of arrays ({error})") from None
-        taken = next((name for name in arrays if name == "header" or name.startswith(BANDS)), None)
+        taken = next((name for name in arrays if name == "header" or name.startswith((BANDS, ALARM_PARTS))), None)
         fault = _fault_of(arrays) if taken is None else f"{taken!r} is a name that is taken: use another"
         if fault:
             raise DataError(f"arrays {what}: {fault}")
@@ -345,7 +369,10 @@ class Predictor(DeployedMethod):
             raise ResultError(f"damaged: {fault}: run the study again", file=file)
         try:
             known, vessel = _Header.model_validate(header), header["vessel"]
-            bands = _read_bands(header.get("bands"), arrays)  # the arrays that are left are the method's
+            bands = _read_part(Bands, BANDS, header.get("bands"), arrays)
+            alarm = _read_part(
+                NoveltyAlarm, ALARM_PARTS, header.get("alarm"), arrays
+            )  # the arrays left are the method's
             loaded = cls(
                 physics=Physics(
                     None if vessel is None else check_document(vessel["document"], vessel["file"]),
@@ -362,6 +389,7 @@ class Predictor(DeployedMethod):
                 commands=known.commands,
                 causal=tuple(known.causal),
                 bands=bands,
+                alarm=alarm,
                 run_up=known.run_up,
             )
             if not 0 <= loaded.past <= MOST_HORIZON_STEPS:
@@ -482,10 +510,8 @@ def fit(
     provenance: dict[str, Any] = {"runs": list(windows.spans), "seed": seed}
     if left_out is None and refits:
         left_out = _errors_of_refits(method, physics, windows, refits, commands, seed)
-    bands, reason = bands_of(left_out, windows, limits, kinds)
-    if bands is None:
-        provenance["no_band"] = reason
-    return Predictor(physics, kind, corrector, limits, provenance, commands, bands=bands)
+    predictor = Predictor(physics, kind, corrector, limits, provenance, commands)
+    return with_bands(predictor, left_out, windows, windows.instants(known=task.known), kinds)
 
 
 def _check_fit(method: Method, kind: str, physics: Physics, windows: Windows) -> None:
@@ -524,7 +550,7 @@ def read_bands(file: str | os.PathLike[str]) -> tuple[Bands | None, str]:
     arrays = read_arrays(file, "header", BANDS)
     header = json.loads(str(arrays.pop("header")))
     _check_format(header, file)
-    return _read_bands(header["bands"], arrays), reason_of_no_band(header["provenance"])
+    return _read_part(Bands, BANDS, header["bands"], arrays), reason_of_no_band(header["provenance"])
 
 
 def _check_format(header: Mapping[str, Any], file: str | os.PathLike[str]) -> None:
@@ -533,10 +559,10 @@ def _check_format(header: Mapping[str, Any], file: str | os.PathLike[str]) -> No
         raise ResultError(words, file=file)
 
 
-def _read_bands(header: Any, arrays: dict[str, Array]) -> Bands | None:
-    """Bands from their header, which is None where there are none, and their arrays, which are taken out."""
-    taken = {name.removeprefix(BANDS): arrays.pop(name) for name in [*arrays] if name.startswith(BANDS)}
-    return None if header is None else Bands.from_arrays(header, taken)
+def _read_part(kind: type[Part], prefix: str, header: Any, arrays: dict[str, Array]) -> Part | None:
+    """A part of a predictor from its header, which is None where there is none, and its arrays, which are taken out."""
+    taken = {name.removeprefix(prefix): arrays.pop(name) for name in [*arrays] if name.startswith(prefix)}
+    return None if header is None else kind.from_arrays(header, taken)
 
 
 def check_bands(bands: Bands | None, reason: str, level: float, kind: str | None = None) -> Bands:
@@ -550,17 +576,27 @@ def check_bands(bands: Bands | None, reason: str, level: float, kind: str | None
 NO_BAND = "this predictor has no band: "
 
 
-def bands_of(
+def with_bands(
+    predictor: Predictor,
     left_out: Array | None,
     windows: Windows,
-    limits: Mapping[str, tuple[float, float]],
+    instants: Instants,
     kinds: Mapping[str, str] | None = None,
-) -> tuple[Bands | None, str]:
-    """Bands from errors (T, S, 2) [m] on windows by models that did not see their runs, and why there are none."""
-    if left_out is None:
-        return None, "errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
-    bands = calibrate_bands(left_out, windows.future, windows.run, windows.columns, tuple(limits), windows.step, kinds)
-    return bands, "" if bands is not None else "fewer than 3 runs have errors of models that did not see them"
+) -> Predictor:
+    """The predictor with its alarm and its bands, or why it has none, from the windows that trained it.
+
+    left_out : errors (T, S, 2) [m] on the windows by models that did not see their runs. instants : of the windows.
+    """
+    rows, table = predictor.past, alarm_inputs(predictor.inputs, predictor.past, predictor.physics, instants)
+    alarm, bands = calibrate_alarm(predictor.inputs, rows, table, windows.run), None
+    reason = "errors on runs left out need further fits: set `refits` (of a study `bands.refits`), such as 5"
+    if left_out is not None:
+        past = {name: values[-rows:] for name, values in windows.past.items()} if rows else {}
+        names, reason = tuple(predictor.limits), "fewer than 3 runs have errors of models that did not see them"
+        columns = windows.columns
+        bands = calibrate_bands(left_out, windows.future, windows.run, columns, names, windows.step, kinds, past)
+    without = {} if bands is not None else {"no_band": reason}
+    return replace(predictor, bands=bands, alarm=alarm, provenance={**predictor.provenance, **without})
 
 
 def refit_folds(windows: Windows, refits: int, seed: int) -> list[tuple[Index, Index]]:

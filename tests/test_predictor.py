@@ -18,6 +18,8 @@ from shipid.data.windows import Instants
 from shipid.errors import DataError, ResultError, ShipidError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.compensator import Compensator
+from shipid.hybrid.features import Inputs
+from shipid.hybrid.novelty import calibrate_alarm
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
 from shipid.predictor import FORMAT, Predictor
@@ -52,8 +54,9 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
     """Each field has a value that is not its default, so that none can be left out of the file."""
     physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity")
     bands = made(0)[1]
+    alarm = calibrate_alarm(Inputs(()), 0, {"u": np.arange(6.0), "v": np.ones(6)}, np.array([*"aabbcc"]))
     first = Predictor(
-        physics, "alone", UnchangedPath({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands, 7.0
+        physics, "alone", UnchangedPath({}), {"u": (1.0, 2.0)}, {"seed": 3}, "known", ("u", "v"), bands, 7.0, alarm
     )
     for one in (first, physics):
         for place in fields(one):
@@ -62,12 +65,13 @@ def test_every_field_survives_a_file(tmp_path: Path) -> None:
             assert place.default_factory is MISSING or value != place.default_factory(), place.name
     again = Predictor.load(first.save(tmp_path / "all.npz"))
     for place in fields(Predictor):
-        if place.name != "bands":
+        if place.name not in ("bands", "alarm"):
             assert getattr(again, place.name) == getattr(first, place.name), place.name
-    assert again.bands is not None
-    assert again.bands.header() == bands.header()
-    for name, values in bands.arrays().items():
-        np.testing.assert_array_equal(again.bands.arrays()[name], values)
+    for read, kept in ((again.bands, bands), (again.alarm, alarm)):
+        assert read is not None
+        assert read.header() == kept.header()
+        for name, values in kept.arrays().items():
+            np.testing.assert_array_equal(read.arrays()[name], values)
 
 
 def test_what_a_user_notes_of_the_origin_is_saved(tmp_path: Path) -> None:
@@ -85,7 +89,7 @@ def test_a_level_gives_a_band_or_one_sentence(tiny_run: Path) -> None:
     np.testing.assert_array_equal(prediction.paths, predictor.predict(instants))
     assert prediction.region.along.shape == prediction.paths.shape[:2]
     assert (prediction.region.radius > 0).all()
-    np.testing.assert_array_equal(prediction.outside, predictor.outside(instants.columns))
+    np.testing.assert_array_equal(prediction.outside, predictor.raise_alarm(instants))
     alone = predictor.predict(instants, level=0.7, pointwise=True)
     assert alone.region.radius.mean() < prediction.region.radius.mean()
     with pytest.raises(DataError, match="a band of 90 % needs 9 runs or more to calibrate it: there are"):

@@ -34,7 +34,7 @@ def cell_regions(
         if bands is not None and any(bands.promises(level) for level in levels):
             paths, test = results.paths[row["cell"]], results.test
             kept = filter(bands.promises, levels)
-            by_level = {level: bands.region(paths, test.columns, test.step, level) for level in kept}
+            by_level = {level: bands.region(paths, test.columns, test.step, level, past=test.past) for level in kept}
             yield row, by_level, test.future - paths
 
 

@@ -163,7 +163,7 @@ def window_snapshots(results: Results) -> list[WindowSnapshot]:
             key = model_text(row["model"]), "cooperative", int(row["N_D"])
             paths[key], bands = results.paths[row["cell"]], results.bands.get(row["cell"])
             if bands is not None and bands.promises(level):
-                edges[key] = bands.region(paths[key], test.columns, test.step, level)
+                edges[key] = bands.region(paths[key], test.columns, test.step, level, past=test.past)
     windows, runs = [], figure_runs(results)
     most, V_w = min(INSTANTS, max(3, MOST_WINDOWS // len(runs))), test.columns.get("V_w")
     for run in runs:

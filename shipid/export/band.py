@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 from casadi import MX
 
-from shipid.export.correctors import distance_to_nearest
-from shipid.export.known import column_of_entries
-from shipid.hybrid.bands import FEWEST, LEVELS, Bands
+from shipid.export.correctors import distance_to_nearest, stacked_inputs
+from shipid.export.known import NamedExpressions, PredictorInputs, all_within, column_of_entries
+from shipid.hybrid.bands import FEWEST, LEVELS, Bands, FastMotion, fast_filters
+from shipid.hybrid.features import MOTIONS
+from shipid.hybrid.novelty import NoveltyAlarm, range_of_orders, range_rounding
 
 BAND_CHOICE = ("level", "pointwise", "kind")
 """Inputs of a band: its level, whether each step is taken alone (0 or 1), the kind of manoeuvre (0: any)."""
@@ -19,21 +21,51 @@ BAND_ROWS = ("along", "across", "ahead_x", "ahead_y")
 """Rows of a band: half axes [m], and the unit vector of the track in body axes; a column for each step."""
 
 
-def radii_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
-    """Radius (T,) of a band, by linear interpolation between `LEVELS`: each table times a weight of 1 at its place."""
+def half_axes_at(bands: Bands, level: MX, pointwise: MX, kind: MX) -> MX:
+    """Half axes (T, 2) of a band before it grows: radius, linear between `LEVELS`, times scale.
+
+    Each table has a weight of 1 at its place.
+    """
     whole = np.vstack([bands.whole[None], bands.by_kind.reshape(-1, len(LEVELS))])
     near = ca.fmax(0, 1 - ca.fabs(100 * level - ca.DM(100 * LEVELS)))
     of = ca.fmax(0, 1 - ca.fabs(kind - ca.DM(range(len(whole)))))
     radius = ca.dot(of, ca.mtimes(ca.DM(whole), near))
-    return ca.if_else(pointwise != 0, ca.mtimes(ca.DM(bands.steps.T), near), ca.repmat(radius, len(bands.along), 1))
+    radii = ca.if_else(pointwise != 0, ca.mtimes(ca.DM(bands.steps.T), near), ca.repmat(radius, len(bands.along), 1))
+    scales = np.concatenate([np.stack([bands.along, bands.across], axis=1)[None], bands.scales])
+    return ca.horzcat(*(ca.mtimes(ca.DM(scales[..., side].T), of) * radii for side in (0, 1)))
 
 
-def band_rows(bands: Bands, now: Mapping[str, MX], path: MX, step: float, radius: MX) -> MX:
-    """Rows (4, T) of `BAND_ROWS` around a path (2, T) of steps [s]; radius (T,)."""
+def band_rows(
+    bands: Bands, now: NamedExpressions, path: MX, step: float, half: MX, past: Sequence[NamedExpressions] = ()
+) -> MX:
+    """Rows (4, T) of `BAND_ROWS` around a path (2, T) of steps [s]; half axes (T, 2), rows of the past."""
     point = column_of_entries(now, bands.names) / ca.DM(bands.spread)
     grown = _band_growth(bands, path, now["r"], step, distance_to_nearest(point, bands.centres / bands.spread))
-    size = [grown * ca.DM(scale) * radius for scale in (bands.along, bands.across)]
-    return ca.vertcat(*(half.T for half in size), _track_directions(path))
+    if bands.fast is not None:
+        grown *= _fast_growth(bands.fast, [*past[-bands.fast.past :], now])
+    return ca.vertcat(grown * half.T, _track_directions(path))
+
+
+def _fast_growth(fast: FastMotion, rows: Sequence[NamedExpressions]) -> MX:
+    """How much wider the band is in fast motion, as `FastMotion.growth`."""
+    series = [ca.vertcat(*(row[name] for row in rows)) for name in MOTIONS]
+    filters = [ca.DM(one) for one in fast_filters(len(rows))]
+    powers = ca.vertcat(*(ca.sumsqr(ca.mtimes(one, values)) / len(rows) for values in series for one in filters))
+    return MX(ca.sqrt(ca.fmax(ca.dot(powers, ca.DM(fast.weights)), 1)))
+
+
+def is_alarm_raised(alarm: NoveltyAlarm, known: PredictorInputs) -> MX:
+    """Whether the alarm is raised, as `NoveltyAlarm.is_raised`."""
+    table = known.table(alarm.inputs)
+    for name in alarm.inputs.commands:
+        series = ca.vertcat(*(row[name] for row in known.past[len(known.past) - alarm.past :]), known.now[name])
+        table[range_of_orders(name)] = ca.mmax(series) - ca.mmin(series)
+    away = ca.mtimes(ca.DM(alarm.root.T), stacked_inputs(table, alarm.names) - ca.DM(alarm.middle))
+    rounding, values = ca.DM(range_rounding(alarm.low, alarm.high)), stacked_inputs(table, alarm.limited)
+    beyond = ca.fmax(ca.DM(alarm.low) - values, values - ca.DM(alarm.high)) - rounding
+    excess = beyond / ca.fmax(ca.DM(alarm.high - alarm.low), rounding)
+    inside = ca.logic_and(ca.norm_2(away) <= alarm.farthest, all_within(ca.fmax(excess, 0), alarm.slack))
+    return ca.logic_not(inside)
 
 
 def _track_directions(path: MX) -> MX:

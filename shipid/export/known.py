@@ -87,6 +87,7 @@ class PredictorInputs:
         self.now = split_by_name(names.now, self.inputs["now"])
         rows = ca.reshape(self.inputs["past"], len(names.past), names.num_past)
         self.past = [split_by_name(names.past, row) for row in ca.horzsplit(rows)] if names.past else []
+        self.past_errors: dict[float, MX] = {}
 
     @cached_property
     def equations(self) -> Equations:
@@ -211,7 +212,9 @@ class PredictorInputs:
             table |= self._estimates()
         axes = ("x", "y", *MOTIONS)
         for seconds in inputs.memory.error:
-            table |= split_by_name([f"error-{seconds:g}.{name}" for name in axes], self._past_error(seconds))
+            if seconds not in self.past_errors:
+                self.past_errors[seconds] = self._past_error(seconds)
+            table |= split_by_name([f"error-{seconds:g}.{name}" for name in axes], self.past_errors[seconds])
         if moments:
             every = ca.vertcat(self.path, self.equations.horizontal(self.records))
             every = ca.if_else(ca.logic_and(all_within(every), self._slow(self.records)), every, 0)

@@ -10,7 +10,7 @@ import numpy as np
 from casadi import MX
 
 from shipid.errors import ShipidError
-from shipid.export.band import BAND_CHOICE, band_rows, is_band_promised, radii_at
+from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_alarm_raised, is_band_promised
 from shipid.export.correctors import CORRECTORS
 from shipid.export.equations import function_by_names, symbols_of
 from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs
@@ -59,7 +59,8 @@ class ExportModel:
             raise ShipidError(
                 f"a predictor by the method {self.predictor.method} cannot be exported; these can: {', '.join(kinds)}"
             )
-        arrays = [*corrector.arrays().values(), *([] if bands is None else bands.arrays().values())]
+        tables = [part.arrays() for part in (corrector, bands, self.predictor.alarm) if part is not None]
+        arrays = [array for table in tables for array in table.values()]
         count = sum(np.size(array) for array in arrays)
         if count > MOST_NUMBERS:
             raise ShipidError(
@@ -73,17 +74,23 @@ class ExportModel:
             raise ShipidError(
                 f"the parts of the method {self.predictor.method!r} do not fit together ({error}): its file is damaged"
             ) from error
-        inside = MX(1 if self.limits else 0)
-        for name, (low, high) in self.limits.items():
-            inside = ca.logic_and(inside, ca.logic_and(known.now[name] >= low, known.now[name] <= high))
-        inputs, outputs = dict(known.inputs), {"path": path, "outside": ca.logic_not(inside)}
+        inputs, outputs = dict(known.inputs), {"path": path, "outside": self._outside(known)}
         if bands is not None:
             choice = symbols_of(dict.fromkeys(BAND_CHOICE, 1))
             promised = is_band_promised(bands, **choice)
-            rows = band_rows(bands, known.now, path, self.physics.step, radii_at(bands, **choice))
+            rows = band_rows(bands, known.now, path, self.physics.step, half_axes_at(bands, **choice), known.past)
             inputs |= choice
             outputs |= {"band": ca.if_else(promised, rows, np.nan), "promised": promised}
         return function_by_names("predict", inputs, outputs, is_diff_out=[name == "path" for name in outputs])
+
+    def _outside(self, known: PredictorInputs) -> MX:
+        """Whether the alarm is raised: the calibrated one, or else by the limits."""
+        if self.predictor.alarm is not None:
+            return is_alarm_raised(self.predictor.alarm, known)
+        inside = MX(1 if self.limits else 0)
+        for name, (low, high) in self.limits.items():
+            inside = ca.logic_and(inside, ca.logic_and(known.now[name] >= low, known.now[name] <= high))
+        return MX(ca.logic_not(inside))
 
     @cached_property
     def limits(self) -> dict[str, tuple[float, float]]:

@@ -1,6 +1,6 @@
 """Bands: a region around every step of a predicted path that holds the whole path, or each step, with a probability.
 
-The region at step k is an ellipse along and across the predicted track, or a circle, with half axes
+The region at step k is an ellipse along and across the predicted track, with half axes
 `radius(level) * scale[k] * growth`: how errors grow over the horizon, and how much harder this prediction is than
 others. The radius is calibrated on runs that no model saw: `shipid.hybrid.calibration`.
 """
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.errors import DataError, suggest_name
+from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.stored import StoredData
 from shipid.metrics import Array, vector_lengths
 
@@ -56,11 +57,27 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
+class FastMotion(StoredData):
+    """Growth of a band with motion that is faster than manoeuvres, such as that of waves: errors grow in proportion.
+
+    past : rows before the instant that are looked at. weights : (9,) of each of `fast_power` [1]: the band grows with
+    the root of their sum, from 1 on.
+    """
+
+    past: int
+    weights: Array
+
+    def growth(self, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Array:
+        """How much wider (S,) a band is, 1 or more."""
+        return np.sqrt(np.maximum(fast_power(columns, past, self.past) @ self.weights, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
 class Bands(StoredData):
     """Calibrated bands of a predictor.
 
     runs : number of runs that calibrated it.
-    along, across : scale (T,) [m] of the errors along the predicted track and across it; equal for a circle.
+    along, across : scale (T,) [m] of the errors along the predicted track and across it.
     whole : (99,) radius for each of `LEVELS` that holds whole paths.
     steps : (99, T) the same for each step alone.
     names : columns in which the distance from training is measured. centres : (m, d) points of the training windows.
@@ -70,7 +87,9 @@ class Bands(StoredData):
     slopes : (5,) growth per standard deviation of each trait, as the logarithm.
     length : mean length [m] of the predicted paths of calibration.
     kinds : kind of manoeuvre -> number of runs, where it was known.
-    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind.
+    by_kind : (kinds, 99) radius that holds whole paths of runs of each kind, and scales : (kinds, T, 2) [m] of their
+    errors along and across.
+    fast : growth with fast motion; None where windows hold too short a past.
     """
 
     runs: int
@@ -90,6 +109,8 @@ class Bands(StoredData):
     length: float
     kinds: Mapping[str, int]
     by_kind: Array
+    scales: Array
+    fast: FastMotion | None = None
 
     def region(
         self,
@@ -100,33 +121,39 @@ class Bands(StoredData):
         *,
         pointwise: bool = False,
         kind: str | None = None,
+        past: Mapping[str, Array] | None = None,
     ) -> Region:
         """Return the region around paths (T, S, 2) [m] in the frame (11); DataError as of `check`.
 
         columns : measured columns at the instants, name -> (S,). step : of the path [s].
         level : share of whole paths that the region holds, such as 0.9; with `pointwise`, of positions at each step.
         kind : kind of manoeuvre of the run: the share then holds for runs of this kind.
+        past : of the instants, name -> (P, S): taken where the band grows with fast motion.
         """
         self.check(level, kind)
         if kind is not None and pointwise:
             raise DataError("bands of each step alone are not calibrated by kind of manoeuvre: leave `kind` out")
         radius = radius_at_level(self.steps if pointwise else self.table(kind), level)
-        size = self.growth(paths, columns, step)
-        return Region(track_directions(paths), *(np.outer(scale * radius, size) for scale in (self.along, self.across)))
+        size = self.growth(paths, columns, step, past)
+        half = (self.along, self.across) if kind is None else self.scales[list(self.kinds).index(kind)].T
+        return Region(track_directions(paths), *(np.outer(scale * radius, size) for scale in half))
 
     def table(self, kind: str | None = None) -> Array:
         """Radius (99,) for each of `LEVELS` that holds whole paths, of runs of a kind."""
         return self.whole if kind is None else self.by_kind[list(self.kinds).index(kind)]
 
-    def growth(self, paths: Array, columns: Mapping[str, Array], step: float) -> Array:
+    def growth(
+        self, paths: Array, columns: Mapping[str, Array], step: float, past: Mapping[str, Array] | None = None
+    ) -> Array:
         """How much wider (S,) the band of each prediction is than that of an average one [1]."""
         points = np.stack([columns[name] for name in self.names], axis=1)
         away = nearest_distances(points / self.spread, self.centres / self.spread)
         seen = np.clip(
             prediction_traits(paths, columns, step, np.minimum(away, self.far), self.length), self.low, self.high
         )
+        fast = 1.0 if self.fast is None else self.fast.growth(columns, past or {})
         return np.asarray(
-            np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0)
+            np.exp(((seen - self.middle) / self.deviation) @ self.slopes) * np.maximum(away / self.far, 1.0) * fast
         )
 
     def check(self, level: float, kind: str | None = None) -> None:
@@ -175,6 +202,23 @@ def split_along_track(errors: Array, ahead: Array) -> tuple[Array, Array]:
     """Errors (..., 2) along the unit vectors `ahead` and across them, to starboard."""
     along = errors[..., 0] * ahead[..., 0] + errors[..., 1] * ahead[..., 1]
     return along, errors[..., 1] * ahead[..., 0] - errors[..., 0] * ahead[..., 1]
+
+
+def fast_filters(rows: int) -> Array:
+    """Matrices (3, N, N) for series of N rows: second differences, what a cubic leaves, and its sum less a parabola."""
+    time = np.linspace(-1, 1, rows)
+    cubic, parabola = (np.linalg.qr(np.polynomial.legendre.legvander(time, degree))[0] for degree in (3, 2))
+    left = np.eye(rows) - cubic @ cubic.T
+    total = np.tri(rows) @ left
+    second = np.pad(np.diff(np.eye(rows), 2, axis=0), ((0, 2), (0, 0)))
+    return np.stack([second, left, total - parabola @ (parabola.T @ total)])
+
+
+def fast_power(columns: Mapping[str, Array], past: Mapping[str, Array], rows: int) -> Array:
+    """Mean squares (S, 9) of u, v, r over the last rows and the instant, each through the three `fast_filters`."""
+    series = np.stack([np.concatenate([past[name][-rows:], columns[name][None]]) for name in MOTIONS])  # (3, N, S)
+    passed = np.einsum("fij,mjs->mfis", fast_filters(rows + 1), series, optimize=True)
+    return np.asarray(np.square(passed).mean(axis=2).reshape(9, -1).T)
 
 
 def path_chords(paths: Array) -> Array:

@@ -11,7 +11,7 @@ Candes, Ramdas and Tibshirani, "Predictive inference with the jackknife+" (Annal
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,24 +24,29 @@ from shipid.hybrid.bands import (
     LEVELS,
     TRAITS,
     Bands,
+    FastMotion,
+    fast_power,
     nearest_distances,
     path_chords,
     prediction_traits,
     split_along_track,
     track_directions,
 )
+from shipid.hybrid.features import MOTIONS
 from shipid.metrics import Array, vector_lengths
 
-FLOOR = 0.05  # of the greatest scale: smaller errors early in the horizon do not decide about a path
+FLOOR = 0.3  # of the greatest scale: the motion of waves early in the horizon does not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
 PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
-TIGHTER = 0.97  # an ellipse is taken where its radius is at most this share of that of a circle
+FEWEST_PAST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
+FROM_LEVELS = (0.2, 0.4, 0.55, 0.7, 0.8, 0.9)  # shares of the training with less fast motion than makes a band grow
+WIDER = 1.1  # times the band without, that growth with fast motion may cost on average under the law of training
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
 
 @dataclass(frozen=True)
-class _RunShares:
+class RunShares:
     """Windows (S,) sorted into G runs.
 
     place : index of the run of each window. weight : of each window, (S,), the same sum for each run, 1 in all.
@@ -71,6 +76,7 @@ def calibrate_bands(
     names: Sequence[str],
     step: float,
     kinds: Mapping[str, str] | None = None,
+    past: Mapping[str, Array] | None = None,
 ) -> Bands | None:
     """Calibrate bands; None where fewer than three runs have errors.
 
@@ -79,14 +85,16 @@ def calibrate_bands(
     future : true paths (T, S, 2) [m] in the frame (11). run : name of the run of each window, (S,).
     columns : measured columns at the instants, name -> (S,). names : those in which the distance is measured.
     step : of the path [s]. kinds : kind of manoeuvre by run, where it is known.
+    past : name -> (P, S), as predictions will have it.
     """
     chosen = _pick_over_runs(run, np.all(np.isfinite(left_out), axis=(0, 2)))
-    runs = _shares_of_runs(run[chosen])
+    runs = shares_of_runs(run[chosen])
     if runs.count < FEWEST:
         return None
     errors = left_out[:, chosen]
     paths = future[:, chosen] - errors
-    columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r"}}
+    before = {name: values[:, chosen] for name, values in (past or {}).items() if name in MOTIONS}
+    columns = {name: np.asarray(columns[name], dtype=float)[chosen] for name in {*names, "r", *before}}
     centres, spread, away = _training_distances(runs, np.stack([columns[name] for name in names], axis=1))
     far = max(float(away.max()), 1e-9)
     length = max(float(vector_lengths(path_chords(paths)).sum(axis=0) @ runs.weight), 1e-9)
@@ -98,22 +106,28 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
-    judged = min(90, 100 * runs.count // (runs.count + 1)) - 1  # place in `LEVELS` of 0.9, or of the highest promised
-    fits = [_fit_scores(runs, apart, normal, circle) for circle in (True, False)]
-    radii = [band_radii(one.scores.max(axis=0), runs) for one in fits]
-    circle, ellipse = (
-        float(np.sqrt(one.scale[:, 0] * one.scale[:, 1]).mean()) * radius[judged]
-        for one, radius in zip(fits, radii, strict=True)
-    )
-    better = int(ellipse < TIGHTER * circle)
-    fitted, whole = fits[better], radii[better]
+    fitted, motion = _fit_scores(runs, apart, normal), None
+    widest = WIDER * fitted.mean_size(runs, normal, np.ones(len(chosen)))
+    for slower in _fast_motions(runs, columns, before):
+        wide = slower.growth(columns, before)
+        trial = _fit_scores(runs, apart / wide[:, None], normal)
+        if trial.mean_size(runs, normal, wide) <= widest:
+            fitted, motion, apart = trial, slower, apart / wide[:, None]
+            break
+    whole = band_radii(fitted.scores.max(axis=0), runs)
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
-    reach, of = fitted.scores.max(axis=0), of[runs.place]
-    by_kind = [  # of too few runs no band is promised, whatever is here
-        band_radii(reach[of == kind], _shares_of_runs(runs.place[of == kind])) if count >= FEWEST else whole
-        for kind, count in known.items()
-    ]
+    of, growth = of[runs.place], np.exp(normal @ fitted.slopes)
+    by_kind, scales = [], []
+    for kind, count in known.items():  # of too few runs no band is promised, whatever is here
+        mine = of == kind
+        radii, scale = whole, fitted.scale
+        if count >= FEWEST:
+            same = shares_of_runs(runs.place[mine])
+            scale, scores = _scale_errors(same, apart[:, mine])
+            radii = band_radii(scores.max(axis=0) / growth[mine], same)
+        by_kind.append(radii)
+        scales.append(scale)
     return Bands(
         runs=runs.count,
         along=fitted.scale[:, 0],
@@ -132,10 +146,24 @@ def calibrate_bands(
         length=length,
         kinds=known,
         by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
+        scales=np.reshape(scales, (len(known), *fitted.scale.shape)),
+        fast=motion,
     )
 
 
-def band_radii(scores: Array, runs: _RunShares) -> Array:
+def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Iterator[FastMotion]:
+    """Growths in proportion to fast motion, from a low level on, then from higher ones; none where it is not known."""
+    rows = len(past.get("u", ()))
+    power = fast_power(columns, past, rows) if rows >= FEWEST_PAST_ROWS else np.zeros((len(runs.place), 9))
+    mean = runs.weight @ power
+    weights = np.divide(1.0, mean, out=np.zeros(9), where=mean > 0)
+    level = power @ weights
+    order = np.argsort(level)
+    for share in FROM_LEVELS if mean.any() else ():
+        yield FastMotion(rows, weights / np.interp(share, np.cumsum(runs.weight[order]), level[order]))
+
+
+def band_radii(scores: Array, runs: RunShares) -> Array:
     """Radii (99,) that hold a share `LEVELS` of the windows of a new run, from scores (S,) of the windows of G runs."""
     order = np.argsort(scores, kind="stable")
     ranks = _ranks_among_others(order, runs)
@@ -150,7 +178,7 @@ def band_radii(scores: Array, runs: _RunShares) -> Array:
     return np.asarray(np.maximum.accumulate(np.interp(wanted, at, scores[order])))
 
 
-def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
+def _ranks_among_others(order: NDArray[np.int64], runs: RunShares) -> Array:
     """Share (S,) of the windows of the other runs, each run weighing the same, that come before in an order."""
     below = np.empty(len(order))
     below[order] = np.cumsum(runs.weight[order]) - runs.weight[order]  # of all
@@ -161,7 +189,7 @@ def _ranks_among_others(order: NDArray[np.int64], runs: _RunShares) -> Array:
     return np.asarray(np.clip((runs.count * below - mine) / (runs.count - 1), 0.0, 1.0))
 
 
-def _intraclass_correlation(ranks: Array, runs: _RunShares) -> float:
+def _intraclass_correlation(ranks: Array, runs: RunShares) -> float:
     """How alike the windows of one run are, 0 to 1: share of the variance of their ranks that lies between runs."""
     means = runs.means(ranks)
     within = float(runs.weight @ (ranks - means[runs.place]) ** 2)
@@ -180,18 +208,27 @@ class _ScoreFit:
     slopes: Array
     scores: Array
 
+    def mean_size(self, runs: RunShares, normal: Array, wide: Array) -> float:
+        """Mean size [m] of the band, of windows `wide` (S,) times as wide, at 0.9 or the highest level promised."""
+        judged = min(90, 100 * runs.count // (runs.count + 1)) - 1
+        radius = float(band_radii(self.scores.max(axis=0), runs)[judged])
+        scale = float(np.sqrt(self.scale[:, 0] * self.scale[:, 1]).mean())
+        return radius * scale * float(runs.weight @ (wide * np.exp(normal @ self.slopes)))
 
-def _fit_scores(runs: _RunShares, apart: Array, normal: Array, circle: bool) -> _ScoreFit:
+
+def _fit_scores(runs: RunShares, apart: Array, normal: Array) -> _ScoreFit:
     """Scale and growth from all runs, and scores of each run by those of the others."""
-    if circle:
-        apart = np.broadcast_to(vector_lengths(apart)[..., None] / np.sqrt(2.0), apart.shape)
-    means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
-    total = means.sum(axis=0)
-    scale = _floor_scale(total / runs.count)
-    others = _floor_scale((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
-    plain = vector_lengths(apart / others)
+    scale, plain = _scale_errors(runs, apart)
     slopes, without = _growth_slopes(runs, normal, plain.max(axis=0))
     return _ScoreFit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+
+
+def _scale_errors(runs: RunShares, apart: Array) -> tuple[Array, Array]:
+    """Scale (T, 2) [m] from all runs, and errors (T, S) over the scale of the other runs."""
+    means = runs.means(apart.transpose(1, 0, 2))  # (G, T, 2)
+    total = means.sum(axis=0)
+    others = _floor_scale((total - means) / (runs.count - 1))[runs.place].transpose(1, 0, 2)  # (T, S, 2)
+    return _floor_scale(total / runs.count), vector_lengths(apart / others)
 
 
 def _floor_scale(scale: Array) -> Array:
@@ -200,7 +237,7 @@ def _floor_scale(scale: Array) -> Array:
     return np.asarray(np.maximum(scale, np.maximum(FLOOR * most, 1e-9)), dtype=float)
 
 
-def _growth_slopes(runs: _RunShares, normal: Array, scores: Array) -> tuple[Array, Array]:
+def _growth_slopes(runs: RunShares, normal: Array, scores: Array) -> tuple[Array, Array]:
     """Slopes (5,) of the logarithm of scores (S,) over traits, from all runs, and without each run, (G, 5).
 
     Ridge regression in which every run counts as one sample. The distance from training makes no band narrower.
@@ -226,7 +263,7 @@ def _growth_slopes(runs: _RunShares, normal: Array, scores: Array) -> tuple[Arra
     return solved(product, right), np.stack(without)
 
 
-def _training_distances(runs: _RunShares, points: Array) -> tuple[Array, Array, Array]:
+def _training_distances(runs: RunShares, points: Array) -> tuple[Array, Array, Array]:
     """Centres (m, d) of training windows (S, d), spread (d,) of each column, and distances (S,) from other runs."""
     deviation = np.sqrt(runs.weight @ (points - runs.weight @ points) ** 2)
     spread = np.maximum(deviation, np.maximum(1e-3 * np.abs(points).max(axis=0), 1e-9))
@@ -247,7 +284,8 @@ def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[
     return np.sort(np.concatenate([rows[:0], *parts]))
 
 
-def _shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> _RunShares:
+def shares_of_runs(names: NDArray[np.str_] | NDArray[np.int64]) -> RunShares:
+    """Windows sorted by the names of their runs, (S,)."""
     known, place = np.unique(names, return_inverse=True)
     sizes = np.bincount(place, minlength=len(known))
-    return _RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))
+    return RunShares(place, 1.0 / (len(known) * sizes[place]) if len(known) else np.zeros(0), len(known))

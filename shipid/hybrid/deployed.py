@@ -9,7 +9,9 @@ from typing import Any
 
 from shipid.data.windows import Commands
 from shipid.hybrid.bands import Bands
+from shipid.hybrid.features import NO_MEMORY, Inputs
 from shipid.hybrid.method import Corrector
+from shipid.hybrid.novelty import NoveltyAlarm
 from shipid.hybrid.physics import Physics
 from shipid.vessel.load import Vessel
 
@@ -25,6 +27,7 @@ class DeployedMethod:
     bands : None where no runs could calibrate them.
     run_up : time [s] from the begin of an unbroken stretch of rows to the earliest instant in training, by which an
         observer has settled; 0 without one. An earlier instant is outside.
+    alarm : sees every input of the method; None where no runs could calibrate it: the limits then are the alarm.
     """
 
     physics: Physics
@@ -36,6 +39,7 @@ class DeployedMethod:
     causal: tuple[str, ...] = ()
     bands: Bands | None = field(default=None, repr=False)
     run_up: float = 0.0
+    alarm: NoveltyAlarm | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         """A number of NumPy's becomes a plain one, as in `Physics`."""
@@ -50,6 +54,13 @@ class DeployedMethod:
     def no_band(self) -> str:
         """Why it has no band, if it has none."""
         return reason_of_no_band(self.provenance)
+
+    @property
+    def inputs(self) -> Inputs:
+        """Inputs of the method at the instant and from its past, and every order."""
+        known = getattr(self.corrector, "inputs", None)
+        orders = tuple(name for name in self.limits if "." in name)
+        return Inputs(orders, known.memory if isinstance(known, Inputs) else NO_MEMORY)
 
     @property
     def past(self) -> int:

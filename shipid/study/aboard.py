@@ -19,7 +19,15 @@ from shipid.hybrid.bands import Region
 from shipid.hybrid.physics import check_columns, missing_columns
 from shipid.predictor import Predictor
 from shipid.report.content import SummaryLine
-from shipid.study.apply import BandSettings, Forecast, instants_along, predict_instants, read_or_import, tables_along
+from shipid.study.apply import (
+    BandSettings,
+    Forecast,
+    instants_along,
+    is_kind_new,
+    predict_instants,
+    read_or_import,
+    tables_along,
+)
 from shipid.study.store import read_predictor
 from shipid.units import length_text, level_text, percent_text, plural_word
 
@@ -27,7 +35,7 @@ Array = np.ndarray
 TRACK_COLUMNS = ["run", "t", "north", "east"]
 MOMENTS_OF_SUMMARY = np.linspace(0.0, 1.0, 5)  # of the horizon
 SHIP_CHANGED = "the ship, its loading or the weather is not that of the training, and bands do not hold"
-ORDERS_UNKNOWN = "later orders were not known as they were in calibration"
+ORDERS_UNKNOWN = "later orders were known in calibration and are not here: nothing is promised"
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +135,11 @@ def _forecast_row_by_row(
     predictor: Predictor, dataset: Dataset, piece: pd.DataFrame, rows: list[int], band: BandSettings | None
 ) -> tuple[Forecast, list[float]]:
     """Predictions at some rows of one unbroken stretch, each from the rows up to it, and the latency [s] of each."""
-    forecasts, latency = [], []
+    forecasts, latency, new = [], [], is_kind_new(predictor, dataset, str(piece["run"].iloc[0]))
     for i in rows:
         begin = time.perf_counter()
         known = instants_along(predictor, dataset, piece.iloc[: i + 1], slice(i, i + 1), plan=False)
-        forecasts.append(predict_instants(predictor, known, band))
+        forecasts.append(predict_instants(predictor, known, band, new))
         latency.append(time.perf_counter() - begin)
     regions = [one.region for one in forecasts if one.region is not None]
     names = ("ahead", "along", "across")
@@ -208,10 +216,11 @@ def _band_in_words(played: Replay, band: BandSettings) -> str:
     adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {judged['factor'].max():.2f} times"
     share = f"it held {percent_text(held.mean())} of the {len(held)} whole paths that can be judged"
     line = f"band of {level_text(band.level)}{of}{adapts}: {share}"
+    if played.plan:
+        return f"{line}; {ORDERS_UNKNOWN}"
     if not promised.any():
         return f"{line}, all in alarm, where nothing is promised"
     line += f", {percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"
     if share_interval(held[promised], judged["run"].to_numpy()[promised])[1] < band.level:
-        why = f"{ORDERS_UNKNOWN}, or {SHIP_CHANGED}" if played.plan else SHIP_CHANGED
-        line += f"; that is fewer than {level_text(band.level)} by more than chance: {why}"
+        line += f"; that is fewer than {level_text(band.level)} by more than chance: {SHIP_CHANGED}"
     return line

@@ -118,7 +118,8 @@ def table_of_stretch(
     some = _usable_rows(predictor, rows["t"].to_numpy())
     if some.start >= some.stop:
         return pd.DataFrame()
-    forecast = predict_instants(predictor, instants_along(predictor, dataset, rows, some, plan=True), band)
+    known = instants_along(predictor, dataset, rows, some, plan=True)
+    forecast = predict_instants(predictor, known, band, is_kind_new(predictor, dataset, run))
     points, instants = tables_along(predictor, run, rows, forecast, band)
     points = points.rename(columns=dict(zip(("north", "east"), COOPERATIVE_COLUMNS, strict=True)))
     if band is not None and band.rate is not None:
@@ -190,12 +191,18 @@ def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, s
     return Instants(columns, past, planned, hidden, estimates)
 
 
-def predict_instants(predictor: Predictor, instants: Instants, band: BandSettings | None) -> Forecast:
-    """Paths, band and alarm at some instants."""
+def is_kind_new(predictor: Predictor, dataset: Dataset, run: str) -> bool:
+    """Whether a run is said to be a kind of manoeuvre of which no run calibrated the band."""
+    kind, bands = dataset.metadata.get("manoeuvres", {}).get(run), predictor.bands
+    return bool(kind and bands is not None and bands.kinds and kind not in bands.kinds)
+
+
+def predict_instants(predictor: Predictor, instants: Instants, band: BandSettings | None, new: bool) -> Forecast:
+    """Paths, band and alarm at some instants; new : whether the alarm is raised at all, for the kind of the run."""
     alone = predictor.alone(instants)
     predicted = predictor.predict(instants, alone)
     region = None if band is None else predictor.band(predicted, instants, band.level, kind=band.kind)
-    outside = np.asarray(predictor.outside({**instants.columns, **instants.estimates}))
+    outside = predictor.raise_alarm(instants) | new
     columns = {name: instants.columns[name] for name in ("t", "north", "east", "psi")}
     return Forecast(predicted, alone if predictor.vessel else np.full_like(alone, np.nan), region, outside, columns)
 

@@ -23,7 +23,7 @@ from shipid.metrics import (
     vector_lengths,
 )
 from shipid.observer import Estimates
-from shipid.predictor import Array, Predictor, bands_of, limits_of, refit_folds
+from shipid.predictor import Array, Predictor, limits_of, refit_folds, with_bands
 from shipid.study.declared import Foundation, StudyMethod
 from shipid.study.plan import Batch, Unit
 from shipid.study.prepare import (
@@ -203,9 +203,8 @@ def evaluate_cell(
     if not any(other.fitted for other in prepared.foundations if other.family == foundation.family):
         errors = result.left_out if result.left_out is not None else errors  # fair: the physics saw none of these runs
     predictor = _predictor(work, foundation, way, result.corrector, origin)
-    bands, reason = bands_of(errors, work.windows, predictor.limits, prepared.kinds)
-    without = {} if bands is not None else {"no_band": reason}
-    predictor = replace(predictor, bands=bands, provenance={**predictor.provenance, **without})
+    instants = instants_of(prepared.study, predictor.vessel, prepared.data, work.windows, one.estimates)
+    predictor = with_bands(predictor, errors, work.windows, instants, prepared.kinds)
     chosen = result.corrector.hyperparameters
     words = ", ".join(f"{key} {chosen[key]:.3g}" for key in way.method.varied() if key in chosen)
     outcome, paths = _test_errors(prepared, one, predictor, way)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shipid.data.windows import Instants
 from shipid.hybrid.alone import UnchangedPath
-from shipid.hybrid.bands import Bands
+from shipid.hybrid.bands import Bands, FastMotion, fast_power
 from shipid.hybrid.calibrator import TrajectoryCompensator, TrajectoryInputs
 from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
@@ -16,6 +16,7 @@ from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector, LinearLaw
 from shipid.hybrid.learned_force import HIDDEN, OUTPUT, ForceCorrector
 from shipid.hybrid.modules import Alarm, ModulesCorrector, modules_of
+from shipid.hybrid.novelty import alarm_inputs, calibrate_alarm
 from shipid.hybrid.one_step import OneStepCorrector, OutputWeights
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
@@ -82,7 +83,24 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
         "known" if known else "held",
         bands=bands_of(np.random.default_rng([seed, 77]), physics, instants, tuple(limits), slow),
     )  # fmt: skip
-    return Strange(predictor, instants)
+    return Strange(watchful(predictor, instants, np.random.default_rng([seed, 78])), instants)
+
+
+def watchful(predictor, instants, rng):
+    """The predictor with an alarm that half of the instants raise, and a band that grows with fast motion."""
+    past, run = predictor.past, np.array([f"M{i % 4}" for i in range(len(instants))])
+    table = alarm_inputs(predictor.inputs, past, predictor.physics, instants)
+    alarm = calibrate_alarm(predictor.inputs, past, table, run)
+    if alarm is None:  # of one instant
+        return predictor
+    away = np.linalg.norm((np.stack([table[name] for name in alarm.names], axis=1) - alarm.middle) @ alarm.root, axis=1)
+    alarm = replace(alarm, farthest=float(np.median(away)) * (1 + 1e-6), slack=0.3)
+    bands = predictor.bands
+    if past:
+        power = fast_power(instants.columns, instants.past, past)
+        weights = rng.dirichlet(np.ones(9)) / np.maximum(power.mean(axis=0), 1e-9)
+        bands = replace(bands, fast=FastMotion(past, weights / np.median(power @ weights)))
+    return replace(predictor, alarm=alarm, bands=bands)
 
 
 def remembering(physics, memory, instants, seed=2, **more):
@@ -113,6 +131,7 @@ def bands_of(rng, physics, instants, names, slow):
         middle=middle, deviation=rng.uniform(0.2, 1, 5), low=middle - spread, high=middle + spread,
         slopes=rng.normal(0, 0.3, 5), length=float(slow * physics.step * horizon * 4),
         kinds=kinds, by_kind=np.cumsum(rng.exponential(0.03, (len(kinds), 99)), axis=1),
+        scales=slow * np.cumsum(rng.uniform(0.01, 1, (len(kinds), horizon, 2)), axis=1),
     )  # fmt: skip
 
 

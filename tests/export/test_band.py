@@ -10,7 +10,7 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.export.band import BAND_CHOICE, band_rows, radii_at
+from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import build_model
 from shipid.hybrid.alone import UnchangedPath
@@ -44,7 +44,7 @@ def agrees(predictor, instants, folder):
     """Half axes and directions of C are those of Python for every level; how many bands there were."""
     exported, count = build_model(predictor), 0
     loaded = library(predictor_files(exported, "odd"), folder)
-    outside = np.where(predictor.outside(instants.columns), OUTSIDE, 0)
+    outside = np.where(predictor.raise_alarm(instants), OUTSIDE, 0)
     for asked in ASKED:
         path, computed, results = paths(loaded, "odd", exported, instants, *asked)
         whole = np.isfinite(path).all(axis=(0, 2))
@@ -83,7 +83,8 @@ def test_a_graph_of_the_band_is_the_arithmetic_of_python(seed):
     bands_ = predictor.bands
     steps = np.cumsum(rng.exponential(0.1, (99, horizon)), axis=0)
     scale = rng.uniform(0.1, 3, (2, horizon))
-    bands_ = replace(bands_, runs=200, along=scale[0], across=scale[1], steps=steps)
+    scales = rng.uniform(0.1, 3, (len(bands_.kinds), horizon, 2))
+    bands_ = replace(bands_, runs=200, along=scale[0], across=scale[1], steps=steps, scales=scales)
     path = np.cumsum(rng.normal(0, 10.0 ** rng.integers(-3, 3), (horizon, 12, 2)), axis=0)
     path[:, 0] = 0
     path[horizon // 2 :, 1] = path[horizon // 2, 1]
@@ -93,7 +94,7 @@ def test_a_graph_of_the_band_is_the_arithmetic_of_python(seed):
     given = np.stack([columns.get(name, np.zeros(12)) for name in now], axis=1)
     place = {name: ca.MX.sym(name) for name in now}
     shape, choice = ca.MX.sym("path", 2, horizon), [ca.MX.sym(name) for name in BAND_CHOICE]
-    rows = band_rows(bands_, place, shape, 2.0, radii_at(bands_, *choice))
+    rows = band_rows(bands_, place, shape, 2.0, half_axes_at(bands_, *choice))
     function = ca.Function("band", [ca.vertcat(*place.values()), shape, *choice], [rows])
     for level, pointwise in ((0.005, False), (0.4, True), (0.905, False), (0.99, True)):
         right = rows_of(bands_.region(path, columns, 2.0, level, pointwise=pointwise))
@@ -105,7 +106,9 @@ def test_a_graph_of_the_band_is_the_arithmetic_of_python(seed):
 
 def test_faults_give_a_result_and_no_band(tmp_path):
     strange = drawn("alone", 6, count=4, vessel="mariner")
-    predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), limits={"u": (-1e9, 1e9)})
+    predictor = replace(
+        strange.predictor, bands=replace(strange.predictor.bands, runs=10), limits={"u": (-1e9, 1e9)}, alarm=None
+    )
     exported = build_model(predictor)
     loaded = library(predictor_files(exported, "odd"), tmp_path)
 
@@ -143,7 +146,7 @@ def test_without_bands_none_is_promised(tmp_path):
 def test_the_recorder_gives_path_and_band(tmp_path):
     """From rows alone; a ship of which nothing is known has no band."""
     strange = drawn("alone", 6, count=4, vessel="mariner")
-    predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), commands="held")
+    predictor = replace(strange.predictor, bands=replace(strange.predictor.bands, runs=10), commands="held", alarm=None)
     recorder, columns = Recorder(predictor, tmp_path), strange.instants.columns
     path, band = (np.zeros((predictor.physics.horizon, size)) for size in (2, 4))
 

@@ -121,7 +121,9 @@ def hybrid(horizon):
     corrector = predictor.corrector
     heads = tuple(replace(h, surge=0.1 * h.surge, sway_yaw=0.005 * h.sway_yaw) for h in corrector.heads)
     physics = Physics(load_vessel("mariner"), horizon, 10.0, "rk4")
-    return replace(predictor, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None)
+    return replace(
+        predictor, physics=physics, corrector=replace(corrector, heads=heads), commands="known", bands=None, alarm=None
+    )
 
 
 @pytest.mark.slow

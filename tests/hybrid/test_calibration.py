@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import f_oneway
@@ -11,11 +13,11 @@ from shipid.hybrid.calibration import (
     _fit_scores,
     _growth_slopes,
     _intraclass_correlation,
-    _shares_of_runs,
     band_radii,
     calibrate_bands,
+    shares_of_runs,
 )
-from tests.hybrid.runs import NAMES, made, runs
+from tests.hybrid.runs import NAMES, Array, made, runs
 
 AT = [49, 79, 89]  # 50, 80, 90 %
 
@@ -29,7 +31,7 @@ def test_radii_hold_their_share_of_new_runs(count: int, alike: float) -> None:
     for _ in range(rounds):
         shared, single = rng.standard_normal((count + 20, 1)), rng.standard_normal((count + 20, windows))
         scores = np.exp(np.sqrt(alike) * shared + np.sqrt(1 - alike) * single)
-        radius = band_radii(scores[:count].ravel(), _shares_of_runs(place))[AT]
+        radius = band_radii(scores[:count].ravel(), shares_of_runs(place))[AT]
         held.append([(scores[count:] <= one).mean() for one in radius])
     np.testing.assert_allclose(np.mean(held, axis=0), [0.5, 0.8, 0.9], atol=0.03)
     assert np.mean(held, axis=0)[2] > 0.885  # rather more than less
@@ -41,16 +43,16 @@ def test_how_alike_windows_are_is_the_intraclass_correlation(count: int, windows
     rng = np.random.default_rng(count)
     values = 2.0 * rng.standard_normal((count, 1)) + rng.standard_normal((count, windows))
     F = f_oneway(*values).statistic
-    alike = _intraclass_correlation(values.ravel(), _shares_of_runs(np.repeat(np.arange(count), windows)))
+    alike = _intraclass_correlation(values.ravel(), shares_of_runs(np.repeat(np.arange(count), windows)))
     assert alike == pytest.approx(max(F - 1, 0) / (F - 1 + windows))
     assert (
-        _intraclass_correlation(np.ones(6), _shares_of_runs(np.repeat(np.arange(3), 2))) == 1.0
+        _intraclass_correlation(np.ones(6), shares_of_runs(np.repeat(np.arange(3), 2))) == 1.0
     )  # nothing differs: a run is one window
 
 
 def test_one_window_a_run_is_the_order_statistic() -> None:
     scores = np.arange(1.0, 20.0)  # 19 runs: the 18th of 19 holds a share of 18 / 20 of new ones
-    radius = band_radii(scores, _shares_of_runs(np.arange(19)))
+    radius = band_radii(scores, shares_of_runs(np.arange(19)))
     assert 17.5 <= radius[89] <= 18.5
     assert radius[94] == pytest.approx(19.0, abs=0.5)
     assert (np.diff(radius) >= 0).all()
@@ -111,15 +113,14 @@ def test_runs_without_errors_do_not_calibrate() -> None:
     assert bands.runs == 4
 
 
-@pytest.mark.parametrize("circle", [True, False])
-def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> None:
+def test_what_a_score_is_divided_by_comes_from_the_other_runs() -> None:
     """Errors of one run three times as large: its scores are three times as large, those of the others smaller."""
     rng = np.random.default_rng(4)
-    of = _shares_of_runs(np.repeat(np.arange(6), 8))
+    of = shares_of_runs(np.repeat(np.arange(6), 8))
     apart, mine = rng.uniform(0.5, 2.0, (5, 48, 2)), of.place == 2
     larger = np.where(mine[:, None], 3.0, 1.0) * apart
     still = np.zeros((48, 5))  # no traits: no growth
-    one, other = (_fit_scores(of, errors, still, circle).scores for errors in (apart, larger))
+    one, other = (_fit_scores(of, errors, still).scores for errors in (apart, larger))
     np.testing.assert_allclose(other[:, mine], 3.0 * one[:, mine], rtol=1e-12)
     assert (other[:, ~mine] < one[:, ~mine]).all()
 
@@ -127,7 +128,7 @@ def test_what_a_score_is_divided_by_comes_from_the_other_runs(circle: bool) -> N
 def test_slopes_without_a_run_are_those_of_the_other_runs() -> None:
     """A ridge regression by least squares with rows that stand for the prior; every run counts as one sample."""
     rng, place = np.random.default_rng(4), np.repeat(np.arange(4), [3, 9, 5, 7])
-    runs, traits = _shares_of_runs(place), rng.standard_normal((24, 5))
+    runs, traits = shares_of_runs(place), rng.standard_normal((24, 5))
     scores = np.exp(0.4 * traits[:, 0] + 0.3 * traits[:, 4] + 0.2 * rng.standard_normal(24))
     slopes, without = _growth_slopes(runs, traits, scores)
     target = np.log(scores)
@@ -139,3 +140,38 @@ def test_slopes_without_a_run_are_those_of_the_other_runs() -> None:
         wanted = np.linalg.lstsq(rows, np.append(root[:, 0] * target[kept], np.zeros(5)), rcond=None)[0]
         assert wanted[-1] > 0
         np.testing.assert_allclose(found, wanted[1:], rtol=1e-6)
+
+
+def rough(seed: int, count: int, waves: float) -> tuple[Array, Array, dict[str, Array], dict[str, Array], Array]:
+    """Errors, paths, columns, past and run of windows in a sea: motion and errors are in proportion to its height."""
+    drawn, rng = runs(seed, count, alike=0.1), np.random.default_rng(seed)
+    of = np.repeat(np.arange(count), len(drawn.run) // count)
+    height = waves * np.exp(0.2 * rng.standard_normal(count))[of]
+    swell = 0.1 * height * rng.standard_normal((3, 21, len(of)))
+    slow = np.linspace(-1, 1, 21)[:, None] * rng.standard_normal((3, 1, len(of)))  # of a manoeuvre: it does not count
+    series = dict(zip("uvr", swell + slow + 3.0, strict=True))
+    columns = drawn.columns | {name: values[-1] for name, values in series.items() if name == "v"}
+    past = {name: values[:-1] + (columns[name] - values[-1]) for name, values in series.items()}
+    return height[:, None] * drawn.errors, drawn.paths, columns, past, drawn.run
+
+
+@pytest.mark.parametrize("unit", [1.0, 100.0])
+def test_a_higher_sea_widens_the_band_and_a_lower_one_does_not(unit: float) -> None:
+    """Twice the motion and twice the errors, of which training has seen nothing; speeds in any unit."""
+    held, plain = [], []
+    for seed in range(6):
+        errors, paths, columns, past, run = rough(seed, 40, 1.0)
+        rescaled = {name: unit * values for name, values in past.items()}
+        here = {**columns, **{name: unit * columns[name] for name in "uvr"}}
+        bands = calibrate_bands(errors, paths + errors, run, here, NAMES, 1.0 / unit, past=rescaled)
+        assert bands is not None
+        assert bands.fast is not None
+        assert bands.fast.growth(here, rescaled).min() == 1
+        errors, paths, columns, past, run = rough(100 + seed, 40, 2.0)
+        here = {**columns, **{name: unit * columns[name] for name in "uvr"}}
+        rescaled = {name: unit * values for name, values in past.items()}
+        still = replace(bands, fast=None)
+        held.append(bands.region(paths, here, 1.0 / unit, 0.9, past=rescaled).holds(errors).mean())
+        plain.append(still.region(paths, here, 1.0 / unit, 0.9).holds(errors).mean())
+    assert np.mean(held) > 0.85
+    assert np.mean(plain) < 0.8
