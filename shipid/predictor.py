@@ -50,7 +50,7 @@ Array = np.ndarray
 Part = TypeVar("Part", bound=StoredData)
 FORMAT = 6
 DIVISORS = ("std", "spread", "deviation")  # last words of the names of arrays by which inputs or traits are divided
-BANDS, ALARM_PARTS = "bands.", "alarm."  # before the names of arrays of a band and an alarm in a saved predictor
+BANDS, ALARM_PARTS = "bands.", "novelty."  # before the names of arrays of a band and an alarm in a saved predictor
 MOST_HORIZON_STEPS = 100_000  # of a horizon and of a past
 
 

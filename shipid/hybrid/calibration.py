@@ -159,8 +159,8 @@ def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[s
     weights = np.divide(1.0, mean, out=np.zeros(9), where=mean > 0)
     level = power @ weights
     order = np.argsort(level)
-    for share in FROM_LEVELS if mean.any() else ():
-        yield FastMotion(rows, weights / np.interp(share, np.cumsum(runs.weight[order]), level[order]))
+    for share in FROM_LEVELS if np.isfinite(mean).all() and mean.any() else ():
+        yield FastMotion(rows, weights / max(np.interp(share, np.cumsum(runs.weight[order]), level[order]), 1e-12))
 
 
 def band_radii(scores: Array, runs: RunShares) -> Array:

@@ -174,6 +174,14 @@ def test_a_summary_says_when_bands_hold_less_than_promised_by_more_than_chance(b
     )
 
 
+def test_a_kind_of_run_that_calibrated_no_band_is_all_alarm(banded, tmp_path):
+    _, file = banded
+    for kind, alarm in (("zigzag", False), ("spiral", True)):
+        known = {"clock": "run", "manoeuvres": {"a": kind}}
+        write_dataset(Dataset(log(), known), tmp_path / f"{kind}.parquet")
+        assert play_aboard(file, tmp_path / f"{kind}.parquet", every=50.0).instants["outside"].all() == alarm
+
+
 def test_a_band_adapts_to_the_past_alone(banded, tmp_path):
     _, file = banded
     whole = log()
