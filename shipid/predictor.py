@@ -230,13 +230,15 @@ class Predictor(DeployedMethod):
     def raise_alarm(self, instants: Instants) -> Array:
         """Return whether each instant (S,) is unlike those of training in any input of the method, also in its past.
 
-        Without a calibrated alarm, whether it is `outside` the limits. DataError as of `predict`.
+        Without a calibrated alarm, whether it is `outside` the limits. Also where the physics diverges. DataError as of
+        `predict`.
         """
         instants = self._known(instants)
         known = {**instants.columns, **instants.estimates}
+        lost = self.physics_with_force.variant_paths(instants)[1][0]
         if self.alarm is None:
-            return self.outside(known)
-        raised = self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
+            return np.asarray(lost | self.outside(known))
+        raised = lost | self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
         return np.asarray(raised | replace(self, limits={"u": (-np.inf, np.inf)}).outside(known))
 
     def outside(self, columns: Mapping[str, Array]) -> Array:

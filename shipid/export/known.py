@@ -177,6 +177,11 @@ class PredictorInputs:
             places.append(ca.if_else(sound, place, places[-1] + last))
         return ca.if_else(self._slow(self.records), path, ca.horzcat(*places[1:]))
 
+    @property
+    def diverges(self) -> MX:
+        """Whether the rollout of the physics diverges; never without physics."""
+        return MX(0) if self.physics.vessel is None else ca.logic_not(self._slow(self.records))
+
     def _slow(self, records: MX) -> MX:
         """Whether no velocity of some carries is above that of any ship: in Python the rollout diverged."""
         num_dof = self.equations.model.num_dof

@@ -16,7 +16,6 @@ from shipid.export.equations import function_by_names, symbols_of
 from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.features import MOTIONS
-from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.method import widen_range
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
@@ -74,7 +73,10 @@ class ExportModel:
             raise ShipidError(
                 f"the parts of the method {self.predictor.method!r} do not fit together ({error}): its file is damaged"
             ) from error
-        inputs, outputs = dict(known.inputs), {"path": path, "outside": self._outside(known)}
+        inputs, outputs = (
+            dict(known.inputs),
+            {"path": path, "outside": ca.logic_or(self._outside(known), known.diverges)},
+        )
         if bands is not None:
             choice = symbols_of(dict.fromkeys(BAND_CHOICE, 1))
             promised = is_band_promised(bands, **choice)
@@ -112,9 +114,7 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
     Its inputs are those of the physics, and what the alarm and the band look at: every input of a method is among them,
     but for the direction of the wind.
     """
-    corrector, physics = predictor.corrector, predictor.physics
-    if isinstance(corrector, ForceCorrector):
-        physics = corrector.with_force(physics)
+    physics = predictor.physics_with_force
     states, memory, orders, weather = (tuple[str, ...](),) * 4
     if physics.vessel is not None:
         model = vessel_dynamics(physics.vessel)

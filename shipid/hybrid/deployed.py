@@ -56,6 +56,12 @@ class DeployedMethod:
         return reason_of_no_band(self.provenance)
 
     @property
+    def physics_with_force(self) -> Physics:
+        """The physics that moves in a prediction: with the force of a corrector that adds one to it."""
+        add = getattr(self.corrector, "with_force", None)
+        return self.physics if add is None else add(self.physics)
+
+    @property
     def inputs(self) -> Inputs:
         """Inputs of the method at the instant and from its past, and every order."""
         known = getattr(self.corrector, "inputs", None)

@@ -104,7 +104,10 @@ def parse_dates(dates: pd.Series[Any]) -> Array:
             return _since_1970(_parse_moments(joined, "%Y%m%d %H%M%S.%f").reindex(dates.index))
         written = date_formats(texts)
         if written:
-            moments = min((_parse_moments(texts, one) for one in written), key=_date_cost)
+            moments = min(
+                (_parse_moments(texts, one) for one in written),
+                key=lambda one: (int(one.isna().sum()), float((one.max() - one.min()).total_seconds())),
+            )
             return _since_1970(moments.reindex(dates.index))
         zoned = texts.str.contains(ZONE)
         dates = (texts[zoned] if zoned.any() else texts).reindex(dates.index)
@@ -153,11 +156,6 @@ def _parse_moments(texts: pd.Series[Any], way: str) -> pd.Series[Any]:
         again = pd.to_datetime(texts[missing], format=way.replace("%S", "%S.%f"), utc=True, errors="coerce")
         moments = moments.fillna(again.dt.as_unit("us"))
     return moments
-
-
-def _date_cost(moments: pd.Series[Any]) -> tuple[int, float]:
-    """Rows that are no dates, then the time between the first and the last."""
-    return int(moments.isna().sum()), float((moments.max() - moments.min()).total_seconds())
 
 
 def format_date(moment: float) -> str:

@@ -233,7 +233,9 @@ def _test_errors(
         return _failed_columns("diverged", sentence), None
     instants = instants_of(study, predictor.vessel, prepared.data, test, one.estimates)
     predictor.check_restored(instants, one.test_paths, way.method.corrector)
-    paths = cap_paths(predictor.predict(instants, one.test_paths), test.future, one.diverged)
+    moved = predictor.physics_with_force
+    lost = one.diverged if moved is predictor.physics else moved.variant_paths(instants)[1][0]
+    paths = cap_paths(predictor.predict(instants, one.test_paths), test.future, lost)
     failed = ~(vector_lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(axis=0)
     if failed.any():
         where = f"{percent_text(failed.mean(), 1)} of the test windows"
@@ -248,8 +250,8 @@ def _test_errors(
         region = predictor.band(paths, instants, level)
         outcome["coverage"] = coverage_share(region.holds(test.future - paths), test.run)
         outcome["width"] = float(region.radius.mean())
-    if one.diverged.any():
-        share = f"physics diverges on {percent_text(one.diverged.mean(), 1)} of the test windows"
+    if lost.any():
+        share = f"physics diverges on {percent_text(lost.mean(), 1)} of the test windows"
         sentence = "; ".join(filter(None, [sentence, f"{share}: errors there are at most the distance run"]))
     return {**outcome, "status": "ok", "sentence": sentence}, paths
 

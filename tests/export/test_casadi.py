@@ -64,16 +64,19 @@ def test_a_path_starts_where_it_does_in_python(settings, path, tmp_path):
 
 @pytest.mark.parametrize("step", [20.0, 60.0])
 def test_a_path_that_diverged_keeps_its_last_velocity(step, tmp_path):
-    """As in Python."""
+    """As in Python, and the alarm is raised: a band around it promises nothing."""
     vessel = load_vessel("mariner")
     columns = {name: np.zeros(2) for name in ("psi", "v", "r")} | {"u": np.array([7.0, 0.1])}
     columns |= {"propeller.n": np.array([1.3, 0.0]), "rudder.delta": np.array([0.5, 0.0])}
     predictor = Predictor(Physics(vessel, 6, step), "alone", UnchangedPath({}), {"u": (0.0, 9.0)})
     file, *_ = export_predictor(predictor, "casadi", tmp_path / "ship.casadi")
     given, expected = inputs_of_model(build_model(predictor), Instants(columns)), predictor.predict(Instants(columns))
+    raised = predictor.raise_alarm(Instants(columns))
     for i in range(2):
-        seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})["path"]
-        np.testing.assert_allclose(np.array(seen).T, expected[:, i], rtol=1e-9)
+        seen = ca.Function.load(str(file))(**{key: values[i] for key, values in given.items()})
+        np.testing.assert_allclose(np.array(seen["path"]).T, expected[:, i], rtol=1e-9)
+        assert bool(seen["outside"]) == raised[i]
+    assert raised.tolist() == [step == 60.0, False]
     ahead, across = np.diff(expected[:, 0], n=2, axis=0).T
     straight = np.hypot(ahead, across) < 1e-6
     assert straight[-3:].all() == (step == 60.0)

@@ -19,6 +19,7 @@ from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows, from_frame
 from shipid.errors import DataError, DivergenceError, DocumentError, ResultError
 from shipid.hybrid.alone import UnchangedPath
+from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.physics import Physics
 from shipid.logs.kinds import LOW_SPEED, RANDOM
 from shipid.metrics import position_error
@@ -213,6 +214,24 @@ def test_a_folder_with_members_of_an_earlier_version_is_not_gone_on_with(tmp_pat
     seals.remove_seal(folder, plan.units[0].key)
     with pytest.raises(ResultError, match=r"test paths of wild-\d by another version"):
         run_here(plan, folder)
+
+
+def test_a_force_that_lets_the_physics_diverge_errs_by_the_distance_run_at_most(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its windows count, and not those of the physics without it."""
+    method = {"name": "force", "kind": "learned-force", "trials": 1, "units": 2, "iterations": 1, "samples": 20}
+    plan = tiny_plan(tmp_path, {"method": [method], "grid.N_D": [4]})
+    prepared, given = prepare(plan, obtain_runs(plan)), ForceCorrector.with_force
+    wild = {"hull.derivatives.X_u|u|": 1e6}
+    monkeypatch.setattr(ForceCorrector, "with_force", lambda one, physics: given(one, physics).with_values(wild))
+    cells = [cell for cell in run_unit(plan, prepared, whole_unit(plan, plan.batches[0]), "cpu") if cell.row["member"]]
+    assert [cell.row["status"] for cell in cells] == ["ok"] * len(cells)
+    way = np.cumsum(np.linalg.norm(np.diff(prepared.test.future, axis=0, prepend=0.0), axis=-1), axis=0)
+    for row, _, paths in cells:
+        assert (position_error(paths, prepared.test.future) <= way * (1 + 1e-9)).all()
+        assert "physics diverges on 100.0 % of the test windows" in row["sentence"]
+    assert cells
 
 
 def test_divergence_on_test_windows_only_is_shown_never_redrawn(

@@ -72,7 +72,7 @@ def _choose_steering(state: State, r: Array, used: dict[str, int]) -> bool:
             name: power[name] * (0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values))))
             for name in power
             for values in [state.columns[name]]
-            if _is_small_angle(values) and name not in screws
+            if 0 < np.abs(values).max() < 95 and np.ptp(values) > 0 and name not in screws
         }
         likely = max(strength, key=lambda name: abs(strength[name]), default="")
         angles = [(likely, "delta")] if likely and abs(strength[likely]) > SEEN else []
@@ -272,10 +272,6 @@ def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]
         chosen += [(name, signal) for name in kept]
     order = list(state.columns)
     return sorted(chosen, key=lambda entry: order.index(entry[0]))
-
-
-def _is_small_angle(values: Array) -> bool:
-    return bool(0 < np.abs(values).max() < 95 and np.ptp(values) > 0)
 
 
 def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:

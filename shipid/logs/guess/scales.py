@@ -75,7 +75,11 @@ def _take_positions(state: State) -> None:
         if both[0].max() <= 90 and both[1].max() <= 360:
             _take_sides(state, north, east)
             continue
-        arc = next((part for part, words in ARC.items() if all(_has_unit(one, words) for one in (north, east))), None)
+        named = [[unit.strip().lower() for unit in units_in_name(one)] for one in (north, east)]
+        arc = next(
+            (part for part, words in ARC.items() if all(any(re.fullmatch(words, u) for u in units) for units in named)),
+            None,
+        )
         if arc is not None and _within_globe(both, arc):
             for name in (north, east):
                 _set_scale(state, name, arc, f"{'minutes' if arc == 1 / 60 else 'seconds'} of arc, as its name says")
@@ -96,11 +100,6 @@ def _take_positions(state: State) -> None:
                     f"do {north!r} and {east!r}, degrees and minutes without a sign, count to north and east? "
                     f"If they are S or W, write sign = -1",
                 )
-
-
-def _has_unit(name: str, words: str) -> bool:
-    """Whether a name has a unit that is one of these words, a regular expression."""
-    return any(re.fullmatch(words, unit.strip().lower()) for unit in units_in_name(name))
 
 
 def _in_radians(state: State, north: str, east: str) -> bool:
