@@ -214,8 +214,8 @@ def compare_cells(mine: Sequence[CellErrors], others: Sequence[CellErrors]) -> C
         apart = np.array([log_error(one.errors) - log_error(other.errors) for one, other in pairs])
         seeds, part = np.array([one.seed for one, _ in pairs]), len(pairs) / count
         draws = np.array([apart[seeds == seed].mean() for seed in np.unique(seeds)])
-        share = min(max(one.share for one, _ in pairs), 1.0)
-        variance, known = draw_variance([draws], [1], 1 / share, 0)
+        share = max(one.share for one, _ in pairs)
+        variance, known = draw_variance([draws], [1], 1 / share if share > 0 else np.inf, 0)
         moved = sum(
             cell.trained for pair in pairs for cell in pair if not np.array_equal(pair[0].errors, pair[1].errors)
         )

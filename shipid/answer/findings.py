@@ -1,7 +1,7 @@
 """Findings of a study: which claims it judges, R1-R4 at full scale (method, section 5), and B1-B2 on bands.
 
 Rules and their error rates: docs/findings.md. "Shown" is a paired difference of logarithms over test manoeuvres whose
-95 % interval is free of 0 (`shipid.evidence`); R3, on a gap in metres, takes differences in metres. The width of a band
+95 % interval is free of 0 (`shipid.evidence`); R3 and B1, on metres, take differences in metres. The width of a band
 is its mean radius [m] over the horizon, a mean over windows of each test manoeuvre, and is judged as errors are.
 """
 
@@ -275,13 +275,13 @@ def _judge_widths(widths: Widths) -> Judgement:
         decided = verdict_of(apart and all_significant(wider.above), apart and any_significant(wider.below))
         return decided, evidence, {"ratio of widths": table.mean(bad, last) / table.mean(good, last)}
     trend = trend_over_accuracy(table, models)
-    ends = [f"{ratio_with_interval(trend.slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
+    ends = [f"{difference_with_interval(trend.slopes, k)} at N_D = {table.amounts[k]}" for k in sorted({0, last})]
     evidence = (
-        f"twice the A multiplies the mean radius by {' and by '.join(ends)}; rank correlation of width and A "
+        f"for twice the A the mean radius rises by {' and by '.join(ends)}; rank correlation of width and A "
         f"{trend.words}{hold}"
     )
     numbers = {"least rank correlation of width and A": trend.least}
-    numbers |= {f"ratio for twice the A at N_D = {table.amounts[last]}": float(np.exp(trend.slopes.mean[last]))}
+    numbers |= {f"rise for twice the A at N_D = {table.amounts[last]} [m]": float(trend.slopes.mean[last])}
     return trend.verdict, evidence, numbers
 
 

@@ -1,8 +1,8 @@
 """Findings S1-S7 (method, section 4): verdicts on the map H(A, N_D) of a simulated study.
 
 Rules and their error rates: docs/findings.md. Taken over the members of the moderate and the high family with a result
-in every cell. "Shown" is a paired difference of logarithms over test manoeuvres whose 95 % interval is
-free of 0 (`shipid.evidence`). The thresholds are free: the paper gives none.
+in every cell. "Shown" is a paired difference of logarithms, in S3 of metres, over test manoeuvres whose
+95 % interval is free of 0 (`shipid.evidence`). The thresholds are free: the paper gives none.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from shipid.answer.verdict import (
     Judgement,
     UndecidedClaim,
     Verdict,
+    difference_with_interval,
     judge_claims,
     least_to_greatest,
     leave_undecided,
@@ -174,12 +175,12 @@ def trend_over_accuracy(table: ErrorTable, models: Sequence[str], *, flattens: b
         raise UndecidedClaim("all physics models have the same A, so nothing can rise with it")
     weights, places = doubling_weights(np.log(A)), range(len(table.amounts))
     each = [[(float(w), model, k) for w, model in zip(weights, models, strict=True)] for k in places]
-    order = np.log([[table.mean(model, k) for model in models] for k in places])
+    order = np.array([[table.mean(model, k) for model in models] for k in places])
     rises = [rank_correlation(A, values) for values in order]
     if flattens:
         each.append([*each[0], *((-factor, model, place) for factor, model, place in each[-1])])
         order = np.vstack([order, order[0] - order[-1]])
-    slopes = table.compare(each)
+    slopes = table.compare(each, logs=False)
     risen, fallen = np.maximum(slopes.above, order_chance(A, order)), np.maximum(slopes.below, order_chance(A, -order))
     words = f"{least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
     return AccuracyTrend(slopes, verdict_of(all_significant(risen), any_significant(fallen)), words, min(rises))
@@ -187,15 +188,14 @@ def trend_over_accuracy(table: ErrorTable, models: Sequence[str], *, flattens: b
 
 def _judge_rise(grid: ErrorGrid) -> Judgement:
     trend, amounts = trend_over_accuracy(grid.table, grid.physics, flattens=True), grid.table.amounts
-    at_first, at_last, less = (ratio_with_interval(trend.slopes, k) for k in (0, len(amounts) - 1, len(amounts)))
+    at_first, at_last, less = (difference_with_interval(trend.slopes, k) for k in (0, len(amounts) - 1, len(amounts)))
     evidence = (
-        f"twice the A multiplies H by {at_first} at N_D = {amounts[0]} and by {at_last} at {amounts[-1]}, {less} times "
-        f"less; "
+        f"for twice the A, H rises by {at_first} at N_D = {amounts[0]} and by {at_last} at {amounts[-1]}, {less} less; "
         f"rank correlation of H and A {trend.words}"
     )
     numbers = {"least rank correlation of H and A": trend.least}
     ends = (0, len(amounts) - 1)
-    numbers |= {f"ratio for twice the A at N_D = {amounts[k]}": float(np.exp(trend.slopes.mean[k])) for k in ends}
+    numbers |= {f"rise for twice the A at N_D = {amounts[k]} [m]": float(trend.slopes.mean[k]) for k in ends}
     return trend.verdict, evidence, numbers
 
 
