@@ -163,7 +163,7 @@ def test_S6_names_pairs(judged: Any) -> None:
     assert finding["verdict"] == "confirmed"
     evidence = finding["evidence"]
     words = "4 of 6 comparisons show a moderate model better than no physics with more runs, each by its own test; "
-    assert f"{words}corrected for their number (Holm), 3, such as " in evidence
+    assert f"{words}corrected for their number (Holm), 2, such as " in evidence
     assert "moderate-1 with 10 runs 1.50 m against 30 runs without physics, 4.00 m" in evidence
     assert "moderate-2 (4.00 m alone) with 30 runs 1.20 m against moderate-1 alone, 2.00 m" in evidence
     assert "100 runs 0.60 m" not in evidence, "100 runs are not few"
