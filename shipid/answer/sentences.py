@@ -326,9 +326,12 @@ def _how_to_read(case: AnswerCase) -> Iterator[str]:
     if note := too_few_manoeuvres(runs):
         yield f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another."
         return
-    drawn = max(map(len, case.table.H[str(case.rows["model"].iloc[0])]))
-    draws = f"{drawn} draws of {counted_text(amounts[0], 'training run')}" if drawn > 1 else "one draw of training runs"
+    drawn = max((len(errors[0]) for errors in case.table.H.values()), default=1)
+    draws = (
+        f"and {drawn} draws of {counted_text(amounts[0], 'training run')}: what other runs of the same kind would give"
+    )
+    alone = "of one draw of training runs: errors with other draws may lie outside"
     yield (
-        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} and {draws}: what other runs of the "
-        "same kind would give. Models are compared run by run, by the logarithm of H."
+        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} {draws if drawn > 1 else alone}. "
+        "Models are compared run by run, by the logarithm of H."
     )
