@@ -120,7 +120,7 @@ def test_what_a_score_is_divided_by_comes_from_the_other_runs() -> None:
     apart, mine = rng.uniform(0.5, 2.0, (5, 48, 2)), of.place == 2
     larger = np.where(mine[:, None], 3.0, 1.0) * apart
     still = np.zeros((48, 5))  # no traits: no growth
-    one, other = (_fit_scores(of, errors, still).scores for errors in (apart, larger))
+    one, other = (_fit_scores(of, errors, still)[2] for errors in (apart, larger))
     np.testing.assert_allclose(other[:, mine], 3.0 * one[:, mine], rtol=1e-12)
     assert (other[:, ~mine] < one[:, ~mine]).all()
 
