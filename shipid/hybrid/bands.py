@@ -70,7 +70,7 @@ class FastMotion(StoredData):
     def growth(self, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Array:
         """How much wider (S,) a band is, 1 or more."""
         power = fast_power(columns, past, self.past) * self.weights
-        return np.sqrt(np.maximum(power.max(axis=1), 1.0))
+        return np.asarray(np.sqrt(np.maximum(power.max(axis=1), 1.0)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,6 @@ from shipid.metrics import Array, vector_lengths
 
 FLOOR = 0.3  # of the greatest scale: the motion of waves early in the horizon does not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
-PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
 FEWEST_PAST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
 WIDER = 1.1  # times the band without, that growth with fast motion costs on average under the law of training
@@ -110,16 +109,13 @@ def calibrate_bands(
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
     of, growth = of[runs.place], np.exp(normal @ slopes)
-    by_kind, scales = [], []
-    for kind, count in known.items():  # of too few runs no band is promised, whatever is here
-        mine = of == kind
-        radii, size = whole, scale
-        if count >= FEWEST:
+    by_kind, scales = (np.repeat(table[None], len(known), axis=0) for table in (whole, scale))
+    for place, kind in enumerate(known):
+        if known[kind] >= FEWEST:  # of fewer runs no band is promised, whatever is here
+            mine = of == kind
             same = shares_of_runs(runs.place[mine])
-            size, scores = _scale_errors(same, apart[:, mine])
-            radii = band_radii(scores.max(axis=0) / growth[mine], same)
-        by_kind.append(radii)
-        scales.append(size)
+            scales[place], scores = _scale_errors(same, apart[:, mine])
+            by_kind[place] = band_radii(scores.max(axis=0) / growth[mine], same)
     return Bands(
         runs=runs.count,
         along=scale[:, 0],
@@ -137,8 +133,8 @@ def calibrate_bands(
         slopes=slopes,
         length=length,
         kinds=known,
-        by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
-        scales=np.reshape(scales, (len(known), *scale.shape)),
+        by_kind=by_kind,
+        scales=scales,
         fast=_fit_fast_motion(runs, columns, before, growth),
     )
 
@@ -255,11 +251,8 @@ def _training_distances(runs: RunShares, points: Array) -> tuple[Array, Array, A
     each = max(-(-CENTRES // runs.count), 1)
     chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
-    parts = [  # 128 numbers a window are held at once
-        nearest_distances(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen])
-        for part in np.array_split(np.arange(len(points)), -(-len(points) // PART))
-    ]
-    return centres, spread, np.concatenate(parts)
+    away = nearest_distances(points / spread, centres / spread, runs.place, runs.place[chosen])
+    return centres, spread, away
 
 
 def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:
