@@ -119,16 +119,6 @@ def _factor_at_limit(ratio: Callable[[float], float | None], end: float, rising:
     return high if abs(high) < FARTHEST / 2 else math.copysign(math.inf, high)
 
 
-def implausible_paths(vessel: Vessel, values: Mapping[str, float]) -> set[str]:
-    """Paths among `values` with which the number is outside the range that ships have.
-
-    values : dotted path -> value of all numbers that were changed.
-    """
-    numbers = {**vessel.parameters, **values}
-    judged = {path: _coefficient_ratio(vessel, path, numbers) for path in values}
-    return {path for path, seen in judged.items() if seen is not None and not seen[0].low <= seen[1] <= seen[0].high}
-
-
 def _coefficient_ratio(vessel: Vessel, path: str, numbers: Mapping[str, float]) -> tuple[Kind, float] | None:
     """Kind of a number and its ratio; None where no range is known."""
     kind = _coefficient_kind(path)
