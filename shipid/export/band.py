@@ -56,16 +56,17 @@ def _fast_growth(fast: FastMotion, rows: Sequence[NamedExpressions]) -> MX:
 
 def is_alarm_raised(alarm: NoveltyAlarm, known: PredictorInputs) -> MX:
     """Whether the alarm is raised, as `NoveltyAlarm.is_raised`."""
-    table = known.table(alarm.inputs)
+    table, measured = known.table(alarm.inputs), MX(1)
     for name in alarm.inputs.commands:
         series = ca.vertcat(*(row[name] for row in known.past[len(known.past) - alarm.past :]), known.now[name])
-        table[range_of_orders(name)] = ca.mmax(series) - ca.mmin(series)
+        table[range_of_orders(name)] = ca.mmax(series) - ca.mmin(series)  # these pass over NaN
+        measured = ca.logic_and(measured, all_within(series))
     away = ca.mtimes(ca.DM(alarm.root.T), stacked_inputs(table, alarm.names) - ca.DM(alarm.middle))
     rounding, values = ca.DM(range_rounding(alarm.low, alarm.high)), stacked_inputs(table, alarm.limited)
-    beyond = ca.fmax(ca.DM(alarm.low) - values, values - ca.DM(alarm.high)) - rounding
-    excess = beyond / ca.fmax(ca.DM(alarm.high - alarm.low), rounding)
-    inside = ca.logic_and(ca.norm_2(away) <= alarm.farthest, all_within(ca.fmax(excess, 0), alarm.slack))
-    return ca.logic_not(inside)
+    slack = alarm.slack * ca.fmax(ca.DM(alarm.high - alarm.low), rounding) + rounding
+    reach = ca.vertcat(ca.DM(alarm.low) - values, values - ca.DM(alarm.high)) - ca.vertcat(slack, slack)
+    inside = ca.logic_and(ca.norm_2(away) <= alarm.farthest, ca.sum1(reach <= 0) > reach.numel() - 0.5)
+    return ca.logic_not(ca.logic_and(inside, measured))
 
 
 def _track_directions(path: MX) -> MX:

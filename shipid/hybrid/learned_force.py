@@ -24,6 +24,7 @@ from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, T
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import solve_ridges
+from shipid.metrics import cap_paths
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -47,7 +48,7 @@ class ForceCorrector(StoredData):
 
     def with_force(self, physics: Physics) -> Physics:
         """Return the physics with the learned force among its terms."""
-        return physics.with_values({BLOCK: block_document(self.block)})
+        return with_block(physics, self.block)
 
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11) of the physics with the learned force."""
@@ -174,10 +175,14 @@ def force_limits(vessel: Vessel, speed: float, factor: float) -> dict[str, Array
     return {"X_max": np.array([force]), "Y_max": np.array([force]), "N_max": np.array([moment])}
 
 
-def block_document(block: Mapping[str, Array]) -> dict[str, Any]:
-    """The block as a vessel document holds it: numbers, and lists of numbers; 0 for one too near to 0 for it."""
+def with_block(physics: Physics, block: Mapping[str, Array]) -> Physics:
+    """The physics with the block, as a vessel document holds it, whatever the size of its numbers.
+
+    They are numbers and lists of numbers; 0 for one too near to 0 for a document.
+    """
     held = {name: np.where(np.abs(values) < LEAST_NUMBER, 0.0, values) for name, values in block.items()}
-    return {name: values.tolist() if name in (*HIDDEN, *OUTPUT) else float(values[0]) for name, values in held.items()}
+    usual = {name: values.tolist() if name in (*HIDDEN, *OUTPUT) else float(values[0]) for name, values in held.items()}
+    return physics.with_values({BLOCK: usual, "unusual": [*physics.ship.document.get("unusual", []), f"{BLOCK}.*"]})
 
 
 class _ForceLoss:
@@ -186,7 +191,7 @@ class _ForceLoss:
     def __init__(
         self, physics: Physics, block: Mapping[str, Array], instants: Instants, future: Array, iterations: int
     ) -> None:
-        self.physics = physics.with_values({BLOCK: block_document(block)})
+        self.physics = with_block(physics, block)
         lost = self.physics.variant_paths(instants)[1][0]
         sound = np.flatnonzero(~lost | lost.all())  # where all are lost, no force makes the error finite
         self.instants, self.future = instants.select(sound), future[:, sound]
@@ -225,9 +230,9 @@ class _ForceLoss:
         return np.asarray(optimum.x), int(optimum.nit)
 
     def error(self, weights: Array, instants: Instants, future: Array) -> float:
-        """Mean squared position error [m^2] on other windows."""
-        paths, _ = self.physics.variant_paths(instants, self.with_weights(weights)[None])
-        return float(np.square(paths[:, 0] - future).sum(axis=-1).mean())
+        """Mean squared position error [m^2] on other windows, see `cap_paths`."""
+        paths, lost = self.physics.variant_paths(instants, self.with_weights(weights)[None])
+        return float(np.square(cap_paths(paths[:, 0], future, lost[0]) - future).sum(axis=-1).mean())
 
     def block(self, weights: Array) -> dict[str, Array]:
         """The block with these weights."""

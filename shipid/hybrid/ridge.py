@@ -143,7 +143,10 @@ class _JudgingWindows:
             (training[np.isin(training, taken)], judged[np.isin(judged, taken)]) for training, judged in task.folds
         ]
         judged = np.concatenate([validation for _, validation in folds])
-        faster = {key: _unfollowed_squares(paths[:, judged], basis) for key, paths in targets.items()}
+        faster = {  # sums of squares [m^2] of what the basis cannot follow
+            key: float(np.square(paths[:, judged] - np.tensordot(basis @ basis.T, paths[:, judged], 1)).sum())
+            for key, paths in targets.items()
+        }
         return cls(rows, len(rows) / len(windows), _fold_blocks(folds, taken), faster, len(judged))
 
 
@@ -371,11 +374,6 @@ def _group_foundations(
             _FoundationGroup(tuple(keys), outputs, plain, mirrored if mirrored[0].reflection is not None else None)
         )
     return groups
-
-
-def _unfollowed_squares(paths: Array, basis: Array) -> float:
-    """Sum of squares [m^2] of what the basis cannot follow in paths (T, S, 2)."""
-    return float(np.square(paths - np.tensordot(basis @ basis.T, paths, 1)).sum())
 
 
 @dataclass(frozen=True)

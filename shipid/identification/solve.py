@@ -256,7 +256,9 @@ def _initial_unknowns(problem: Problem, start: Mapping[str, float] | Solution | 
     begin = zip(start.paths, start.factors.tolist(), strict=True)
     gone = NUISANCES["current"].keys() - set(problem.unknown.paths)  # the other fit may have chosen a current
     factors = _initial_factors(problem, {path: factor for path, factor in begin if path not in gone})
-    return factors, start.point if _same_shapes(start.point, initial_point(problem)) else initial_point(problem)
+    one, other = start.point, initial_point(problem)
+    alike = one.nuisances.shape == other.nuisances.shape and one.away.shape == other.away.shape
+    return factors, one if alike else other
 
 
 def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
@@ -269,10 +271,6 @@ def _initial_factors(problem: Problem, start: Mapping[str, float]) -> Array:
             raise DocumentError(message, path=f"{BLOCK}.start")
         factors[unknown.paths.index(path)] = float(as_float_array(f"start of {path}", factor, DocumentError))
     return np.asarray(np.clip(factors, unknown.low, unknown.high))
-
-
-def _same_shapes(point: Point, other: Point) -> bool:
-    return point.nuisances.shape == other.nuisances.shape and point.away.shape == other.away.shape
 
 
 def _result_point(result: Result) -> Point:

@@ -5,17 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from shipid import document
 from shipid.errors import DataError
 from shipid.logs.importing import log_digest
 from shipid.logs.mapping import read_mapping
 
 FOLDER_VARIABLE = "SHIPID_DATA"
-
-
-def bundled_mappings() -> list[str]:
-    """The names of the bundled mappings; `fetch_log` takes each of them."""
-    return list(document.bundled_documents("studies/mappings"))
 
 
 def fetch_log(name: str) -> Path:

@@ -73,7 +73,9 @@ class _Heard:
     def __init__(self, stamped: bool) -> None:
         self.stamped, self.checked = stamped, True
         self.clock, self.stamps = _Clock(), array("d")
-        self.said: dict[str, tuple[array[float], array[int], list[str]]] = defaultdict(_empty_channel)
+        self.said: dict[str, tuple[array[float], array[int], list[str]]] = defaultdict(
+            lambda: (array("d"), array("q"), [])
+        )
         self.unreadable, self.unread = 0, Counter[str]()
 
     def hear(self, line: str) -> None:
@@ -144,10 +146,6 @@ class _Heard:
         others = f", and its sentences are of other kinds: {kinds}" if self.unread else ""
         message = f"no sentence with a time and a value ({self.unreadable} unreadable lines{others})"
         return f"{message}: set [format] kind or time"
-
-
-def _empty_channel() -> tuple[array[float], array[int], list[str]]:
-    return array("d"), array("q"), []
 
 
 def _by_talker(name: str, t: Array, talkers: NDArray[np.str_]) -> Iterator[tuple[str, NDArray[np.int_]]]:

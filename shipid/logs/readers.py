@@ -355,8 +355,13 @@ def _large_text(
     if {names[index] for index in places} != wanted or len(places) != len(wanted):
         return None
     plain = {
-        index: bool(pd.to_numeric(_with_decimal_point(first.iloc[:, index], form), errors="coerce").notna().any())
+        index: bool(
+            pd.to_numeric(column.str.replace(",", ".") if form.decimal == "," else column, errors="coerce")
+            .notna()
+            .any()
+        )
         for index in places
+        for column in [first.iloc[:, index]]
     }
     try:
         reader = _read_blocks(file, form, len(names), plain)
@@ -441,10 +446,6 @@ def _start_threads(count: int) -> None:
         for thread in threads:
             if thread.ident is not None:
                 thread.join()
-
-
-def _with_decimal_point(column: pd.Series[Any], form: TextFormat) -> pd.Series[Any]:
-    return column.str.replace(",", ".") if form.decimal == "," else column
 
 
 def _read_sheet(file: Path, form: SheetFormat, *_: object) -> pd.DataFrame:

@@ -450,7 +450,7 @@ def _ordinary_sensors(length: float, service: float) -> list[Choice]:
         ),
         "east": (position, "as north"),
         "psi": (COMPASS_NOISE, "rad: 0.25 deg RMS, which IMO A.424(XI) allows a gyro compass"),
-        "u": (speed, f"m/s: {percent_text(SPEED_NOISE)} of the service speed; IMO MSC.96(72) allows a log 2 %"),
+        "u": (speed, f"m/s: {percent_text(SPEED_NOISE, 1)} of the service speed; IMO MSC.96(72) allows a log 2 %"),
         "v": (speed, "as u"),
         "r": (rate, "rad/s: that of u over the length; IMO A.526(13) allows a rate gyro 0.5 deg/min and 5 %"),
     }

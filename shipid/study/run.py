@@ -19,12 +19,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from shipid.arguments import as_path, check_class, check_whole_number
 from shipid.capacity import processor_name, usable_cores
 from shipid.data.dataset import read_dataset, write_dataset
 from shipid.engine.engines import check_device
 from shipid.engine.native import engine_description, noted_engine
-from shipid.errors import ShipidError
+from shipid.errors import ResultError, ShipidError
 from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
@@ -134,6 +136,8 @@ def _run_one(plan: Plan, folder: Path, means: Means) -> Iterator[Event]:
             yield Event("note", f"earlier results were computed otherwise: {'; '.join(changed)}")
         prepared = yield from _prepare_folder(plan, folder, place, begun)
         mine, left = _units(plan, folder, shard)
+        if left:
+            _check_common(folder, prepared)
         total, done = _cells(mine), _cells(mine) - _cells(left)
         yield Event("start", done=done, total=total)
         for unit, results in _compute(plan, prepared, left, place, begun, means):
@@ -185,19 +189,34 @@ def _prepare_folder(
     return prepared
 
 
+def _paths_alone(prepared: PreparedStudy) -> dict[str, np.ndarray]:
+    """Paths (T, S, 2) [m] on the test windows by foundation that is not fitted, see `cap_paths`."""
+    future, lost = prepared.test.future, prepared.diverged
+    fixed = [one.name for one in prepared.foundations if not one.fitted]
+    return {name: cap_paths(prepared.test_paths[name], future, lost[name][1]) for name in fixed}
+
+
+def _check_common(folder: Path, prepared: PreparedStudy) -> None:
+    """Raise ResultError where true or physics paths of the test are stored that this shipid makes otherwise."""
+    test, stored, _ = store.read_test(folder)
+    now = {"truth": prepared.test.future, **_paths_alone(prepared)}
+    for name, old in {"truth": test.future, **stored}.items():
+        if old.shape != now[name].shape or not np.allclose(old, now[name], rtol=1e-3, atol=1e-4, equal_nan=True):
+            message = f"holds test paths of {name} by another version of shipid, which this one makes otherwise"
+            raise ResultError(f"{message}: read its report.html, and run the study into a new folder", file=folder)
+
+
 def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy) -> None:
     """Store what all batches share, so that a report needs nothing else."""
-    test, lost = prepared.test, prepared.diverged
-    fixed = [one for one in prepared.foundations if not one.fitted]
-    paths = {one.name: cap_paths(prepared.test_paths[one.name], test.future, lost[one.name][1]) for one in fixed}
+    test, lost, paths = prepared.test, prepared.diverged, _paths_alone(prepared)
     store.write_test(folder, test, paths, prepared.naive)
     rows = input_envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
     known = {
         one.name: accuracy_of(paths[one.name], test)
         | {f"diverged_{part}": int(bad.sum()) for part, bad in zip(("training", "test"), lost[one.name], strict=True)}
-        for one in fixed
-        if one.base is not None
+        for one in prepared.foundations
+        if one.name in paths and one.base is not None
     }
     described = [{**foundation_record(one), **known.get(one.name, NO_ACCURACY)} for one in prepared.foundations]
     write_json(folder / store.FOUNDATIONS, described)

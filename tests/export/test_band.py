@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -10,11 +11,13 @@ import pytest
 
 from shipid.data.windows import Instants
 from shipid.errors import DataError
-from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at
+from shipid.export.band import BAND_CHOICE, band_rows, half_axes_at, is_alarm_raised
 from shipid.export.c_predictor import predictor_files
 from shipid.export.model import build_model
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.bands import Region
+from shipid.hybrid.features import NO_MEMORY, Inputs
+from shipid.hybrid.novelty import calibrate_alarm
 from shipid.hybrid.physics import Physics
 from shipid.predictor import Predictor
 from shipid.vessel.load import load_vessel
@@ -165,3 +168,25 @@ def test_the_recorder_gives_path_and_band(tmp_path):
     assert result(0.95) == OUTSIDE * int(right.outside[0]) + NO_BAND
     assert np.isfinite(path).all()
     assert np.isnan(band).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_alarm_of_a_graph_is_raised_as_in_python_also_by_what_is_no_number(seed):
+    """Drawn alarms; a fault in an order now or before, in an input that was constant, or in one that varied."""
+    rng = np.random.default_rng(seed)
+    table = {name: rng.normal(size=40) for name in ("u", "a.n", "a.range.n")} | {"calm": np.zeros(40)}
+    run = np.array([f"M{i % 5}" for i in range(40)])
+    alarm = calibrate_alarm(Inputs(("a.n",), NO_MEMORY), 1, table | {"a.range.n": np.abs(table["a.range.n"])}, run)
+    before, now, u, calm = (ca.MX.sym(name) for name in ("before", "now", "u", "calm"))
+    known = SimpleNamespace(
+        past=[{"a.n": before}], now={"a.n": now}, table=lambda _: {"u": u, "a.n": now, "calm": calm}
+    )
+    graph = ca.Function("alarm", [before, now, u, calm], [is_alarm_raised(alarm, known)])
+    given = rng.normal(size=(60, 4)) * [2, 2, 2, 0]
+    given[np.arange(32), np.arange(32) % 4] = np.repeat([np.nan, np.inf, 0.1, 9.0], 8)
+    with np.errstate(invalid="ignore"):
+        right = alarm.is_raised(
+            {"u": given[:, 2], "a.n": given[:, 1], "calm": given[:, 3], "a.range.n": np.ptp(given[:, :2], axis=1)}
+        )
+    assert [bool(graph(*row)) for row in given] == right.tolist()
+    assert 0 < right[32:].mean() < 1

@@ -7,8 +7,9 @@ import pooch
 import pytest
 import requests
 
+from shipid.document import bundled_documents
 from shipid.errors import DataError, DocumentError
-from shipid.logs.catalogue import bundled_mappings, fetch_log
+from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import read_mapping
 
 NAME = "gunnerus-2022"
@@ -20,8 +21,9 @@ def test_from_the_shared_data(shared_data: Path, gunnerus_log: Path, monkeypatch
 
 
 def test_every_bundled_mapping_names_its_bytes() -> None:
-    assert NAME in bundled_mappings()
-    for name in bundled_mappings():
+    bundled = bundled_documents("studies/mappings")
+    assert NAME in bundled
+    for name in bundled:
         source = read_mapping(name).source
         assert None not in (source.url, source.sha256, source.file, source.citation, source.licence)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pandas as pd
@@ -16,13 +17,14 @@ import tomlkit
 from shipid.answer.sentences import answer_sentences
 from shipid.data.dataset import Dataset
 from shipid.data.windows import Windows, cut_windows, from_frame
-from shipid.errors import DataError, DivergenceError, DocumentError
+from shipid.errors import DataError, DivergenceError, DocumentError, ResultError
 from shipid.hybrid.alone import UnchangedPath
 from shipid.hybrid.physics import Physics
 from shipid.logs.kinds import LOW_SPEED, RANDOM
 from shipid.metrics import position_error
 from shipid.predictor import Predictor
 from shipid.study import prepare as module
+from shipid.study import run, seals
 from shipid.study.envelope import input_envelope
 from shipid.study.plan import Plan, read_plan
 from shipid.study.prepare import (
@@ -181,13 +183,13 @@ def test_members_that_diverge_stay_and_err_by_the_distance_run_at_most(tmp_path:
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
     assert (results.cells["status"] == "ok").all()
-    run = np.cumsum(np.linalg.norm(np.diff(prepared.test.future, axis=0, prepend=0.0), axis=-1), axis=0)
+    way = np.cumsum(np.linalg.norm(np.diff(prepared.test.future, axis=0, prepend=0.0), axis=-1), axis=0)
     models, counts = results.models.set_index("model"), 0
     for planned, model in zip(plan.foundations[:-1], prepared.foundations[:-1], strict=True):
         assert model.variant == planned.variant
         pool, test = prepared.diverged[model.name]
         error = position_error(results.physics[model.name], prepared.test.future)
-        assert (error[:, test] <= run[:, test] * (1 + 1e-9)).all()
+        assert (error[:, test] <= way[:, test] * (1 + 1e-9)).all()
         assert error.mean() == pytest.approx(models.loc[model.name, "A"])
         np.testing.assert_array_equal(results.physics[model.name][:, ~test], prepared.test_paths[model.name][:, ~test])
         assert np.isfinite(prepared.test_paths[model.name]).all()
@@ -197,6 +199,20 @@ def test_members_that_diverge_stay_and_err_by_the_distance_run_at_most(tmp_path:
         counts += pool.any()
     assert 0 < counts < 6
     assert any("test windows: a path then keeps its last velocity" in text for text, _ in answer_sentences(results))
+
+
+def test_a_folder_with_members_of_an_earlier_version_is_not_gone_on_with(tmp_path: Path) -> None:
+    """Before, they were drawn again: cells of both in one table would be of two models by one name."""
+    family: dict[str, Any] = {"name": "wild", "base": "gunnerus-28.9", "members": 6}
+    family["perturb"] = [{"parameters": ["hull.derivatives.*"], "factor": [-6.0, 6.0], "change_sign": True}]
+    plan, folder = tiny_plan(tmp_path, {"family": [family], "grid.N_D": [4]}), tmp_path / "run"
+    older = replace(plan, families=tuple(one.model_copy(update={"redraw": True}) for one in plan.families))
+    with patch.object(run, "prepare", lambda _, *given: prepare(older, *given)):
+        run_here(plan, folder)
+    assert run_here(plan, folder)[-1].done == 7, "nothing is left to compute"
+    seals.remove_seal(folder, plan.units[0].key)
+    with pytest.raises(ResultError, match=r"test paths of wild-\d by another version"):
+        run_here(plan, folder)
 
 
 def test_divergence_on_test_windows_only_is_shown_never_redrawn(

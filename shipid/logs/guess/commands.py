@@ -66,12 +66,13 @@ def _choose_steering(state: State, r: Array, used: dict[str, int]) -> bool:
     power = {name: state.effect(r, state.columns[name]) for name in state.eligible()}
     by_name = bool(angles)
     if not angles:
-        # an order is held at its largest value; a response such as roll is not
+        # an order is held: rows repeat the value before, to 1/100 of the range; a response such as roll does not
         screws = _screw_columns(state)
         strength = {
-            name: power[name] * _repeated_share(state.columns[name])
+            name: power[name] * (0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values))))
             for name in power
-            if _is_small_angle(state.columns[name]) and name not in screws
+            for values in [state.columns[name]]
+            if _is_small_angle(values) and name not in screws
         }
         likely = max(strength, key=lambda name: abs(strength[name]), default="")
         angles = [(likely, "delta")] if likely and abs(strength[likely]) > SEEN else []
@@ -275,11 +276,6 @@ def _columns_named_for(state: State, signals: list[str]) -> list[tuple[str, str]
 
 def _is_small_angle(values: Array) -> bool:
     return bool(0 < np.abs(values).max() < 95 and np.ptp(values) > 0)
-
-
-def _repeated_share(values: Array) -> float:
-    """The share of rows that repeat the value before (to 1/100 of the range), floored: orders are held."""
-    return 0.05 + float(np.mean(np.abs(np.diff(values)) < 1e-2 * np.ptp(values)))
 
 
 def _choose_thrust(state: State, azimuth: bool, used: dict[str, int]) -> None:
