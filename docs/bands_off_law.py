@@ -101,7 +101,7 @@ def main() -> None:
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
     predictor = Predictor.load(file)
     for law in [*LAWS, *drawn]:
-        cells = row_of_law(predictor, {**LAWS, **FURTHER}[law], 1058)
+        cells = row_of_law(predictor, {**LAWS, **FURTHER}[law], 5919)
         print(f"| {law} | {' | '.join(cells)} |", flush=True)
 
 

@@ -1,16 +1,13 @@
-"""Evidence of test manoeuvres: intervals of paired differences, and how easily chance makes them.
+"""Evidence by levels: test manoeuvres, draws of training runs, worlds; and how easily chance makes a difference.
 
-Test manoeuvres are resampled, whole and paired (cluster bootstrap; Davison and Hinkley 1997, section 3.8), in standard
-errors (bootstrap-t; Efron and Tibshirani 1993, section 12.5). Where Student's interval is wider, it counts. What
-another training would give adds to the standard error.
+The variance of a mean is that over test manoeuvres, which count alike, and that over draws of the training runs: two
+crossed factors (Owen 2007, Annals of Applied Statistics 1). Their degrees of freedom are those of Satterthwaite (1946).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,19 +18,19 @@ from shipid.metrics import coverage_by_run
 
 Array = NDArray[np.float64]
 SIGNIFICANT = 0.025  # of one side: an interval of 95 % is free of 0
-RESAMPLES, SEED = 1999, 0
 FEWEST_RUNS = 5  # test manoeuvres below which no interval is given
 FEWEST_WORLDS = 3  # below which no interval over worlds is given
-LEAST_SPREAD, ROUNDING = 0.01, 1e-9  # of training and of the mean: a smaller spread between manoeuvres is none
+SMALLEST_ERROR = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
+ROUNDING = 1e-9  # of the mean: a smaller spread between manoeuvres is none
 FEWEST_MODELS = 5  # whose order by A says anything: that of fewer comes by chance too often
-TRAINING, WORTH = 0.03, 4  # relative sd of H between trainings, and how many observations this number counts for
+TRAINING = 0.03  # relative sd of H between trainings, assumed where no amount of data was drawn twice
 
 
 @dataclass(frozen=True)
 class Differences:
-    """Differences (J,) of mean errors over test manoeuvres.
+    """Differences (J,) of errors over test manoeuvres, of their logarithms by default.
 
-    mean, low, high : [m], with the 95 % interval of each.
+    mean, low, high : with the 95 % interval of each.
     above, below : chance of a difference as far above 0, or as far below, if there were none (one-sided p-values).
     """
 
@@ -44,65 +41,50 @@ class Differences:
     below: Array
 
 
-def paired_difference(differences: Array, counts: Array, training: Array | float = 0.0) -> Differences:
-    """Means of paired differences with intervals and chances; only means with fewer than `FEWEST_RUNS` manoeuvres.
+def paired_difference(differences: Array, noise: Array | float = 0.0, freedom: float = np.inf) -> Differences:
+    """Student's intervals and chances of mean differences; only means with fewer than `FEWEST_RUNS` manoeuvres.
+
+    differences : (J, R) in each test manoeuvre; each counts alike. noise : variance that other training runs give
+    these means, (J,) or one for all, with its degrees of freedom.
+    """
+    mean, runs = differences.mean(axis=1), differences.shape[1]
+    if runs < FEWEST_RUNS:
+        blank = np.full_like(mean, np.nan)
+        return Differences(mean, blank, blank, blank, blank)
+    spread = differences.std(axis=1, ddof=1)
+    tests = np.where(spread <= ROUNDING * np.abs(mean), 0.0, np.square(spread)) / runs
+    variance = tests + noise
+    degrees = np.full_like(mean, runs - 1.0)
+    squares = np.square(tests) / (runs - 1) + np.square(noise) / freedom
+    np.divide(np.square(variance), squares, out=degrees, where=squares > 0)
+    wide = stdtrit(degrees, 1 - SIGNIFICANT) * np.sqrt(variance)
+    far = mean / np.maximum(np.sqrt(variance), 1e-12 * np.abs(mean) + 1e-300)
+    return Differences(mean, mean - wide, mean + wide, stdtr(degrees, -far), stdtr(degrees, far))
+
+
+def draw_variance(
+    by_draw: Sequence[Array], amounts: Sequence[int], pool: float, place: int
+) -> tuple[Array | float, float]:
+    """Variance that other training runs give a mean over the draws of one amount of data, and its degrees of freedom.
+
+    Up to the largest amount that was drawn several times it falls as 1 / N_D, estimated from all of them; 0 degrees of
+    freedom where none was. Beyond, as 1 / N_D squared: of an error near its floor, what is left is a square itself.
+    Draws of one pool share runs, and scatter less by 1 - N_D / pool than those of other pools (Cochran 1977, section
+    2.6): so there is an estimate where all runs are used.
 
     Parameters
     ----------
-    differences : (J, R) mean of each difference in each test manoeuvre [m].
-    counts : (R,) windows of each manoeuvre, its weight.
-    training : standard error of each difference from training alone [m], (J,) or one for all.
+    by_draw : for each amount the means (S, J) of its draws. pool : runs from which all are drawn.
+    place : of the amount.
     """
-    weights, freedom = counts / counts.sum(), len(counts) - 1
-    mean = differences @ weights
-    if len(counts) < FEWEST_RUNS:
-        blank = np.full_like(mean, np.nan)
-        return Differences(mean, blank, blank, blank, blank)
-    drawn, spread = _bootstrap_distances(differences, weights, training)
-    # If all manoeuvres scatter alike: one with most of the windows lies near the mean because it makes the mean.
-    alike = np.sqrt(np.square(weights).sum()) * differences.std(axis=1, ddof=1)
-    error, widest = np.hypot(spread, training), np.hypot(np.maximum(spread, alike), training)
-    student = stdtrit(freedom, 1 - SIGNIFICANT) * widest
-    lower = np.minimum(np.quantile(drawn, SIGNIFICANT, axis=0, method="lower") * error, -student)
-    upper = np.maximum(np.quantile(drawn, 1 - SIGNIFICANT, axis=0, method="higher") * error, student)
-    least = 1e-12 * np.abs(mean) + 1e-300
-    ahead, far = mean / np.maximum(error, least), mean / np.maximum(widest, least)
-    above, below = (
-        np.maximum((sign * drawn >= sign * ahead).mean(axis=0), stdtr(freedom, -sign * far)) for sign in (1, -1)
-    )
-    return Differences(mean, mean - upper, mean - lower, above, below)
-
-
-def _bootstrap_distances(values: Array, weights: Array, training: Array | float) -> tuple[Array, Array]:
-    """(B, J) resampled weighted means less the mean, in their standard errors, and (J,) the standard error of the mean.
-
-    0 where the spread of manoeuvres is that of rounding, or far below that of training.
-    """
-    draws = _resampling_counts(len(weights))
-    mean, sums, total = values @ weights, weights * values, draws @ weights
-    means = (draws @ sums.T) / total[:, None]
-    squares = draws @ (sums**2).T - 2 * means * (draws @ (sums * weights).T)
-    squares += means**2 * (draws @ weights**2)[:, None]
-    correction = len(weights) / (len(weights) - 1)
-    spread = np.sqrt(correction * np.maximum(squares, 0.0)) / total[:, None]
-    here = np.sqrt(correction * np.square(sums - mean[:, None] * weights).sum(axis=1))
-    least = np.maximum(ROUNDING * np.abs(mean), LEAST_SPREAD * np.asarray(training))
-    smallest = np.maximum(1e-6 * here, 1e-300)
-    return np.where(here <= least, 0.0, (means - mean) / np.maximum(spread, smallest)), here
-
-
-@lru_cache(maxsize=8)
-def _resampling_counts(runs: int) -> Array:
-    """(B, R) how often each of R manoeuvres is drawn, with replacement."""
-    rng = np.random.default_rng(SEED)
-    return rng.multinomial(runs, np.full(runs, 1 / runs), RESAMPLES).astype(float)
-
-
-def resampled_means(values: Array, counts: Array) -> Array:
-    """(B, ...) weighted means of values (..., R) over resampled manoeuvres, the same resamples for all values."""
-    draws = _resampling_counts(len(counts))
-    means: Array = np.tensordot(draws * counts, values, axes=(1, values.ndim - 1))
-    return means / (draws @ counts).reshape(-1, *[1] * (values.ndim - 1))
+    squares, freedom, known, amount = 0.0, 0.0, 0, amounts[place]
+    for drawn, values in zip(amounts, by_draw, strict=True):
+        if len(values) > 1 and drawn < pool:
+            squares = squares + drawn * np.square(values - values.mean(axis=0)).sum(axis=0) / (1 - drawn / pool)
+            freedom, known = freedom + len(values) - 1, max(known, drawn)
+    share = min(amount / max(pool, 1), 1.0)
+    alike = ((1 - share) / len(by_draw[place]) + share) / amount * min(1.0, known / amount)
+    return squares * alike / max(freedom, 1.0), freedom
 
 
 def share_interval(held: NDArray[Any], run: NDArray[Any]) -> tuple[float, float]:
@@ -179,25 +161,12 @@ def order_chance(A: Array, values: Array) -> Array:
     return np.array([kendalltau(A, row, alternative="greater").pvalue for row in values])
 
 
-def training_noise(H: Sequence[Array]) -> float:
-    """Relative standard deviation [1] of H between trainings, from H by seed of several models at one amount of data.
-
-    With one seed it is `TRAINING`, the value of bundled studies; more seeds replace it.
-    """
-    squares, freedom = WORTH * TRAINING**2, float(WORTH)
-    for values in H:
-        if len(values) > 1 and values.mean() > 0:
-            squares += float(np.square(values / values.mean() - 1).sum())
-            freedom += len(values) - 1
-    return float(np.sqrt(squares / freedom))
-
-
 @dataclass(frozen=True, eq=False)
 class CellErrors:
     """Mean error (R,) [m] of one cell in every test manoeuvre, and the windows (R,) of each.
 
-    model : cells of one model in one world differ by their seed alone. trained : whether another training would change
-    the errors. world : test manoeuvres of two worlds are not the same ones.
+    trained : whether another training would change the errors. world : test manoeuvres of two worlds are not the same
+    ones. seed : of the draw of its runs. share : of the runs that could train, those that did.
     """
 
     model: str
@@ -205,6 +174,8 @@ class CellErrors:
     windows: Array
     trained: bool = True
     world: str = ""
+    seed: int = 0
+    share: float = 1.0
 
     @property
     def mean(self) -> float:
@@ -214,9 +185,10 @@ class CellErrors:
 
 @dataclass(frozen=True)
 class CellDifference:
-    """Mean error of cells less that of others [m], with its 95 % interval and one-sided chances.
+    """By how much errors of cells are above those of others [%]: a geometric mean over test manoeuvres.
 
-    runs, better : test manoeuvres, and those with a lower error. worlds : (W,) the difference in each world [m].
+    low, high, above, below : 95 % interval and one-sided chances. runs, better : test manoeuvres, and those with a
+    lower error. worlds : (W,) logarithm of the ratio in each world; `percent_above` gives the others.
     """
 
     mean: float
@@ -230,30 +202,41 @@ class CellDifference:
 
 
 def compare_cells(mine: Sequence[CellErrors], others: Sequence[CellErrors]) -> CellDifference:
-    """Compare cells with others, pair by pair; every pair weighs the same.
+    """Compare cells with others, pair by pair, by logarithms; every pair and every test manoeuvre weighs the same.
 
-    All windows and cells of a test manoeuvre, in its world, are drawn together; the interval holds another training.
+    Draws of the training runs count where there are several; with one, `TRAINING` is assumed.
     """
-    pairs = list(zip(mine, others, strict=True))
     by_world: dict[str, list[tuple[CellErrors, CellErrors]]] = {}
-    for pair in pairs:
+    for pair in zip(mine, others, strict=True):
         by_world.setdefault(pair[0].world, []).append(pair)
-    means = [np.mean([one.errors - other.errors for one, other in same], axis=0) for same in by_world.values()]
-    shares = [len(same) * same[0][0].windows / same[0][0].windows.sum() for same in by_world.values()]
-    values, weights = np.concatenate(means), np.concatenate(shares)
-    training = math.hypot(*(_training_of(side, pairs) for side in zip(*pairs, strict=True)))
-    one = paired_difference(values[None], weights, training)
-    mean, low, high, above, below = (float(number[0]) for number in (one.mean, one.low, one.high, one.above, one.below))
-    worlds = np.array([mean @ share / share.sum() for mean, share in zip(means, shares, strict=True)])
-    return CellDifference(mean, low, high, above, below, len(values), int((values < 0).sum()), worlds)
+    count, values, noise, freedom = len(mine), list[Array](), 0.0, 0.0
+    for pairs in by_world.values():
+        apart = np.array([log_error(one.errors) - log_error(other.errors) for one, other in pairs])
+        seeds, part = np.array([one.seed for one, _ in pairs]), len(pairs) / count
+        draws = np.array([apart[seeds == seed].mean() for seed in np.unique(seeds)])
+        share = max(one.share for one, _ in pairs)
+        variance, known = draw_variance([draws], [1], 1 / share if share > 0 else np.inf, 0)
+        moved = sum(
+            cell.trained for pair in pairs for cell in pair if not np.array_equal(pair[0].errors, pair[1].errors)
+        )
+        noise += part**2 * (float(variance) if known else TRAINING**2 * moved / len(pairs) ** 2)
+        freedom += known
+        values.append(part * apart.mean(axis=0))
+    runs = sum(map(len, values))
+    one = paired_difference(
+        np.concatenate([runs / len(each) * each for each in values])[None], noise, freedom or np.inf
+    )
+    mean, low, high = (percent_above(number[0]) for number in (one.mean, one.low, one.high))
+    worlds = np.array([count / len(by_world[name]) * each.mean() for name, each in zip(by_world, values, strict=True)])
+    better = sum(int((each < 0).sum()) for each in values)
+    return CellDifference(mean, low, high, float(one.above[0]), float(one.below[0]), runs, better, worlds)
 
 
-def _training_of(cells: Sequence[CellErrors], pairs: Sequence[tuple[CellErrors, CellErrors]]) -> float:
-    """Standard error [m] that training alone gives the mean error of one side of pairs."""
-    models: dict[tuple[str, str], list[tuple[float, bool]]] = {}
-    for cell, (one, other) in zip(cells, pairs, strict=True):
-        moved = cell.trained and not np.array_equal(one.errors, other.errors)
-        models.setdefault((cell.world, cell.model), []).append((cell.mean, moved))
-    by_seed = [np.array(seeds, dtype=float).T for seeds in models.values()]  # means, and whether each would change
-    squares = sum(means.mean() ** 2 * moved.sum() for means, moved in by_seed)
-    return training_noise([means for means, _ in by_seed]) * float(np.sqrt(squares)) / len(cells)
+def percent_above(logarithm: float) -> float:
+    """How far above 1 a ratio is [%], from its logarithm."""
+    return float(100 * np.expm1(logarithm))
+
+
+def log_error(errors: Array) -> Array:
+    """Logarithms of errors [m]; below `SMALLEST_ERROR` they count as this one."""
+    return np.log(np.maximum(errors, SMALLEST_ERROR))

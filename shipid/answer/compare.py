@@ -54,9 +54,9 @@ class Comparison:
     names : of the folders. documents : a row per value that differs: path, and a column of text per name.
     errors : a row per other folder, family, method and N_D (0: the physics alone): `cells` that match, and means over
         them, as H `first` and `other` [m], at the horizon `first_end`, `other_end`, and 90 % quantiles `first_end_90`,
-        `other_end_90`; `difference` of H, other less first [m], with its 95 % interval `low`, `high`, `verdict`
-        ("lower", "higher", "identical" to the digit, or empty; corrected for the number of rows), `coverage_first`,
-        `coverage_other`.
+        `other_end_90`; `difference`: by how much H of the other is above [%], with its 95 % interval `low`, `high`,
+        `verdict` ("lower", "higher", "identical" to the digit, or empty; corrected for the number of rows),
+        `coverage_first`, `coverage_other`.
     notes : sentences on what could not be matched, and what the intervals rest on.
     """
 
@@ -214,13 +214,14 @@ def _cell_errors(
     test, cells, known = results.test, [], []
     _, place, counts = np.unique(test.run[windows], return_inverse=True, return_counts=True)
     rows = results.cells.set_index("cell")[["family", "method"]]
-    for cell, foundation in zip(part[f"cell_{side}"], part[f"foundation_{side}"], strict=True):
+    for cell, foundation, seed in zip(part[f"cell_{side}"], part[f"foundation_{side}"], part["seed"], strict=True):
         path = results.paths[str(cell)] if cell else results.physics[str(foundation)]
         errors = position_error(path[:, windows], test.future[:, windows])
         known.append(summarise_errors(errors))
         error = error_of_windows(errors)
         learns = bool(cell) and learns_from_runs(results.plan, *rows.loc[cell])
-        cells.append(CellErrors(str(foundation), np.bincount(place, error) / counts, counts.astype(float), learns))
+        by_run, share = np.bincount(place, error) / counts, int(part["N_D"].iloc[0]) / results.pool
+        cells.append(CellErrors(str(foundation), by_run, counts.astype(float), learns, "", seed, share))
     means = {side: float(np.mean([cell.mean for cell in cells]))}
     means |= {f"{side}_end": float(np.mean([one["end"] for one in known]))}
     means |= {f"{side}_end_90": float(np.mean([one["end_90"] for one in known]))}

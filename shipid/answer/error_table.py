@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, stdtrit
 
-from shipid.evidence import (
-    FEWEST_RUNS,
-    SEED,
-    SIGNIFICANT,
-    Differences,
-    paired_difference,
-    resampled_means,
-    training_noise,
-)
+from shipid.evidence import SMALLEST_ERROR, TRAINING, Differences, draw_variance, log_error, paired_difference
 from shipid.metrics import error_at_horizon, position_error
 from shipid.report.wording import metres_text
 from shipid.study.declared import NO_MODEL
@@ -28,10 +19,9 @@ from shipid.study.results import Results
 Array = NDArray[np.float64]
 Metric = Literal["H", "H_90", "H_end"]
 PHYSICS_ONLY = -1  # place of the physics alone in a term
-SMALLEST_ERROR = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
 ErrorTerm = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or PHYSICS_ONLY
 FEWEST_FOR_LINE = 4  # for a line of H over A
-STEPS_OF_A = 400  # of A from its least to its greatest, in an interval
+STEPS = 200  # of A, or of runs, from the least to the greatest, in an interval
 
 
 @dataclass(frozen=True)
@@ -39,13 +29,15 @@ class ErrorTable:
     """Errors [m] by test manoeuvre.
 
     amounts : N_D, rising. counts : (R,) windows of each test manoeuvre.
-    A : model -> (R,) mean error of the physics alone. H : model -> (amounts, seeds, R) of the prediction.
+    A : model -> (R,) mean error of the physics alone. H : model -> for each amount (draws, R) of the prediction.
+    pool : runs from which those that train are drawn.
     """
 
     amounts: tuple[int, ...]
     counts: Array
     A: Mapping[str, Array]
-    H: Mapping[str, Array]
+    H: Mapping[str, Sequence[Array]]
+    pool: float = np.inf
 
     @property
     def runs(self) -> int:
@@ -57,47 +49,87 @@ class ErrorTable:
         """(R,) share of the windows in each manoeuvre."""
         return np.asarray(self.counts / self.counts.sum())
 
-    @cached_property
-    def noise(self) -> Array:
-        """(amounts,) relative standard error [1] that H of one cell has from training, as a mean over seeds."""
-        by_seed = [values @ self.weights for values in self.H.values()]
-        seeds = max((values.shape[1] for values in by_seed), default=1)
-        each = [training_noise([values[k] for values in by_seed]) for k in range(len(self.amounts))]
-        return np.asarray(np.array(each, dtype=float) / seeds**0.5)
-
-    def by_run(self, model: str, place: int) -> Array:
-        """(R,) error of a model at an amount, mean over seeds, or of its physics alone; `SMALLEST_ERROR` at least.
+    def draws(self, model: str, place: int) -> Array:
+        """(draws, R) errors of a model at an amount, or (1, R) of its physics alone; `SMALLEST_ERROR` at least.
 
         Of the physics that made the data it is 0.
         """
-        errors = self.A[model] if place == PHYSICS_ONLY else self.H[model][place].mean(axis=0)
-        return np.maximum(errors, SMALLEST_ERROR)
+        return np.maximum(self.A[model][None] if place == PHYSICS_ONLY else self.H[model][place], SMALLEST_ERROR)
 
     def mean(self, model: str, place: int) -> float:
-        """Error [m] of a model at an amount, mean over seeds and windows, or of its physics alone."""
-        return float(self.by_run(model, place) @ self.weights)
+        """Error [m] of a model at an amount, mean over draws and windows, or of its physics alone."""
+        return float(self.draws(model, place).mean(axis=0) @ self.weights)
 
     def metres(self, model: str, place: int) -> str:
         """Error of a model at an amount, or of its physics alone, in words."""
         return metres_text(self.mean(model, place))
 
     def interval(self, model: str, place: int) -> tuple[float, float]:
-        """95 % interval [m] of the error of a model at an amount, mean over seeds and windows."""
-        errors = self.compare([[(1.0, model, place)]])
-        return max(float(errors.low[0]), 0.0), float(errors.high[0])
+        """95 % interval [m] of the error of a model at an amount: that of its logarithm (delta method)."""
+        mean, errors = self.mean(model, place), self.draws(model, place).mean(axis=0)
+        by_draw = [np.log(self.draws(model, k) @ self.weights)[:, None] for k in range(len(self.amounts))]
+        noise, freedom = draw_variance(by_draw, self.amounts, self.pool, place)
+        known = (noise, freedom) if freedom else (TRAINING**2 / len(by_draw[place]), np.inf)
+        one = paired_difference((self.runs * self.weights * errors / mean - 1)[None], *known)
+        return mean * float(np.exp(one.low[0])), mean * float(np.exp(one.high[0]))
 
-    def compare(self, differences: Sequence[Sequence[ErrorTerm]]) -> Differences:
-        """Judge sums of errors, each with its factor: `[(1, "none", 0), (-1, "good", 0)]` is what physics saves."""
-        values, training = np.zeros((len(differences), self.runs)), np.zeros(len(differences))
-        for row, terms in enumerate(differences):
-            for factor, model, place in terms:
-                values[row] += factor * self.by_run(model, place)
-                if place != PHYSICS_ONLY:
-                    training[row] += (factor * self.mean(model, place) * self.noise[place]) ** 2
-        return paired_difference(values, self.counts, np.sqrt(training))
+    def compare(
+        self,
+        sums: Sequence[Sequence[ErrorTerm]],
+        plus: Array | float = 0.0,
+        mix: Array | None = None,
+        logs: bool = True,
+    ) -> Differences:
+        """Judge sums of logarithms of errors, each with its factor, or of errors [m] weighted by windows.
+
+        `[(1, "none", 0), (-1, "good", 0)]` is by how much physics lowers the error. mix : (J, sums) factors of the sums
+        in what is judged. plus : is added to it, (J,) or one for all.
+        """
+        weights = np.eye(len(sums)) if mix is None else mix
+        value = log_error if logs else self._weighted
+        values = np.array([self._sum(terms, PHYSICS_ONLY, value).mean(axis=0) for terms in sums])
+        return paired_difference((weights @ values + np.reshape(plus, (-1, 1))), *self.noise(sums, weights, logs))
+
+    def noise(
+        self, sums: Sequence[Sequence[ErrorTerm]], mix: Array | None = None, logs: bool = True
+    ) -> tuple[Array, float]:
+        """Variance (J,) that other draws of runs give what `compare` judges, and its degrees of freedom."""
+        weights = np.eye(len(sums)) if mix is None else mix
+        value = log_error if logs else self._weighted
+        noise, freedom, assumed = np.zeros(len(weights)), 0.0, np.zeros(len(weights))
+        for place in {at for terms in sums for *_, at in terms} - {PHYSICS_ONLY}:
+            mine = [[term for term in terms if term[2] == place] for terms in sums]
+            by_draw = [
+                np.stack([self._sum(terms, k, value).mean(axis=1) for terms in mine], axis=1) @ weights.T
+                for k in range(len(self.amounts))
+            ]
+            variance, freedom = draw_variance(by_draw, self.amounts, self.pool, place)
+            noise += variance
+            sizes = [[f * (1.0 if logs else self.mean(model, place)) for f, model, _ in terms] for terms in mine]
+            each = np.array([np.square(size).sum() for size in sizes])
+            assumed += TRAINING**2 * np.square(weights) @ each / len(by_draw[place])
+        return (noise, freedom) if freedom else (assumed, np.inf)
+
+    def _sum(self, terms: Sequence[ErrorTerm], place: int, value: Callable[[Array], Array]) -> Array:
+        """A sum of errors: (draws, R) of its models at an amount; (1, R) at their own, mean over draws, for none."""
+        of = [
+            factor * value(self.draws(model, at)).mean(axis=0, keepdims=True)
+            if place == PHYSICS_ONLY
+            else factor * value(self.draws(model, place))
+            for factor, model, at in terms
+        ]
+        return np.asarray(sum(of, np.zeros((1 if place == PHYSICS_ONLY else self._drawn(place), self.runs))))
+
+    def _drawn(self, place: int) -> int:
+        """Draws of an amount of data."""
+        return max(len(errors[place]) for errors in self.H.values())
+
+    def _weighted(self, errors: Array) -> Array:
+        """Errors (..., R) times what makes their mean that over windows."""
+        return errors * self.weights * self.runs
 
     def lead(self, rival: str, models: Sequence[str], place: int) -> Differences:
-        """How much lower [m] than a rival's the errors of models are at an amount of data."""
+        """By how much the errors of models are lower than a rival's at an amount of data, as logarithms of ratios."""
         return self.compare([[(1.0, rival, place), (-1.0, model, place)] for model in models])
 
 
@@ -113,20 +145,20 @@ def error_table(
     good = [cell for cell in cells["cell"] if cell in results.paths]
     errors = results.errors if metric == "H" else {cell: of_path(results.paths[cell]) for cell in good}
     amounts = sorted(set(cells["N_D"])) if amounts is None else amounts
-    seeds = sorted(set(cells["seed"]))
+    seeds = {N: sorted(set(cells["seed"][cells["N_D"] == N])) for N in amounts}
     keys = zip(cells["foundation"], cells["N_D"], cells["seed"], strict=True)
     known = dict(zip(keys, cells["cell"], strict=True))
     H = {}
     for name in (*models, NO_MODEL):
-        mine = [[known.get((name, N, seed)) for seed in seeds] for N in amounts]
+        mine = [[known.get((name, N, seed)) for seed in seeds[N]] for N in amounts]
         if all(cell in errors for row in mine for cell in row):
-            H[name] = np.array([[errors[str(cell)] for cell in row] for row in mine])
+            H[name] = [np.array([errors[str(cell)] for cell in row]) for row in mine]
     alone = {
         name: of_path(path)
         for name, path in results.physics.items()
         if name in models and name != NO_MODEL and np.isfinite(path).all()
     }
-    return ErrorTable(tuple(int(N) for N in amounts), results.windows, alone, H)
+    return ErrorTable(tuple(int(N) for N in amounts), results.windows, alone, H, results.pool)
 
 
 def _upper_errors(results: Results, path: Array) -> Array:
@@ -149,7 +181,7 @@ ERRORS_BY_RUN: dict[Metric, Callable[[Results, Array], Array]] = {
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its 95 % interval over test manoeuvres; the interval is not a number where there are too few.
+    """A number with its 95 % interval; the interval is not a number where there are too few test manoeuvres.
 
     limits : least and greatest value that the study covers; a value there is a bound.
     """
@@ -170,111 +202,59 @@ class Estimate:
         return self.value >= self.limits[1]
 
 
-def _quantile_estimate(value: Array, drawn: Array, runs: int, limits: tuple[float, float]) -> Estimate:
-    """Quantiles of resampled values, further out where manoeuvres are few (expanded percentiles; Hesterberg 2015)."""
-    level = float(ndtr(stdtrit(runs - 1, SIGNIFICANT) * (runs / (runs - 1)) ** 0.5)) if runs >= FEWEST_RUNS else np.nan
-    low, high = np.quantile(drawn, [level, 1 - level]) if runs >= FEWEST_RUNS else (np.nan, np.nan)
-    middle, least, greatest = (
-        next((end for end in limits if np.isclose(end, number)), float(number)) for number in (value[0], low, high)
-    )
-    return Estimate(middle, least, greatest, limits)
+def _undecided_range(values: Array, differences: Differences) -> tuple[float, float]:
+    """Least and greatest of rising values (J,) at which a test cannot tell a falling difference from 0 (Fieller 1954).
 
-
-def _with_other_trainings(drawn: Array, noise: Array) -> Array:
-    """Resampled means (B, ...) as other trainings would give them: each times a factor of relative spread `noise`."""
-    return drawn * np.exp(np.random.default_rng(SEED).standard_normal(drawn.shape) * noise)
+    A step more on both sides, since the ends lie between two values.
+    """
+    if np.isnan(differences.low).any():
+        return np.nan, np.nan
+    open_below, open_above = np.flatnonzero(differences.low <= 0), np.flatnonzero(differences.high >= 0)
+    low = values[max(open_below[0] - 1, 0)] if len(open_below) else values[-1]
+    high = values[min(open_above[-1] + 1, len(values) - 1)] if len(open_above) else values[0]
+    return float(low), float(high)
 
 
 def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate | None:
     """Accuracy A [m] at which compensated physics is as good as none, at the amount of this place.
 
     A line ln H over ln A, by least squares, crosses H of `none`; values beyond the models tried are bounds. The
-    interval holds at least every A at which Student's test over manoeuvres cannot tell the line from `none`. None with
-    fewer than four models, or where all have the same A.
+    interval holds every A at which the test cannot tell the line from `none`, and A of every model that `lead` does not
+    show to be better, or worse, as the line has it. None with fewer than four models, or where all have the same A.
     """
-    if len(models) < FEWEST_FOR_LINE:
+    A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])
+    if len(models) < FEWEST_FOR_LINE or np.isclose(A.min(), A.max()):
         return None
-    values = np.stack(
-        [
-            [table.by_run(model, PHYSICS_ONLY) for model in (*models, models[0])],
-            [table.by_run(model, place) for model in (*models, NO_MODEL)],
-        ]
-    )  # (A or H, models and none, R)
-    noise = np.array([[0.0], [float(table.noise[place])]])
-    means, drawn = values @ table.weights, _with_other_trainings(resampled_means(values, table.counts), noise)
-    A = means[0, :-1]
-    limits = float(A.min()), float(A.max())
-    if np.isclose(*limits):
-        return None
-    estimate = _quantile_estimate(
-        _crossing_of_line(means[None], limits), _crossing_of_line(drawn, limits), table.runs, limits
-    )
-    if table.runs < FEWEST_RUNS:
-        return estimate
-    low, high = _undecided_range(values, table.counts, limits)
-    return replace(estimate, low=min(estimate.low, low), high=max(estimate.high, high))
-
-
-def _undecided_range(values: Array, counts: Array, limits: tuple[float, float]) -> tuple[float, float]:
-    """Least and greatest A within limits at which Student's test, by the jackknife, cannot tell the line from none.
-
-    values : (2, models and none, R).
-    """
-    runs, A = len(counts), np.geomspace(*limits, STEPS_OF_A)
-    left = np.vstack([counts, counts * (1 - np.eye(runs))])  # all manoeuvres, and all without each in turn
-    centre, slope, margin = _line_of_logs(np.moveaxis(values @ (left / left.sum(axis=1, keepdims=True)).T, -1, 0))
-    ahead = margin[:, None] - slope[:, None] * (np.log(A) - centre[:, None])  # of none, (1 + R, A)
-    wide = stdtrit(runs - 1, 1 - SIGNIFICANT) * np.sqrt(runs - 1) * ahead[1:].std(axis=0)
-    open_below, open_above = np.flatnonzero(ahead[0] <= wide), np.flatnonzero(ahead[0] >= -wide)
-    least = A[max(open_below[0] - 1, 0)] if len(open_below) else limits[1]  # where the least A is not shown to pay
-    most = A[min(open_above[-1] + 1, STEPS_OF_A - 1)] if len(open_above) else limits[0]
-    return float(least), float(most)
-
-
-def _line_of_logs(values: Array) -> tuple[Array, Array, Array]:
-    """Line of ln H over ln A: middle of ln A, slope, and how far ln H of none is above the mean of the models.
-
-    values : (B, 2, models and none); each result (B,).
-    """
-    logs = np.log(values)
-    x, y, none = logs[:, 0, :-1], logs[:, 1, :-1], logs[:, 1, -1]
-    middle = x.mean(axis=1)
-    centred = x - middle[:, None]
-    slope: Array = (centred * y).sum(axis=1) / np.maximum((centred**2).sum(axis=1), 1e-12)
-    return middle, slope, none - y.mean(axis=1)
-
-
-def _crossing_of_line(values: Array, limits: tuple[float, float]) -> Array:
-    """Where the line through (A, H) of models reaches the H of none, within limits; values (B, 2, models and none)."""
-    middle, slope, margin = _line_of_logs(values)
-    low, high = np.log(limits)
-    rising = slope > 1e-9
-    at = middle + np.divide(margin, slope, out=np.zeros_like(margin), where=rising)
-    flat = np.where(margin > 0, high, low)  # no better for being more accurate: all pay, or none does
-    return np.asarray(np.exp(np.clip(np.where(rising, at, flat), low, high)))
+    limits, middle = (float(A.min()), float(A.max())), float(np.log(A).mean())
+    tilt = (np.log(A) - middle) / np.square(np.log(A) - middle).sum()
+    margins = [(1.0, NO_MODEL, place), *((-1 / len(models), model, place) for model in models)]
+    slopes = [(float(share), model, place) for share, model in zip(tilt, models, strict=True)]
+    harder = [(1 / len(models), model, PHYSICS_ONLY) for model in models]  # all A rise where manoeuvres are harder
+    margin, slope, alone = table.compare([margins, slopes, harder]).mean
+    tried = np.geomspace(*limits, STEPS)
+    mix = np.stack([np.ones(STEPS), middle - np.log(tried), np.full(STEPS, slope)], axis=1)
+    low, high = _undecided_range(tried, table.compare([margins, slopes, harder], -slope * alone, mix))
+    at = middle + margin / slope if slope > 1e-9 else np.copysign(np.inf, margin)  # flat: all pay, or none does
+    value = float(np.exp(np.clip(at, *np.log(limits))))
+    value = next((end for end in limits if np.isclose(end, value)), value)
+    lead = table.lead(NO_MODEL, models, place)
+    low, high = min([low, *A[lead.low <= 0]]), max([high, *A[lead.high >= 0]])
+    return Estimate(value, min(low, value), max(high, value), limits)
 
 
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
     """Runs that no physics needs for the error that a model has with the amount of this place.
 
     Interpolated along ln H over ln N_D; where more data made it worse, the best so far counts. The interval holds every
-    amount at which the test cannot tell the two.
+    number of runs at which the test cannot tell the two.
     """
-    rivals = np.stack([table.by_run(NO_MODEL, k) for k in range(len(table.amounts))])
-    values = np.vstack([rivals, table.by_run(model, place)[None]])
-    limits = float(table.amounts[0]), float(table.amounts[-1])
-    noise = np.array([*table.noise, table.noise[place]])
-    mean, drawn = (values @ table.weights)[None], _with_other_trainings(resampled_means(values, table.counts), noise)
     amounts = np.array(table.amounts, dtype=float)
-    estimate = _quantile_estimate(_runs_needed(amounts, mean), _runs_needed(amounts, drawn), table.runs, limits)
-    differences = table.compare([[(1.0, NO_MODEL, k), (-1.0, model, place)] for k in range(len(amounts))])
-    alike = amounts[(differences.above > SIGNIFICANT) & (differences.below > SIGNIFICANT)]
-    return replace(estimate, low=min([estimate.low, *alike]), high=max([estimate.high, *alike]))
-
-
-def _runs_needed(amounts: Array, values: Array) -> Array:
-    """Amounts (B,) at which curves reach a level, along their logarithms; values (B, amounts and level)."""
-    logs = np.log(values)
-    curves = np.minimum.accumulate(logs[:, :-1], axis=1)[:, ::-1]  # rising, as `interp` takes them
-    least_first = np.log(amounts)[::-1]
-    return np.exp([np.interp(goal, curve, least_first) for curve, goal in zip(curves, logs[:, -1], strict=True)])
+    ends, limits = np.log(amounts), (float(amounts[0]), float(amounts[-1]))
+    tried = np.geomspace(*limits, STEPS)
+    shares = np.stack([np.interp(np.log(tried), ends, one) for one in np.eye(len(amounts))], axis=1)
+    sums = [[(1.0, NO_MODEL, k)] for k in range(len(amounts))]
+    ahead = table.compare([*sums, [(-1.0, model, place)]], 0.0, np.column_stack([shares, np.ones(STEPS)]))
+    curve = np.minimum.accumulate(ahead.mean)  # falling
+    value = float(np.interp(0.0, curve[::-1], tried[::-1]))
+    low, high = _undecided_range(tried, ahead)
+    return Estimate(value, min(low, value), max(high, value), limits)

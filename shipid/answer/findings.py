@@ -1,8 +1,8 @@
 """Findings of a study: which claims it judges, R1-R4 at full scale (method, section 5), and B1-B2 on bands.
 
-Rules and their error rates: docs/findings.md. "Shown" is a paired difference over test manoeuvres whose 95 % interval
-is free of 0 (`shipid.evidence`). The width of a band is its mean radius [m] over the horizon, a mean over windows of
-each test manoeuvre, and is judged as errors are.
+Rules and their error rates: docs/findings.md. "Shown" is a paired difference of logarithms over test manoeuvres whose
+95 % interval is free of 0 (`shipid.evidence`); R3 and B1, on metres, take differences in metres. The width of a band
+is its mean radius [m] over the horizon, a mean over windows of each test manoeuvre, and is judged as errors are.
 """
 
 from __future__ import annotations
@@ -32,10 +32,18 @@ from shipid.answer.verdict import (
     least_to_greatest,
     leave_undecided,
     quoted_model,
+    ratio_with_interval,
     too_few_manoeuvres,
     verdict_of,
 )
-from shipid.evidence import Differences, all_significant, any_significant, paired_difference, share_interval
+from shipid.evidence import (
+    Differences,
+    all_significant,
+    any_significant,
+    log_error,
+    paired_difference,
+    share_interval,
+)
 from shipid.metrics import coverage_share, position_error
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
@@ -78,7 +86,7 @@ def _judge_gain(rivals: Rivals) -> Judgement:
     table, last, models = rivals.table, rivals.last, (rivals.good, rivals.bad)
     gains = table.compare([[(1.0, model, PHYSICS_ONLY), (-1.0, model, last)] for model in models])
     parts = [
-        f"{m} {table.metres(m, PHYSICS_ONLY)} -> {table.metres(m, last)}, {difference_with_interval(gains, k)} less"
+        f"{m} {table.metres(m, PHYSICS_ONLY)} -> {table.metres(m, last)}, {ratio_with_interval(gains, k)} times less"
         for k, m in enumerate(models)
     ]
     good, bad = (table.mean(model, last) / table.mean(model, PHYSICS_ONLY) for model in models)
@@ -90,11 +98,11 @@ def _judge_equal(rivals: Rivals) -> Judgement:
     table, last, (less, more) = rivals.table, rivals.last, rivals.by_accuracy
     apart = all_significant(table.compare([[(1.0, more, PHYSICS_ONLY), (-1.0, less, PHYSICS_ONLY)]]).above)
     sides = [(less, more)] if apart else [(less, more), (more, less)]
-    about = table.compare([[(1 + ABOUT, one, PHYSICS_ONLY), (-1.0, other, last)] for one, other in sides])
-    by = table.compare([[(1.0, less, PHYSICS_ONLY), (-1.0, more, last)]])
+    terms = [[(1.0, one, PHYSICS_ONLY), (-1.0, other, last)] for one, other in sides]
+    about, by = table.compare(terms, np.log(1 + ABOUT)), table.compare([[(-f, *of) for f, *of in terms[0]]])  # type: ignore[misc]
     evidence = (
         f"inaccurate and compensated {table.metres(more, last)}, accurate alone {table.metres(less, PHYSICS_ONLY)}: "
-        f"{difference_with_interval(by)} less{'' if apart else f'; {EQUAL_A}'}"
+        f"{ratio_with_interval(by)} times{'' if apart else f'; {EQUAL_A}'}"
     )
     decided = verdict_of(all_significant(about.above), all_significant(about.below))
     return decided, evidence, {"H inaccurate / A accurate": table.mean(more, last) / table.mean(less, PHYSICS_ONLY)}
@@ -103,7 +111,7 @@ def _judge_equal(rivals: Rivals) -> Judgement:
 def _judge_gap(rivals: Rivals) -> Judgement:
     table, last, (less, more) = rivals.table, rivals.last, rivals.by_accuracy
     gap = [(1.0, more, PHYSICS_ONLY), (-1.0, less, PHYSICS_ONLY)]
-    gaps = table.compare([[*gap, (sign, more, last), (-sign, less, last)] for sign in (-1.0, 1.0)])
+    gaps = table.compare([[*gap, (sign, more, last), (-sign, less, last)] for sign in (-1.0, 1.0)], logs=False)
     before, after = (abs(table.mean(rivals.bad, at) - table.mean(rivals.good, at)) for at in (PHYSICS_ONLY, last))
     counts = 0 if gaps.mean[0] < gaps.mean[1] else 1  # the gap of H has the sign of that of A, or not
     evidence = (
@@ -133,10 +141,14 @@ def _judge_worst(rivals: Rivals) -> Judgement:
 
 
 def _lead_of_others(table: ErrorTable, pure: Array, others: list[Array]) -> Differences:
-    """How much smaller [m] than errors (T, R) without physics those of other predictors are, step by step."""
-    noise = [np.hypot(pure @ table.weights, error @ table.weights) for error in others]
-    ahead = np.concatenate([pure - error for error in others])
-    return paired_difference(ahead, table.counts, float(table.noise[-1]) * np.concatenate(noise))
+    """How much smaller than errors (T, R) without physics those of other predictors are, step by step, as logarithms.
+
+    Other draws of runs count as for the model that they move most.
+    """
+    last = len(table.amounts) - 1
+    noise = [table.noise([[(1.0, NO_MODEL, last), (-1.0, model, last)]]) for model in table.H if model != NO_MODEL]
+    ahead = np.concatenate([log_error(pure) - log_error(error) for error in others])
+    return paired_difference(ahead, *max(noise, key=lambda known: float(known[0][0])))
 
 
 FULL_SCALE_RULES: dict[str, ClaimRule] = {
@@ -241,7 +253,7 @@ def _width_table(errors: ErrorTable, cells: pd.DataFrame, widths: Mapping[str, A
     """Widths [m] of cells by test manoeuvre in place of H."""
     amounts = tuple(N for N in errors.amounts if N in set(cells["N_D"]))
     H = {
-        str(name): np.array([[widths[cell] for cell in mine["cell"][mine["N_D"] == N]] for N in amounts])
+        str(name): [np.array([widths[cell] for cell in mine["cell"][mine["N_D"] == N]]) for N in amounts]
         for name, mine in cells.sort_values("seed", kind="stable").groupby("foundation")
     }
     return replace(errors, amounts=amounts, H=H)
@@ -257,7 +269,7 @@ def _judge_widths(widths: Widths) -> Judgement:
         apart = all_significant(table.compare([[(1.0, bad, PHYSICS_ONLY), (-1.0, good, PHYSICS_ONLY)]]).above)
         evidence = (
             f"at N_D = {table.amounts[last]} the mean radius of the band is {table.metres(bad, last)} "
-            f"for {bad}, {table.metres(good, last)} for {good}: {difference_with_interval(wider)} more"
+            f"for {bad}, {table.metres(good, last)} for {good}: {ratio_with_interval(wider)} times"
             f"{'' if apart else f'; {EQUAL_A}'}{hold}"
         )
         decided = verdict_of(apart and all_significant(wider.above), apart and any_significant(wider.below))

@@ -1,8 +1,8 @@
 """Findings S1-S7 (method, section 4): verdicts on the map H(A, N_D) of a simulated study.
 
 Rules and their error rates: docs/findings.md. Taken over the members of the moderate and the high family with a result
-in every cell. "Shown" is a paired difference over test manoeuvres whose 95 % interval is free of 0
-(`shipid.evidence`). The thresholds are free: the paper gives none.
+in every cell. "Shown" is a paired difference of logarithms, in S3 of metres, over test manoeuvres whose
+95 % interval is free of 0 (`shipid.evidence`). The thresholds are free: the paper gives none.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from shipid.answer.error_table import PHYSICS_ONLY, SMALLEST_ERROR, ErrorTable, ErrorTerm, error_table
+from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, error_table
 from shipid.answer.verdict import (
     ClaimRule,
     ClaimVerdict,
@@ -27,6 +27,8 @@ from shipid.answer.verdict import (
     leave_undecided,
     model_list,
     quoted_model,
+    ratio_with_interval,
+    stricter_list,
     too_few_manoeuvres,
     verdict_of,
     weakest_verdict,
@@ -35,10 +37,12 @@ from shipid.evidence import (
     FEWEST_MODELS,
     FEWEST_RUNS,
     SIGNIFICANT,
+    SMALLEST_ERROR,
     Differences,
     all_significant,
     any_significant,
     doubling_weights,
+    log_error,
     order_chance,
     paired_difference,
     partial_conjunction,
@@ -105,10 +109,10 @@ def simulation_findings(results: Results, families: Iterable[str | None]) -> lis
     return judge_claims(SIMULATION_RULES, grid, too_few_manoeuvres(by_mean.runs), left_out)
 
 
-def _difference_range(differences: Differences) -> str:
-    """The least and the greatest of some differences, with their intervals."""
+def _ratio_range(differences: Differences) -> str:
+    """The least and the greatest of some ratios, with their intervals."""
     ends = dict.fromkeys((int(differences.mean.argmin()), int(differences.mean.argmax())))
-    return " to ".join(difference_with_interval(differences, index) for index in ends)
+    return " to ".join(ratio_with_interval(differences, index) for index in ends)
 
 
 def _judge_lead(grid: ErrorGrid) -> Judgement:
@@ -119,12 +123,12 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     ahead = np.array([partial_conjunction(lead.above, most) for lead in leads])
     behind = np.array([partial_conjunction(lead.below, most) for lead in leads])
     keeps = verdict_of(all_significant(ahead), any_significant(behind))
-    won = [int(which_significant(lead.above).sum()) for lead in leads]
+    won = [int((lead.above <= SIGNIFICANT).sum()) for lead in leads]
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
         f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown "
-        f"to beat no physics ({grid.table.metres(NO_MODEL, 0)}), which has an error larger by "
-        f"{_difference_range(leads[0])}; that most keep the lead is {keeps}: {later}"
+        f"to beat no physics{stricter_list(moderate, leads[0].above)} ({table.metres(NO_MODEL, 0)}), whose error is "
+        f"{_ratio_range(leads[0])} times theirs; that most keep the lead is {keeps}: {later}"
     )
     numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
     return weakest_verdict((begins, keeps)), evidence, numbers
@@ -138,8 +142,8 @@ def _judge_fall(grid: ErrorGrid) -> Judgement:
     end = len(weights) - 1
     left = float(np.median([grid.table.mean(model, end) / grid.table.mean(model, 0) for model in models]))
     evidence = (
-        f"H is shown to fall for {fallen.sum() or 'none'} of {len(models)} models; twice the runs lower it by "
-        f"{_difference_range(falls)}; N_D = {last} leaves {percent_text(left)} of the error at {first} in the median"
+        f"H is shown to fall for {fallen.sum() or 'none'} of {len(models)} models; twice the runs divide it by "
+        f"{_ratio_range(falls)}; N_D = {last} leaves {percent_text(left)} of the error at {first} in the median"
     )
     if not fallen.all():
         evidence += f"; not shown for: {model_list(m for m, good in zip(models, fallen, strict=True) if not good)}"
@@ -176,7 +180,7 @@ def trend_over_accuracy(table: ErrorTable, models: Sequence[str], *, flattens: b
     if flattens:
         each.append([*each[0], *((-factor, model, place) for factor, model, place in each[-1])])
         order = np.vstack([order, order[0] - order[-1]])
-    slopes = table.compare(each)
+    slopes = table.compare(each, logs=False)
     risen, fallen = np.maximum(slopes.above, order_chance(A, order)), np.maximum(slopes.below, order_chance(A, -order))
     words = f"{least_to_greatest(f'{min(rises):.2f}', f'{max(rises):.2f}')} over N_D ({len(A)} models)"
     return AccuracyTrend(slopes, verdict_of(all_significant(risen), any_significant(fallen)), words, min(rises))
@@ -210,7 +214,7 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         f"share of high models shown to lead at N_D = {grid.table.amounts[-1]}": float(better.mean()),
         f"share of high models shown to be worse at N_D = {grid.table.amounts[-1]}": float(worse.mean()),
     }
-    orders, moves = table.H[NO_MODEL].shape[1], verdict_of(False, False)
+    orders, moves = max(map(len, table.H[NO_MODEL])), verdict_of(False, False)
     if orders < FEWEST_ORDERS:
         lacks = f"fluctuation needs {FEWEST_ORDERS} nested orders (grid seeds), the study has"
         evidence += f"; {lacks} {orders} {plural_word(orders, 'seed')}"
@@ -235,13 +239,15 @@ def _chance_of_mean(values: Array) -> float:
 
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:
     """(seeds,) distance of H from its mean over seeds, relative to it, in the mean over amounts and models."""
-    H = np.maximum([table.H[model] @ table.weights for model in models], SMALLEST_ERROR)
+    most = max(map(len, table.H[models[0]]))
+    errors = [[one @ table.weights for one in table.H[model] if len(one) == most] for model in models]
+    H = np.maximum(errors, SMALLEST_ERROR)
     return np.asarray(np.abs(H / H.mean(axis=2, keepdims=True) - 1).mean(axis=(0, 1)))
 
 
 def _judge_metric(grid: ErrorGrid) -> Judgement:
     grids = (grid, replace(grid, table=grid.by_90))
-    both = [np.concatenate([one.table.H[m] @ one.table.weights for m in grid.table.H]).ravel() for one in grids]
+    both = [np.concatenate([H @ one.table.weights for m in grid.table.H for H in one.table.H[m]]) for one in grids]
     alike = rank_correlation(*both)
     verdicts = {key: [SIMULATION_RULES[key].decide(one)[0] for one in grids] for key in FIRST_FOUR}
     changed = {key: pair for key, pair in verdicts.items() if pair[0] != pair[1]}
@@ -271,10 +277,11 @@ def _judge_savings(grid: ErrorGrid) -> Judgement:
     for what, pairs in kinds.items():
         texts, terms, also = zip(*pairs, strict=True)
         first, second = grid.table.compare(terms), grid.table.compare(also)
-        better = which_significant(np.maximum(first.above, second.above))
-        sure = [text for text, shown in zip(texts, better, strict=True) if shown]
+        chances = np.maximum(first.above, second.above)
+        sure = [text for text, shown in zip(texts, which_significant(chances), strict=True) if shown]
         parts.append(verdict_of(bool(sure), all_significant(first.below)))
-        text = f"{len(sure)} of {len(pairs)} comparisons show a moderate model better than {what}"
+        text = f"{(chances <= SIGNIFICANT).sum()} of {len(pairs)} comparisons show a moderate model better than {what}"
+        text += stricter_list(texts, chances, names=False)
         examples.append(text + (f", such as {sure[0]}" if sure else ""))
         numbers[f"share shown to beat {what}"] = len(sure) / len(pairs)
     return weakest_verdict(parts), "; ".join(examples), numbers
@@ -347,7 +354,8 @@ def _judge_paths(grid: ErrorGrid) -> Judgement:
 
 def compare_roughness(true: Array, pure: Array, together: Array, counts: Array) -> tuple[Verdict, dict[str, float]]:
     """Verdict on S7 from the roughness (R,) [m] of true paths, those without physics and cooperative ones, by run."""
-    differences = paired_difference(np.stack([pure - ROUGH * true, ROUGH * true - together]), counts)
+    pure_, true_, together_ = (log_error(values) for values in (pure, ROUGH * true, together))
+    differences = paired_difference(np.stack([pure_ - true_, true_ - together_]))
     of = {"no physics": pure, "cooperative models": together, "true paths": true}
     numbers = {f"roughness of {what} [m]": float(values @ counts / counts.sum()) for what, values in of.items()}
     return verdict_of(all_significant(differences.above), any_significant(differences.below)), numbers

@@ -11,7 +11,7 @@ import pandas as pd
 
 from shipid.arguments import as_path, check_class
 from shipid.errors import DataError
-from shipid.evidence import CellErrors, compare_cells, world_interval
+from shipid.evidence import CellErrors, compare_cells, percent_above, world_interval
 from shipid.metrics import PREDICTION_ERRORS, error_of_windows, position_error, summarise_errors
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import learns_from_runs, verdict_method
@@ -91,7 +91,10 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
         }
         if (cell := row["cell"]) in results.paths:
             learns = learns_from_runs(results.plan, row["family"], row["method"])
-            kept["errors"] = CellErrors(row["foundation"], results.errors[cell], results.windows, learns, world)
+            errors, share = results.errors[cell], row["N_D"] / results.pool
+            kept["errors"] = CellErrors(
+                row["foundation"], errors, results.windows, learns, world, int(row["seed"]), share
+            )
         rows.append(kept)
     cells = pd.DataFrame(rows)
     return pd.concat([cells, *(_rival_cells(results, one, cells) for one in kept_predictions(results))])
@@ -119,10 +122,10 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     """Compare methods by condition, family and N_D; cells as of `method_cells`, of one or several worlds.
 
     H_end, H_end_90, H, H_90 [m], seconds [s] and trials are means over the cells of a method that have a result;
-    `failed` counts the others, `missing` also cells that only other methods have. `difference` is H less that of
-    `reference` over the `pairs` of cells in which both have one, `low`, `high` its 95 % interval (`compare_cells`);
-    `better` counts test runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the difference over
-    worlds, with Student's interval.
+    `failed` counts the others, `missing` also cells that only other methods have. `difference` is by how much H is
+    above that of `reference` [%] over the `pairs` of cells in which both have one, `low`, `high` its 95 % interval
+    (`compare_cells`); `better` counts test runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the
+    difference over worlds, with Student's interval.
     """
     frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
@@ -162,7 +165,7 @@ def _difference_row(mine: ErrorsByCell, others: ErrorsByCell) -> dict[str, Any]:
     if not keys:
         return {"pairs": 0, "runs": 0, "better": 0, "worlds": 0}
     one = compare_cells([mine[key] for key in keys], [others[key] for key in keys])
-    low, high = world_interval(one.worlds)
+    low, high = map(percent_above, world_interval(one.worlds))
     row = {"pairs": len(keys), "difference": one.mean, "low": one.low, "high": one.high, "runs": one.runs}
     row |= {"better": one.better, "worlds": len(one.worlds), "world_low": low, "world_high": high}
-    return row | {"least": float(one.worlds.min()), "greatest": float(one.worlds.max())}
+    return row | {"least": percent_above(one.worlds.min()), "greatest": percent_above(one.worlds.max())}

@@ -17,9 +17,10 @@ from shipid.answer.verdict import (
     length_with_interval,
     model_list,
     quoted_model,
+    stricter_list,
     too_few_manoeuvres,
 )
-from shipid.evidence import Differences, paired_difference, which_significant
+from shipid.evidence import SIGNIFICANT, Differences, log_error, paired_difference
 from shipid.metrics import error_of_windows
 from shipid.report.wording import counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
@@ -98,11 +99,14 @@ class AnswerCase:
         return length_with_interval(error, *(table.interval(model, self.ends[amount]) if known else (np.nan, np.nan)))
 
     def sides(self, models: Sequence[str], differences: Differences) -> list[list[str]]:
-        """Models shown to be better (above 0), to be worse, and the others; by sign alone with too few manoeuvres."""
+        """Models shown to be better (above 0), to be worse, and the others, each by its own test.
+
+        By sign alone with too few manoeuvres.
+        """
         if too_few_manoeuvres(self.table.runs):
             above, below = differences.mean > 0, differences.mean < 0
         else:
-            above, below = which_significant(differences.above), which_significant(differences.below)
+            above, below = differences.above <= SIGNIFICANT, differences.below <= SIGNIFICANT
         return [list(np.array(models)[chosen]) for chosen in (above, below, ~(above | below))]
 
 
@@ -187,9 +191,9 @@ def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
     limits, counts = {}, {}
     for amount, place in case.ends.items():
         models = [str(name) for name in case.with_physics(amount)["model"] if name in case.table.H]
-        sides = case.sides(models, case.table.lead(NO_MODEL, models, place))
-        counts[amount] = _count_of_better(models, *sides)
-        if limit := _limit_of_accuracy(case, place, *sides[:2]):
+        lead = case.table.lead(NO_MODEL, models, place)
+        counts[amount] = _count_of_better(models, lead, case.sides(models, lead))
+        if limit := _limit_of_accuracy(case, place):
             limits[amount] = limit
     for words in (limits, counts):
         alike = len(words) == len(case.ends) == 2 and len(set(words.values())) == 1
@@ -198,22 +202,26 @@ def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
             yield f"With {ends if alike else amount} {plural_word(max(words) if alike else amount, 'run')} {part}."
 
 
-def _count_of_better(models: Sequence[str], better: list[str], worse: list[str], unknown: list[str]) -> str:
+def _count_of_better(models: Sequence[str], lead: Differences, sides: Sequence[list[str]]) -> str:
     """How many physics models do better than none, and which do worse or cannot be told."""
+    better, worse, unknown = sides
     count = f"{len(better) or 'none'} of {len(models)}"
     if len(better) == len(models) > 1:
         count = "both" if len(models) == 2 else f"all {len(models)}"
     verb = plural_word(len(better), "does", "do") if better else "is shown to do"
-    words = [f"{count} physics models {verb} better than no physics"]
-    words += [f"{model_list(worse)} {plural_word(len(worse), 'does', 'do')} worse"] if worse else []
+    words = [f"{count} physics models {verb} better than no physics{stricter_list(models, lead.above)}"]
+    if worse:
+        words.append(
+            f"{model_list(worse)} {plural_word(len(worse), 'does', 'do')} worse{stricter_list(models, lead.below)}"
+        )
     words += [f"for {model_list(unknown)} the test cannot tell"] if unknown else []
     return "; ".join(words)
 
 
-def _limit_of_accuracy(case: AnswerCase, place: int, better: list[str], worse: list[str]) -> str:
-    """Up to which error A physics pays; empty where the models that are shown to do otherwise contradict it."""
+def _limit_of_accuracy(case: AnswerCase, place: int) -> str:
+    """Up to which error A physics pays; empty where no A is shown to pay, or not to."""
     limit = break_even(case.table, case.fixed_physics(), place)
-    if limit is None or not (better or worse) or (limit.above and worse) or (limit.below and better):
+    if limit is None or (limit.low <= limit.limits[0] and limit.high >= limit.limits[1]):
         return ""
     bounds, A = _bounds(limit, _two_digits), "its error over the horizon, A,"
     if limit.above:
@@ -297,10 +305,10 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         )
     constant = f"constant u, v, r (H {metres_text(float(case.results.naive.mean()))})"
     if models:
-        errors = np.stack([table.by_run(name, last) for name in models])
-        ahead = case.results.by_run(error_of_windows(case.results.naive)) - errors
-        noise = errors @ table.weights * table.noise[last]
-        sides = case.sides(models, paired_difference(ahead, table.counts, noise))
+        naive = log_error(case.results.by_run(error_of_windows(case.results.naive)))
+        ahead = naive - np.stack([log_error(table.draws(name, last)).mean(axis=0) for name in models])
+        noise = table.noise([[(1.0, name, last)] for name in models])
+        sides = case.sides(models, paired_difference(ahead, *noise))
         yield from _sentences_on_sides(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
         if len(sides[0]) == len(models):
             yield f"With {counted_text(largest, 'run')} every compared model beats {constant}."
@@ -326,13 +334,12 @@ def _how_to_read(case: AnswerCase) -> Iterator[str]:
     if note := too_few_manoeuvres(runs):
         yield f"{note[0].upper()}{note[1:]}: every comparison here holds on this test and may not on another."
         return
-    yield (
-        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} of one world. Models are compared by "
-        "H. A test of several models is corrected for their number (Holm): one that a short list names may be missing "
-        "in a longer one."
+    drawn = max((len(errors[0]) for errors in case.table.H.values()), default=1)
+    draws = (
+        f"and {drawn} draws of {counted_text(amounts[0], 'training run')}: what other runs of the same kind would give"
     )
-    if len(amounts) > 1 and case.results.cells["seed"].nunique() == 1:
-        yield (
-            f"One seed drew the training runs. With other draws of {counted_text(amounts[0], 'run')} the errors may "
-            "lie outside the brackets: more grid.seeds would show it."
-        )
+    alone = "of one draw of training runs: errors with other draws may lie outside"
+    yield (
+        f"Brackets are 95 % intervals over {counted_text(runs, 'test manoeuvre')} {draws if drawn > 1 else alone}. "
+        "Models are compared run by run, by the logarithm of H."
+    )

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
-from shipid.evidence import FEWEST_RUNS, Differences
+from shipid.evidence import FEWEST_RUNS, SIGNIFICANT, Differences, which_significant
 from shipid.report.content import model_text
 from shipid.report.wording import counted_text, difference_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
@@ -83,8 +84,23 @@ def length_with_interval(value: float, low: float, high: float) -> str:
 
 
 def difference_with_interval(differences: Differences, index: int = 0) -> str:
-    """Return a difference with its 95 % interval, if it has one."""
+    """Return a difference [m] with its 95 % interval, if it has one."""
     return length_with_interval(*(float(ends[index]) for ends in (differences.mean, differences.low, differences.high)))
+
+
+def ratio_with_interval(differences: Differences, index: int = 0) -> str:
+    """Return a ratio, whose logarithm is one of some differences, with its 95 % interval, if it has one."""
+    value, low, high = np.exp([differences.mean[index], differences.low[index], differences.high[index]])
+    return f"{value:.2f}" + (f" [{low:.2f}, {high:.2f}]" if np.isfinite([low, high]).all() else "")
+
+
+def stricter_list(models: Iterable[str], chances: NDArray[np.float64], *, names: bool = True) -> str:
+    """Say which models are shown after Holm's correction, or how many, where those are fewer than by single tests."""
+    shown = which_significant(chances)
+    if shown.sum() == (chances <= SIGNIFICANT).sum():
+        return ""
+    which = model_list(np.array(list(models))[shown]) if names and shown.any() else str(shown.sum() or "none")
+    return f", each by its own test; corrected for their number (Holm), {which}"
 
 
 def least_to_greatest(*numbers: str) -> str:

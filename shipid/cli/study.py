@@ -235,7 +235,7 @@ def study_score(
             mine = table[table["method"].eq(label)].iloc[0]
             end, end_90, H = (f"{mine[name]:.4g} m" for name in ("H_end", "H_end_90", "H"))
             words = f"{label}: at the horizon {end}, nine in ten below {end_90}, H {H}"
-            answer.say(f"{words}\nothers, and their H less this one, with its 95 % interval over test runs:")
+            answer.say(f"{words}\nothers, and by how many % their H is above this one, with its 95 % interval:")
             answer.records(label, table, heads | {"better": "better runs"}, shown=table[table["method"].ne(label)])
     with show_steps() as say:
         shipid.write_pages(folder, say)
@@ -285,7 +285,7 @@ def _show_matched(compared: Comparison, answer: Answer) -> DataFrame:
     answer.say(words, folders=compared.names)
     answer.say(
         f"error at the horizon [m] and H [m], its mean over the horizon, of {first} and of the other run, and the "
-        f"difference of H, the other less {first}, with its 95 % interval:"
+        f"difference of H [%], by how much the other is above {first}, with its 95 % interval:"
     )
     heads = {"folder": "other run"} | CELL
     bands = {"coverage_first": f"in band of {first}", "coverage_other": "of the other"}

@@ -51,7 +51,7 @@ def _fast_growth(fast: FastMotion, rows: Sequence[NamedExpressions]) -> MX:
     series = [ca.vertcat(*(row[name] for row in rows)) for name in MOTIONS]
     filters = [ca.DM(one) for one in fast_filters(len(rows))]
     powers = ca.vertcat(*(ca.sumsqr(ca.mtimes(one, values)) / len(rows) for values in series for one in filters))
-    return MX(ca.sqrt(ca.fmax(ca.dot(powers, ca.DM(fast.weights)), 1)))
+    return MX(ca.sqrt(ca.fmax(ca.mmax(powers * ca.DM(fast.weights)), 1)))
 
 
 def is_alarm_raised(alarm: NoveltyAlarm, known: PredictorInputs) -> MX:

@@ -60,8 +60,8 @@ class Region:
 class FastMotion(StoredData):
     """Growth of a band with motion that is faster than manoeuvres, such as that of waves: errors grow in proportion.
 
-    past : rows before the instant that are looked at. weights : (9,) of each of `fast_power` [1]: the band grows with
-    the root of their sum, from 1 on.
+    past : rows before the instant that are looked at. weights : (6,) of each of `fast_power`: the band grows with the
+    root of the greatest weighted one, from 1 on. So longer waves count as shorter and higher ones do.
     """
 
     past: int
@@ -69,7 +69,8 @@ class FastMotion(StoredData):
 
     def growth(self, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Array:
         """How much wider (S,) a band is, 1 or more."""
-        return np.sqrt(np.maximum(fast_power(columns, past, self.past) @ self.weights, 1.0))
+        power = fast_power(columns, past, self.past) * self.weights
+        return np.asarray(np.sqrt(np.maximum(power.max(axis=1), 1.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,20 +206,19 @@ def split_along_track(errors: Array, ahead: Array) -> tuple[Array, Array]:
 
 
 def fast_filters(rows: int) -> Array:
-    """Matrices (3, N, N) for series of N rows: second differences, what a cubic leaves, and its sum less a parabola."""
+    """Matrices (2, N, N) for series of N rows: third differences; the sum of what a cubic leaves, less a parabola."""
     time = np.linspace(-1, 1, rows)
     cubic, parabola = (np.linalg.qr(np.polynomial.legendre.legvander(time, degree))[0] for degree in (3, 2))
-    left = np.eye(rows) - cubic @ cubic.T
-    total = np.tri(rows) @ left
-    second = np.pad(np.diff(np.eye(rows), 2, axis=0), ((0, 2), (0, 0)))
-    return np.stack([second, left, total - parabola @ (parabola.T @ total)])
+    total = np.tri(rows) @ (np.eye(rows) - cubic @ cubic.T)
+    third = np.pad(np.diff(np.eye(rows), 3, axis=0), ((0, 3), (0, 0)))
+    return np.stack([third, total - parabola @ (parabola.T @ total)])
 
 
 def fast_power(columns: Mapping[str, Array], past: Mapping[str, Array], rows: int) -> Array:
-    """Mean squares (S, 9) of u, v, r over the last rows and the instant, each through the three `fast_filters`."""
+    """Mean squares (S, 6) of u, v, r over the last rows and the instant, each through both `fast_filters`."""
     series = np.stack([np.concatenate([past[name][-rows:], columns[name][None]]) for name in MOTIONS])  # (3, N, S)
     passed = np.einsum("fij,mjs->mfis", fast_filters(rows + 1), series, optimize=True)
-    return np.asarray(np.square(passed).mean(axis=2).reshape(9, -1).T)
+    return np.asarray(np.square(passed).mean(axis=2).reshape(6, -1).T)
 
 
 def path_chords(paths: Array) -> Array:

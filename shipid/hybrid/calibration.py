@@ -11,7 +11,7 @@ Candes, Ramdas and Tibshirani, "Predictive inference with the jackknife+" (Annal
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,11 +37,9 @@ from shipid.metrics import Array, vector_lengths
 
 FLOOR = 0.3  # of the greatest scale: the motion of waves early in the horizon does not decide about a path
 CENTRES = 128  # points of training that the distance is measured from, about
-PART = 4096  # windows whose distances are computed at once
 WINDOWS = 60  # of a run that calibrate, at most
 FEWEST_PAST_ROWS = 8  # of a past in which fast motion can be told from manoeuvres
-FROM_LEVELS = (0.2, 0.4, 0.55, 0.7, 0.8, 0.9)  # shares of the training with less fast motion than makes a band grow
-WIDER = 1.1  # times the band without, that growth with fast motion may cost on average under the law of training
+WIDER = 1.1  # times the band without, that growth with fast motion costs on average under the law of training
 PRIOR = 0.3  # standard deviation of a slope: how strongly one trait is believed to matter, as a logarithm
 
 
@@ -106,34 +104,24 @@ def calibrate_bands(
     apart = np.stack(
         [np.abs(part) for part in split_along_track(errors, track_directions(paths))], axis=-1
     )  # (T, S, 2)
-    fitted, motion = _fit_scores(runs, apart, normal), None
-    widest = WIDER * fitted.mean_size(runs, normal, np.ones(len(chosen)))
-    for slower in _fast_motions(runs, columns, before):
-        wide = slower.growth(columns, before)
-        trial = _fit_scores(runs, apart / wide[:, None], normal)
-        if trial.mean_size(runs, normal, wide) <= widest:
-            fitted, motion, apart = trial, slower, apart / wide[:, None]
-            break
-    whole = band_radii(fitted.scores.max(axis=0), runs)
+    scale, slopes, fitted = _fit_scores(runs, apart, normal)
+    whole = band_radii(fitted.max(axis=0), runs)
     of = np.array([(kinds or {}).get(str(name), "") for name in np.unique(run[chosen])])
     known = {str(kind): int((of == kind).sum()) for kind in np.unique(of) if kind}
-    of, growth = of[runs.place], np.exp(normal @ fitted.slopes)
-    by_kind, scales = [], []
-    for kind, count in known.items():  # of too few runs no band is promised, whatever is here
-        mine = of == kind
-        radii, scale = whole, fitted.scale
-        if count >= FEWEST:
+    of, growth = of[runs.place], np.exp(normal @ slopes)
+    by_kind, scales = (np.repeat(table[None], len(known), axis=0) for table in (whole, scale))
+    for place, kind in enumerate(known):
+        if known[kind] >= FEWEST:  # of fewer runs no band is promised, whatever is here
+            mine = of == kind
             same = shares_of_runs(runs.place[mine])
-            scale, scores = _scale_errors(same, apart[:, mine])
-            radii = band_radii(scores.max(axis=0) / growth[mine], same)
-        by_kind.append(radii)
-        scales.append(scale)
+            scales[place], scores = _scale_errors(same, apart[:, mine])
+            by_kind[place] = band_radii(scores.max(axis=0) / growth[mine], same)
     return Bands(
         runs=runs.count,
-        along=fitted.scale[:, 0],
-        across=fitted.scale[:, 1],
+        along=scale[:, 0],
+        across=scale[:, 1],
         whole=whole,
-        steps=np.stack([band_radii(row, runs) for row in fitted.scores], axis=1),
+        steps=np.stack([band_radii(row, runs) for row in fitted], axis=1),
         names=tuple(names),
         centres=centres,
         spread=spread,
@@ -142,25 +130,34 @@ def calibrate_bands(
         deviation=deviation,
         low=seen.min(axis=0),
         high=seen.max(axis=0),
-        slopes=fitted.slopes,
+        slopes=slopes,
         length=length,
         kinds=known,
-        by_kind=np.reshape(by_kind, (len(known), len(LEVELS))),
-        scales=np.reshape(scales, (len(known), *fitted.scale.shape)),
-        fast=motion,
+        by_kind=by_kind,
+        scales=scales,
+        fast=_fit_fast_motion(runs, columns, before, growth),
     )
 
 
-def _fast_motions(runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array]) -> Iterator[FastMotion]:
-    """Growths in proportion to fast motion, from a low level on, then from higher ones; none where it is not known."""
+def _fit_fast_motion(
+    runs: RunShares, columns: Mapping[str, Array], past: Mapping[str, Array], size: Array
+) -> FastMotion | None:
+    """Growth with fast motion, from a level on at which bands of size (S,) are as much wider as they may be.
+
+    None where the past is too short or not known.
+    """
     rows = len(past.get("u", ()))
-    power = fast_power(columns, past, rows) if rows >= FEWEST_PAST_ROWS else np.zeros((len(runs.place), 9))
+    if rows < FEWEST_PAST_ROWS or not all(np.isfinite(values).all() for values in past.values()):
+        return None
+    power = fast_power(columns, past, rows)
     mean = runs.weight @ power
-    weights = np.divide(1.0, mean, out=np.zeros(9), where=mean > 0)
-    level = power @ weights
-    order = np.argsort(level)
-    for share in FROM_LEVELS if np.isfinite(mean).all() and mean.any() else ():
-        yield FastMotion(rows, weights / max(np.interp(share, np.cumsum(runs.weight[order]), level[order]), 1e-12))
+    weights = np.divide(1.0, mean, out=np.zeros(len(mean)), where=mean > 1e-20 * mean.max())
+    root = np.sqrt((power * weights).max(axis=1))
+    order = np.argsort(root)
+    root, share = np.maximum(root[order], 1e-6), (runs.weight * size)[order]
+    below, above = np.cumsum(share), np.cumsum((share * root)[::-1])[::-1]
+    start = root[np.argmax(below - share + above / root <= WIDER * below[-1])]
+    return FastMotion(rows, weights / start**2)
 
 
 def band_radii(scores: Array, runs: RunShares) -> Array:
@@ -200,27 +197,11 @@ def _intraclass_correlation(ranks: Array, runs: RunShares) -> float:
     return 1.0 if sizes.max() == 1 else max(between, 0.0) / total if total > 0 else 1.0
 
 
-@dataclass(frozen=True)
-class _ScoreFit:
-    """Scale (T, 2) [m] along and across, slopes (5,) of the growth, and scores (T, S) by the other runs alone."""
-
-    scale: Array
-    slopes: Array
-    scores: Array
-
-    def mean_size(self, runs: RunShares, normal: Array, wide: Array) -> float:
-        """Mean size [m] of the band, of windows `wide` (S,) times as wide, at 0.9 or the highest level promised."""
-        judged = min(90, 100 * runs.count // (runs.count + 1)) - 1
-        radius = float(band_radii(self.scores.max(axis=0), runs)[judged])
-        scale = float(np.sqrt(self.scale[:, 0] * self.scale[:, 1]).mean())
-        return radius * scale * float(runs.weight @ (wide * np.exp(normal @ self.slopes)))
-
-
-def _fit_scores(runs: RunShares, apart: Array, normal: Array) -> _ScoreFit:
-    """Scale and growth from all runs, and scores of each run by those of the others."""
+def _fit_scores(runs: RunShares, apart: Array, normal: Array) -> tuple[Array, Array, Array]:
+    """Scale (T, 2) [m] and slopes (5,) of the growth from all runs, and scores (T, S) by the other runs alone."""
     scale, plain = _scale_errors(runs, apart)
     slopes, without = _growth_slopes(runs, normal, plain.max(axis=0))
-    return _ScoreFit(scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1)))
+    return scale, slopes, plain / np.exp((normal * without[runs.place]).sum(axis=1))
 
 
 def _scale_errors(runs: RunShares, apart: Array) -> tuple[Array, Array]:
@@ -270,11 +251,8 @@ def _training_distances(runs: RunShares, points: Array) -> tuple[Array, Array, A
     each = max(-(-CENTRES // runs.count), 1)
     chosen = np.concatenate([choose_evenly(np.flatnonzero(runs.place == one), each) for one in range(runs.count)])
     centres = points[chosen]
-    parts = [  # 128 numbers a window are held at once
-        nearest_distances(points[part] / spread, centres / spread, runs.place[part], runs.place[chosen])
-        for part in np.array_split(np.arange(len(points)), -(-len(points) // PART))
-    ]
-    return centres, spread, np.concatenate(parts)
+    away = nearest_distances(points / spread, centres / spread, runs.place, runs.place[chosen])
+    return centres, spread, away
 
 
 def _pick_over_runs(run: NDArray[np.str_], sound: NDArray[np.bool_]) -> NDArray[np.int64]:

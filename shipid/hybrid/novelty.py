@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.windows import Instants
-from shipid.hybrid.bands import FEWEST
+from shipid.hybrid.bands import FEWEST, radius_at_level
 from shipid.hybrid.calibration import band_radii, shares_of_runs
 from shipid.hybrid.features import TOLERANCE, Inputs, input_group, select_inputs
 from shipid.hybrid.physics import Physics
@@ -91,11 +91,10 @@ def calibrate_alarm(
     table, runs = {name: values[sound] for name, values in table.items()}, shares_of_runs(run[sound])
     if runs.count < FEWEST:
         return None
-    ranges = {range_of_orders(name) for name in inputs.commands}
-    varying = (name for name, values in table.items() if np.ptp(values) > range_rounding(values, values).max())
-    names = tuple(name for name in varying if name not in ranges)
-    limited = tuple(name for name in table if name not in names or input_group(name) == "command")
-    names = tuple(name for name in names if input_group(name) != "wind")
+    fixed = {name for name, values in table.items() if np.ptp(values) <= range_rounding(values, values).max()}
+    fixed |= {range_of_orders(name) for name in inputs.commands}
+    limited = tuple(name for name in table if name in fixed or input_group(name) == "command")
+    names = tuple(name for name in table if name not in fixed and input_group(name) != "wind")
     values, bounded = select_inputs(table, names), select_inputs(table, limited)
     scale = np.sqrt(runs.weight @ (values - runs.weight @ values) ** 2)
     values = values / scale
@@ -113,8 +112,7 @@ def calibrate_alarm(
         ends = np.delete(lows, one, axis=0).min(axis=0), np.delete(highs, one, axis=0).max(axis=0)
         beyond[mine] = range_excess(bounded[mine], *ends, width)
     middle, root = _middle_and_root(total / runs.count, runs.count)
-    at = round(100 * ALARM_LEVEL) - 1
-    farthest, slack = (float(band_radii(score, runs)[at]) for score in (away, beyond))
+    farthest, slack = (float(radius_at_level(band_radii(score, runs), ALARM_LEVEL)) for score in (away, beyond))
     return NoveltyAlarm(inputs, past, names, middle * scale, root / scale[:, None], farthest, limited, low, high, slack)
 
 

@@ -37,6 +37,7 @@ from shipid.units import plural_word
 
 ALL_WITH_PHYSICS = "with physics"
 METHOD_HEIGHT, METHODS_MARGIN = 34, 96  # heights of a method in a panel, and around them [px]
+PERCENT = "%"
 ALIKE_ERRORS = 1e-9  # relative: errors that differ by rounding
 METHOD_COLUMNS = {
     "condition": "condition",
@@ -50,7 +51,7 @@ METHOD_COLUMNS = {
     "core-seconds [s]": "seconds",
     "trials [1]": "trials",
     "no result": "without",
-    "difference of H [m]": "difference",
+    "difference of H [%]": "difference",
     "95 % interval, runs [m]": "over_runs",
     "better runs": "better_runs",
     "by world [m]": "by_world",
@@ -95,9 +96,8 @@ def _verdict_at_size(mine: pd.DataFrame, N_D: int, *, first: bool) -> str:
     for row in rows_as_tuples(whole[~alike if leads else alike][:1]):
         if math.isfinite(row.low):
             its = f"{row.method} is next, its" if leads else plural_word(len(tied), "its", "their")
-            text += (
-                f" ({its} difference of H to {row.reference} is {difference_text(row.difference, row.low, row.high)})"
-            )
+            words = difference_text(row.difference, row.low, row.high, PERCENT)
+            text += f" ({its} difference of H to {row.reference} is {words})"
     failed = [f"{row.method} ({row.failed} of {row.cells})" for row in rows_as_tuples(mine[mine.failed.gt(0)])]
     text += f", without a result: {join_few_names(failed)}" if failed else ""
     partly = [str(row.method) for row in rows_as_tuples(mine[mine.missing.gt(mine.failed)])]
@@ -118,12 +118,12 @@ def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
         takeaway="".join(sentences_on_methods(frame)[:1]) or "No method has physics to improve.",
         how="Methods are in the order of their mean H with physics, or without where they have none. "
         "All methods of the study see the same windows, folds and known quantities. Left: H (15) of each family. "
-        "Right: H less "
-        f"that of {reference} over the cells in which both have a result, mean over members, seeds and "
-        f"{counted_text(worlds, 'world')}; the 95 % interval comes from a bootstrap over test runs, each drawn with "
-        "all its windows and cells, or Student's where that is wider, with what another training would give; with "
-        "fewer than five runs there is none. An interval is for one comparison alone: of many, one in twenty excludes "
-        "0 by chance. A cell without a result is counted in the table, not averaged.",
+        "Right: by how much "
+        f"H is above that of {reference}, a geometric mean over the cells in which both have a result and over the "
+        f"test runs of {counted_text(worlds, 'world')}, which count alike; Student's 95 % interval holds other test "
+        "runs and other training runs; with fewer than five test runs there is none. An interval is for one "
+        "comparison alone: of many, one in twenty excludes 0 by chance. A cell without a result is counted in the "
+        "table, not averaged.",
         alternative="Dots of the position error of each method by family, and of the difference to one of them with "
         "intervals. The numbers are in the table below.",
         height=METHODS_MARGIN + METHOD_HEIGHT * len(order),
@@ -138,7 +138,7 @@ def methods_figure(content: ReportContent | MethodsContent) -> PageFigure:
         ],
         captions=[
             "H, mean over the cells that have a result",
-            f"difference of H to {reference}, 95 % interval over test runs",
+            f"difference of H to {reference}, 95 % interval",
         ],
     )
 
@@ -168,14 +168,14 @@ def _draw_methods(mine: pd.DataFrame, order: Sequence[str], families: Sequence[s
         shift = 0.14 * ((len(families) - 1) / 2 - k)
         prices = [f"{number_text(row.H)} m, {row.seconds:.1f} s" for row in rows_as_tuples(known)]
         errors.append(_dots_of_family(family, families, known, known.H, order, shift, prices))
-        words = [difference_text(row.difference, row.low, row.high) for row in rows_as_tuples(paired)]
+        words = [difference_text(row.difference, row.low, row.high, PERCENT) for row in rows_as_tuples(paired)]
         dots = _dots_of_family(family, families, paired, paired.difference, order, shift, words)
         middle, low, high = (paired[column].to_numpy(dtype=float) for column in ("difference", "low", "high"))
         differences.append(dots | {"error_x": error_bars(middle, low, high, dots["marker"]["color"])})
     y = names_axis([shorten_name(name, 20) for name in order], range=[-0.6, len(order) - 0.4])
     return [
         make_plot(errors, log_axis("position error, H [m]"), y),
-        make_plot(differences, zero_axis("difference of H [m]", INK), y),
+        make_plot(differences, zero_axis("difference of H [%]", INK), y),
     ]
 
 

@@ -49,12 +49,12 @@ def metres_text(value: float) -> str:
     return f"{number_text(value)} m"
 
 
-def difference_text(value: float, low: float, high: float) -> str:
-    """Write a difference [m] and its interval with the decimals of the greatest of them: it may be nearly 0."""
+def difference_text(value: float, low: float, high: float, unit: str = "m") -> str:
+    """Write a difference and its interval with the decimals of the greatest of them: it may be nearly 0."""
     if not math.isfinite(low):
-        return f"{metres_text(value)}, no interval from fewer than five runs"
+        return f"{number_text(value)} {unit}, no interval from fewer than five runs"
     places = _decimals(max(map(abs, (value, low, high))))
-    return f"{fixed_text(value, places)} m [{fixed_text(low, places)}, {fixed_text(high, places)}]"
+    return f"{fixed_text(value, places)} {unit} [{fixed_text(low, places)}, {fixed_text(high, places)}]"
 
 
 def ends_text(low: float, high: float) -> str:

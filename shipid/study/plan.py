@@ -255,7 +255,7 @@ def past_steps(plan: Plan) -> int:
 
 def grid_seeds(plan: Plan) -> tuple[int, ...]:
     """Seeds of the grid, those of its world, each once, the least first."""
-    return tuple(sorted(set(plan.study.grid.seeds)))
+    return tuple(sorted({batch.seed for batch in plan.batches}))
 
 
 def verdict_method(plan: Plan) -> str:
@@ -379,9 +379,7 @@ def _check_and_expand(
     methods = methods_of(study, foundations)
     check_claims(study, foundations)
     batches = tuple(
-        Batch(amount, seed)
-        for amount in sorted(set(study.grid.N_D), reverse=True)
-        for seed in sorted(set(study.grid.seeds))
+        Batch(amount, seed) for amount in sorted(set(study.grid.N_D), reverse=True) for seed in study.seeds_of(amount)
     )
     truth = None
     if study.truth is not None:

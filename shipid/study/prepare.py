@@ -191,7 +191,7 @@ def _check_amounts(plan: Plan, rest: Windows, tests: int) -> None:
         there = f"only {left} {plural_word(left, 'run is', 'runs are')} left for training"
         tested = f"{tests} {plural_word(tests, 'tests', 'test')} (split.test)"
         raise DocumentError(f"{max(amounts)}: {there}, {tested}", path="grid.N_D")
-    for seed in plan.study.grid.seeds if 1 in amounts else ():
+    for seed in plan.study.seeds_of(1) if 1 in amounts else ():
         try:
             part_folds(rest.select(rest.run == nested_runs(rest.spans, amounts, seed)[1][0]))
         except DataError as error:
@@ -291,7 +291,7 @@ def _in_order(plan: Plan, dataset: Dataset) -> Dataset:
 
 def runs_by_amount(study: Study, pool: Windows) -> dict[int, tuple[str, ...]]:
     """Training and validation runs of each amount of data, fewest first, for the least seed."""
-    runs = nested_runs(pool.spans, study.grid.N_D, min(study.grid.seeds))
+    runs = nested_runs(pool.spans, study.grid.N_D, min(study.seeds_of(max(study.grid.N_D))))
     return {amount: runs[amount] for amount in sorted(runs)}
 
 

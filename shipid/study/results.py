@@ -97,6 +97,11 @@ class Results:
         claims = self.plan.study.claims
         return {*(claims.aside if claims else ()), *families_set_from(self.plan, self.test.spans)}
 
+    @property
+    def pool(self) -> int:
+        """Runs from which those that train are drawn."""
+        return len(self.dataset.runs) - len(self.test.spans)
+
     @cached_property
     def windows(self) -> np.ndarray:
         """(R,) windows of each test manoeuvre, by name."""

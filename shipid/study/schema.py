@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
@@ -17,6 +18,7 @@ from shipid.vessel.perturb import Family
 
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]{0,79}$"  # a cell has two such names, and file systems allow 255 characters
 Seed = Annotated[int, Field(ge=0, le=2_000_000_000)]  # with 1000 times `seed` below 2^32
+MOST_DRAWS = 5  # of the runs of one amount of data, where a study names no seeds
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
@@ -103,7 +105,9 @@ class Grid(Strict):
     """`[grid]`: amounts of data and repetitions; every model gets a cell at each."""
 
     N_D: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1, description="runs for training")]
-    seeds: Annotated[list[Seed], Field(min_length=1)] = [0]
+    seeds: Annotated[list[Seed], Field(min_length=1)] | None = Field(
+        default=None, description="draws of the runs, at every amount; default: several where few runs are drawn"
+    )
 
 
 class BandsBlock(Strict):
@@ -231,6 +235,15 @@ class Study(Strict):
         shift = WORLDS * self.seed
         truth = self.truth and self.truth.model_copy(update={"seed": self.truth.seed + shift})
         split = self.split.model_copy(update={"seed": self.split.seed + shift})
-        grid = self.grid.model_copy(update={"seeds": [seed + shift for seed in self.grid.seeds]})
+        seeds = self.grid.seeds and [seed + shift for seed in self.grid.seeds]
+        grid = self.grid.model_copy(update={"seeds": seeds})
         family = [one.model_copy(update={"seed": one.seed + shift}) for one in self.family]
         return self.model_copy(update={"truth": truth, "split": split, "grid": grid, "family": family})
+
+    def seeds_of(self, N_D: int) -> list[int]:
+        """Seeds of the draws of an amount of data, those of its world, each once, the least first.
+
+        Where the study names none: the root of how often the largest amount holds this one, at most `MOST_DRAWS`.
+        """
+        most = min(MOST_DRAWS, math.ceil((max(self.grid.N_D) / N_D) ** 0.5))
+        return sorted(set(self.grid.seeds or range(WORLDS * self.seed, WORLDS * self.seed + most)))

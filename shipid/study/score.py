@@ -20,6 +20,7 @@ from shipid.errors import DataError
 from shipid.files import write_table
 from shipid.metrics import position_error
 from shipid.report.wording import counted_text
+from shipid.study.plan import grid_seeds
 from shipid.study.prepare import constant_motion
 from shipid.study.results import Results
 from shipid.study.windows import TRUTH_RECORD, prediction_table
@@ -66,7 +67,7 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
     rivals: list[RivalPrediction] = []
     blind = is_blind(file, frame, results.folder)
     groups = pd.DataFrame({"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame})
-    for name, offered in (("N_D", results.plan.study.grid.N_D), ("seed", results.plan.study.grid.seeds)):
+    for name, offered in (("N_D", results.plan.study.grid.N_D), ("seed", grid_seeds(results.plan))):
         if odd := [value for value in pd.unique(groups[name]) if value not in {-1, *offered}]:
             fault = f"{odd[0]} is not of the study: give one of {', '.join(map(str, offered))}, or -1 for any"
             raise DataError(fault, file=file, path=name)

@@ -347,7 +347,7 @@ def _structure_table(
     between, worse = dict.fromkeys(known, (np.nan, np.nan)), set[str]()
     if best in sound and len(sound) > 1:
         apart = np.array([[position[name][run] - position[best][run] for run in fitted] for name in sound[1:]])
-        differences = paired_difference(apart, np.ones(len(fitted)))
+        differences = paired_difference(apart)
         between |= dict(zip(sound[1:], np.stack([differences.low, differences.high], axis=1).tolist(), strict=True))
         worse = {name for name, behind in zip(sound[1:], which_significant(differences.above), strict=True) if behind}
     rows: list[dict[str, Any]] = [

@@ -132,9 +132,11 @@ def windows(
     if plan.parts:
         raise ShipidError(f"a study of several parts has windows for each: take that of one, {', '.join(plan.parts)}")
     grid = plan.study.grid
-    batch = Batch(max(grid.N_D) if N_D is None else N_D, min(grid.seeds) if seed is None else seed)
-    check_choice("N_D", str(batch.N_D), map(str, grid.N_D))
-    check_choice("seed", str(batch.seed), map(str, grid.seeds))
+    amount = max(grid.N_D) if N_D is None else N_D
+    check_choice("N_D", str(amount), map(str, grid.N_D))
+    seeds = plan.study.seeds_of(amount)
+    batch = Batch(amount, seeds[0] if seed is None else seed)
+    check_choice("seed", str(batch.seed), map(str, seeds))
     stored = folder is not None and (folder / store.DATASET).is_file()
     dataset = read_dataset(folder / store.DATASET) if folder is not None and stored else obtain_runs(plan)
     prepared = prepare(plan, dataset, device)

@@ -114,10 +114,10 @@ def test_numbers_that_were_set_from_a_test_run_are_in_no_claim(made: Any) -> Non
 
 def test_evidence_names_the_numbers_and_their_intervals(made: Any) -> None:
     evidence = {finding["id"]: finding["evidence"] for finding in judge_findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
-    assert evidence["R1"].startswith("good 2.00 m -> 1.00 m, 1.00 m [0.9")
-    assert "; bad 6.00 m -> 2.10 m, 3.90 m [3." in evidence["R1"]
+    assert evidence["R1"].startswith("good 2.00 m -> 1.00 m, 2.00 [1.8")
+    assert "times less; bad 6.00 m -> 2.10 m, 2.86 [2." in evidence["R1"]
     assert evidence["R1"].endswith("; 8 test manoeuvres")
-    assert evidence["R2"].startswith("inaccurate and compensated 2.10 m, accurate alone 2.00 m: −0.10 m [−")
+    assert evidence["R2"].startswith("inaccurate and compensated 2.10 m, accurate alone 2.00 m: 1.05 [0.9")
     assert evidence["R3"].startswith("gap 4.00 m before, 1.10 m after: 2.90 m [2.")
     numbers = {finding["id"]: finding["numbers"] for finding in judge_findings(made(one(1.0, 2.1, 9.0), runs=RUNS))}
     assert numbers["R1"] == {"H / A, accurate": pytest.approx(0.5), "H / A, inaccurate": pytest.approx(0.35)}

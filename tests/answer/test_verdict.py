@@ -14,6 +14,8 @@ from shipid.answer.verdict import (
     length_with_interval,
     model_list,
     quoted_model,
+    ratio_with_interval,
+    stricter_list,
     too_few_manoeuvres,
     verdict_of,
     weakest_verdict,
@@ -51,6 +53,22 @@ def test_numbers_in_words() -> None:
     assert difference_with_interval(Differences(mean, low, high, mean, mean), 0) == "−9.0 m [−12.0, −6.0]"
     assert too_few_manoeuvres(1) == "1 test manoeuvre gives no interval, 5 would"
     assert too_few_manoeuvres(5) == ""
+
+
+def test_a_stricter_list_is_said_in_the_same_breath() -> None:
+    """0.02 is shown by itself; corrected for four it is not, beside one that is."""
+    chances = np.array([0.001, 0.02, 0.02, 0.9])
+    assert stricter_list("abcd", chances) == ", each by its own test; corrected for their number (Holm), a"
+    assert stricter_list("abcd", chances, names=False).endswith("(Holm), 1")
+    assert stricter_list("abc", np.array([0.02, 0.02, 0.5])).endswith("(Holm), none")
+    assert stricter_list("abc", np.array([0.001, 0.9, 0.9])) == stricter_list("ab", chances[1:3]) == ""
+
+
+def test_ratios_in_words() -> None:
+    mean, low, high = (np.log([value]) for value in (2.0, 1.5, 3.0))
+    assert ratio_with_interval(Differences(mean, low, high, mean, mean)) == "2.00 [1.50, 3.00]"
+    blank = np.array([np.nan])
+    assert ratio_with_interval(Differences(mean, blank, blank, blank, blank)) == "2.00"
 
 
 def test_many_names_are_cut_and_one_more_than_the_limit_is_not() -> None:

@@ -98,8 +98,8 @@ def watchful(predictor, instants, rng):
     bands = predictor.bands
     if past:
         power = fast_power(instants.columns, instants.past, past)
-        weights = rng.dirichlet(np.ones(9)) / np.maximum(power.mean(axis=0), 1e-9)
-        bands = replace(bands, fast=FastMotion(past, weights / np.median(power @ weights)))
+        weights = rng.dirichlet(np.ones(6)) / np.maximum(power.mean(axis=0), 1e-9)
+        bands = replace(bands, fast=FastMotion(past, weights / np.median((power * weights).max(axis=1))))
     return replace(predictor, alarm=alarm, bands=bands)
 
 

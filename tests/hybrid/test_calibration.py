@@ -10,6 +10,7 @@ from scipy.stats import f_oneway
 
 from shipid.hybrid.calibration import (
     PRIOR,
+    WIDER,
     _fit_scores,
     _growth_slopes,
     _intraclass_correlation,
@@ -120,7 +121,7 @@ def test_what_a_score_is_divided_by_comes_from_the_other_runs() -> None:
     apart, mine = rng.uniform(0.5, 2.0, (5, 48, 2)), of.place == 2
     larger = np.where(mine[:, None], 3.0, 1.0) * apart
     still = np.zeros((48, 5))  # no traits: no growth
-    one, other = (_fit_scores(of, errors, still).scores for errors in (apart, larger))
+    one, other = (_fit_scores(of, errors, still)[2] for errors in (apart, larger))
     np.testing.assert_allclose(other[:, mine], 3.0 * one[:, mine], rtol=1e-12)
     assert (other[:, ~mine] < one[:, ~mine]).all()
 
@@ -175,3 +176,27 @@ def test_a_higher_sea_widens_the_band_and_a_lower_one_does_not(unit: float) -> N
         plain.append(still.region(paths, here, 1.0 / unit, 0.9).holds(errors).mean())
     assert np.mean(held) > 0.85
     assert np.mean(plain) < 0.8
+
+
+@pytest.mark.parametrize("period", [2.5, 12.0])
+def test_waves_of_another_period_widen_the_band_and_training_pays_a_tenth(period: float) -> None:
+    """Waves of 5 s, then as high ones that are shorter or longer; no band is narrower than it would be without."""
+
+    def waves(seconds: float, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
+        rng, height = np.random.default_rng(seed), np.exp(0.3 * np.random.default_rng(seed).standard_normal(count))
+        phase = 2 * np.pi * (np.arange(21)[:, None] / seconds + rng.random((3, 1, count)))
+        series = dict(zip("uvr", 3.0 + height * np.sin(phase), strict=True))
+        here = {**drawn.columns, **{name: values[-1] for name, values in series.items()}}
+        return here, {name: values[:-1] for name, values in series.items()}
+
+    drawn = runs(3, 30)
+    count = len(drawn.run)
+    here, past = waves(5.0, 1)
+    bands = calibrate_bands(drawn.errors, drawn.paths + drawn.errors, drawn.run, here, NAMES, 1.0, past=past)
+    assert bands is not None
+    assert bands.fast is not None
+    size = replace(bands, fast=None).growth(drawn.paths, here, 1.0)
+    usual = bands.fast.growth(here, past)
+    assert (usual * size).mean() / size.mean() == pytest.approx(WIDER, abs=0.01)
+    assert usual.min() == 1
+    assert np.median(bands.fast.growth(*waves(period, 2))) > 1.2 * np.median(usual)

@@ -65,7 +65,7 @@ def three(H: tuple[float, float, float], **more: list[object]) -> str:
 def test_methods_that_err_alike_are_named_together() -> None:
     assert three((2.0, 2.0 * (1 + 1e-15), 2.5)) == (
         "With N_D = 3 a and b err alike, least over all cells with physics, 5.00 m at the horizon, H 2.00 m "
-        "(c is next, its difference of H to a is 0.50 m [0.00, 1.00])."
+        "(c is next, its difference of H to a is 0.50 % [0.00, 1.00])."
     )
     assert (
         "b and c err alike, least over all cells with physics, 5.00 m at the horizon, H 1.00 m (their difference"

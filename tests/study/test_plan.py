@@ -165,6 +165,18 @@ def test_a_stored_world_is_the_same_world(tmp_path: Path) -> None:
     assert read_plan(again).digest == plan.digest
 
 
+def test_few_runs_are_drawn_several_times_unless_the_study_names_seeds() -> None:
+    """The root of 100 / 10, of 100 / 30 and of 100 / 100; in another world other draws."""
+    plan = read_plan("quick", {"seed": 3})
+    assert [(batch.N_D, batch.seed % 1000) for batch in plan.batches] == [
+        *((100, 0), (30, 0), (30, 1)),
+        *((10, seed) for seed in range(4)),
+    ]
+    assert {batch.seed // 1000 for batch in plan.batches} == {3}
+    assert len(read_plan("quick", {"grid.N_D": [1, 100]}).study.seeds_of(1)) == 5, "and no more"
+    assert len(read_plan("quick", {"grid.seeds": [7]}).batches) == 3
+
+
 def test_batches_cover_grid_and_seeds_once(tmp_path: Path) -> None:
     plan = tiny_plan(tmp_path, {"grid.N_D": [6, 4, 6], "grid.seeds": [2, 0, 2]})
     assert sorted((batch.N_D, batch.seed) for batch in plan.batches) == [(4, 0), (4, 2), (6, 0), (6, 2)]
