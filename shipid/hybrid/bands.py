@@ -210,7 +210,8 @@ def fast_filters(rows: int) -> Array:
     time = np.linspace(-1, 1, rows)
     cubic, parabola = (np.linalg.qr(np.polynomial.legendre.legvander(time, degree))[0] for degree in (3, 2))
     total = np.tri(rows) @ (np.eye(rows) - cubic @ cubic.T)
-    third = np.pad(np.diff(np.eye(rows), 3, axis=0), ((0, 3), (0, 0)))
+    third = np.zeros((rows, rows))
+    third[: max(rows - 3, 0)] = np.diff(np.eye(rows), 3, axis=0)
     return np.stack([third, total - parabola @ (parabola.T @ total)])
 
 

@@ -21,8 +21,15 @@ from shipid.hybrid.compensator import Compensator, Layers, Network, flatten_path
 from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
 from shipid.hybrid.method import Array, FitResult, Row, Task, input_table_key, shared_tables
-from shipid.hybrid.path_trained import PathTrained
-from shipid.hybrid.search import Search, best_trials, mean_squared_error, seed_of, setting_at_share, trial_row
+from shipid.hybrid.search import (
+    Search,
+    SearchMethod,
+    best_trials,
+    mean_squared_error,
+    seed_of,
+    setting_at_share,
+    trial_row,
+)
 from shipid.hybrid.training import Learner, Length, StackTraining
 from shipid.hybrid.units import VaryingInputs
 
@@ -33,13 +40,25 @@ STACK = 4  # of them; with more nothing is gained
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
 
-def tune_gradient(task: Task, method: PathTrained) -> dict[str, FitResult]:
+def tune_gradient(
+    task: Task,
+    method: SearchMethod,
+    inputs: Inputs,
+    length: Length,
+    *,
+    mirror: bool = False,
+    at_once: int = 1,
+    terms: int | None = None,
+) -> dict[str, FitResult]:
     """Train networks for each foundation.
 
     The objective is the mean validation error over the folds; the compensator is the mean of the fold networks of the
     best trial. The sampler of a trial is seeded by its number.
+
+    mirror : whether networks are symmetric to port and starboard, where the inputs allow it.
+    at_once : trials that are proposed at a time; more than one race. terms : of the polynomials that outputs weigh.
     """
-    trainer, search, at_once = _Trainer(task, method), Search(task, task.cases, method), method.at_once
+    trainer, search = _Trainer(task, method, inputs, length, mirror, terms), Search(task, task.cases, method)
     space = method.space()
     if search.done != search.count:  # a round that was interrupted begins again
         search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
@@ -69,7 +88,7 @@ def tune_gradient(task: Task, method: PathTrained) -> dict[str, FitResult]:
                 best[key] = one
         for number in numbers:
             search.record({key: outcomes[key, number].row for key in studies})
-    return {key: trainer.fitted(key, search.rows, best.get(key)) for key in studies}
+    return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in studies}
 
 
 @dataclass(frozen=True)
@@ -113,10 +132,12 @@ _RunningStack = tuple[list[_StackMember], StackTraining]
 class _Trainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(self, task: Task, method: PathTrained) -> None:
-        self.task, self.method, self.inputs = task, method, Inputs(task.commands, method.memory)
-        self.length = Length(method.epochs, method.batch, method.patience)
-        self.tables = shared_tables(task, self.inputs)
+    def __init__(
+        self, task: Task, method: SearchMethod, inputs: Inputs, length: Length, mirror: bool, terms: int | None
+    ) -> None:
+        self.task, self.method, self.inputs, self.length = task, method, inputs, length
+        self.mirror, self.terms = mirror, terms
+        self.tables = shared_tables(task, inputs)
         self.targets = task.targets
         self._seen: dict[object, tuple[VaryingInputs, Array]] = {}
         self._again: dict[int, dict[Trial, _TrialOutcome]] = {}
@@ -127,14 +148,14 @@ class _Trainer:
         place = (fold, input_table_key(table))
         if place not in self._seen:
             training = {name: values[self.task.folds[fold][0]] for name, values in table.items()}
-            varying = VaryingInputs.of(training, self.method.mirror)
+            varying = VaryingInputs.of(training, self.mirror)
             self._seen[place] = varying, varying.normaliser.apply(table)
         return self._seen[place]
 
     def _outputs(self, key: str, fold: int) -> tuple[Array, Array, float]:
         """Basis (T, r) [m], what it weighs (S, 2 r), about 1 in training, and what validation holds beside [m^2]."""
         training, validation = self.task.folds[fold]
-        targets, terms = self.targets[key], self.method.terms
+        targets, terms = self.targets[key], self.terms
         if terms is None:  # as in the paper: each step, in metres
             return np.eye(len(targets)), flatten_paths(targets), 0.0
         plain = smooth_basis(len(targets), terms)
@@ -205,9 +226,9 @@ class _Trainer:
             outcomes[trial] = _TrialOutcome(row, networks)
         return outcomes
 
-    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None) -> FitResult:
+    def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None, at_once: int) -> FitResult:
         """The networks of the best trial; those of an earlier session are trained once more, in the same company."""
-        seconds, at_once = sum(row["seconds"] for row in rows[key]), self.method.at_once
+        seconds = sum(row["seconds"] for row in rows[key])
         kept = best_trials(rows[key])
         if not kept:
             return FitResult(None, rows[key], seconds)

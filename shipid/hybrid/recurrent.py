@@ -3,7 +3,7 @@
 h_k = GRU(h_(k-1), [u, v, r, commands, relative wind]_k) over the past up to the instant; then
 [dx, dy] = B (W_2 tanh(W_1 [h, inputs at the instant] + c_1) + c_2), with B polynomials of time. AdamW on the mean
 squared error of the path, early stopping on the validation windows; the corrector is the mean over the folds. With
-mirror, x is even and y odd by construction. The unit: Cho et al. (2014).
+mirror, x is even and y odd by construction. The unit: Cho et al. (2014); PyTorch trains it, plain arrays predict.
 """
 
 from __future__ import annotations
@@ -89,12 +89,21 @@ class GatedNetwork(StoredData):
         return np.tensordot(self.basis, unflatten_paths(outputs), 1)
 
     def _outputs(self, seen: Sequences) -> Array:
-        import torch  # a study is read without it
+        layers, (past, now) = self.layers, seen
+        hidden = np.zeros((len(now), layers["W_h"].shape[1]))
+        for row in past:
+            a = row @ layers["W_i"].T + layers["b_i"]
+            b = hidden @ layers["W_h"].T + layers["b_h"]
+            reset, update, fresh = np.split(a, 3, axis=1)
+            reset_h, update_h, fresh_h = np.split(b, 3, axis=1)
+            gate = _logistic(update + update_h)
+            hidden = (1 - gate) * np.tanh(fresh + _logistic(reset + reset_h) * fresh_h) + gate * hidden
+        full = np.concatenate([hidden, now], axis=1)
+        return np.asarray(np.tanh(full @ layers["W_1"].T + layers["c_1"]) @ layers["W_2"].T + layers["c_2"])
 
-        from shipid.hybrid.training import gated_outputs
 
-        layers = {name: torch.from_numpy(values) for name, values in self.layers.items()}
-        return np.asarray(gated_outputs(layers, *map(torch.from_numpy, seen)).numpy())
+def _logistic(values: Array) -> Array:
+    return (1 + np.tanh(values / 2)) / 2
 
 
 @dataclass(frozen=True)
@@ -122,16 +131,14 @@ class RecurrentProblem(PathProblem):
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the error of the networks of the folds, and the most epochs of one."""
-        trained = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
-        self.trained[number] = tuple(network for network, _ in trained)
-        losses = [
-            mean_squared_error(
-                network.predict(self.rows(watched), self.instants.select(watched), self.task.commands),
-                self.targets[:, watched],
-            )
-            for network, (_, watched) in zip(self.trained[number], self.task.folds, strict=True)
-        ]
-        return float(np.mean(losses)), point, max(epochs for _, epochs in trained)
+        networks = [self._train(number, point, fold) for fold in range(len(self.task.folds))]
+        self.trained[number] = tuple(network for network, _ in networks)
+        losses = []
+        for network, (_, validation) in zip(self.trained[number], self.task.folds, strict=True):
+            here, instants = self.rows(validation), self.instants.select(validation)
+            predicted = network.predict(here, instants, self.task.commands)
+            losses.append(mean_squared_error(predicted, self.targets[:, validation]))
+        return float(np.mean(losses)), point, max(epochs for _, epochs in networks)
 
     def corrector(self, best: Sequence[Row]) -> Any:
         """Return the mean of the networks of the best trial; those of an earlier session are trained once more."""
@@ -169,7 +176,8 @@ class RecurrentProblem(PathProblem):
         method = self.method
         length = Length(method.epochs, method.batch, method.patience)
         layers, epochs = train_gated(parts, method.units, point["learning_rate"], method.weight_decay, length, seed)
-        return GatedNetwork(reader, layers, self.basis * scale), epochs
+        scaled = {**layers, "W_2": layers["W_2"] * scale, "c_2": layers["c_2"] * scale}
+        return GatedNetwork(reader, scaled, self.basis), epochs
 
 
 class Recurrent(SearchedAlone):

@@ -18,7 +18,9 @@ from shipid.vessel.perturb import Family
 
 NAME = r"^[A-Za-z][A-Za-z0-9_.-]{0,79}$"  # a cell has two such names, and file systems allow 255 characters
 Seed = Annotated[int, Field(ge=0, le=2_000_000_000)]  # with 1000 times `seed` below 2^32
-MOST_DRAWS = 5  # of the runs of one amount of data, where a study names no seeds
+MOST_DRAWS = (
+    3  # of the runs of one amount of data, where a study names no seeds: more cost more than they tell (record worlds)
+)
 WORLDS = 1000  # top-level `seed` times this is added to every other seed
 INPUTS = ("u", "v", "r", "u_rw", "v_rw")  # what a correction may see beside the commands
 
