@@ -75,11 +75,11 @@ def answer_on_bands(results: Results, coverage: pd.DataFrame) -> list[tuple[str,
         each = [f"{str(reason).removeprefix(NO_BAND)} ({model_list(map(str, models))})" for reason, models in refused]
         return [(f"No band is promised: {'; '.join(each)}.", "cells")] if each else []
     top = mine[mine["N_D"] == mine["N_D"].max()]
-    share, low, high = (percent_text(float(top[name].mean())) for name in ("coverage", "low", "high"))
+    share, low, high = map(percent_text, (top["coverage"].mean(), top["low"].min(), top["high"].max()))
     radius = least_to_greatest(metres_text(top["width"].min()), metres_text(top["width"].max()))
     cells = results.cells[results.cells["model"].isin(top["model"]) & results.cells["N_D"].isin(top["N_D"])]
     data = f"{of_methods(results, [*cells['method'].unique()])} with {top['N_D'].iloc[0]} runs; 95 % interval"
-    mean = f"mean of {len(top)} models{data} of a single model" if len(top) > 1 else data.lstrip()
+    mean = f"mean of {len(top)} models{data}s of single models lie in" if len(top) > 1 else data.lstrip()
     sentence = (
         f"Bands of {level_text(level)} held {share} of the whole test paths ({mean} {low} to {high}); their mean "
         f"radius is {radius}."

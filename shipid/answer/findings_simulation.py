@@ -127,7 +127,7 @@ def _judge_lead(grid: ErrorGrid) -> Judgement:
     later = ", ".join(f"{number} at {N}" for number, N in zip(won[1:], amounts[1:], strict=True))
     evidence = (
         f"at N_D = {amounts[0]} {begins}: {won[0]} of {count} moderate models {plural_word(won[0], 'is', 'are')} shown "
-        f"to beat no physics{stricter_list(moderate, leads[0].above)} ({table.metres(NO_MODEL, 0)}), whose error is "
+        f"to beat no physics{stricter_list(moderate, leads[0].above)}, whose error of {table.metres(NO_MODEL, 0)} is "
         f"{_ratio_range(leads[0])} times theirs; that most keep the lead is {keeps}: {later}"
     )
     numbers = {f"share shown to lead at N_D = {amounts[k]}": won[k] / count for k in (0, -1)}
@@ -190,7 +190,8 @@ def _judge_rise(grid: ErrorGrid) -> Judgement:
     trend, amounts = trend_over_accuracy(grid.table, grid.physics, flattens=True), grid.table.amounts
     at_first, at_last, less = (difference_with_interval(trend.slopes, k) for k in (0, len(amounts) - 1, len(amounts)))
     evidence = (
-        f"for twice the A, H rises by {at_first} at N_D = {amounts[0]} and by {at_last} at {amounts[-1]}, {less} less; "
+        f"for twice the A, H rises by {at_first} at N_D = {amounts[0]} and by {at_last} at {amounts[-1]}, "
+        f"a difference of {less}; "
         f"rank correlation of H and A {trend.words}"
     )
     numbers = {"least rank correlation of H and A": trend.least}

@@ -137,8 +137,8 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
         ("gain", _headline(case)),
         ("methods", methods if len(learning) > 1 else ()),
         (chart, _physics_that_pays(case)),
-        (chart, _runs_that_physics_saves(case)),
         ("gain", _mean_over_horizon(case)),
+        (chart, _runs_that_physics_saves(case)),
         ("cells", [several] if len(learning) > 1 else ()),
         ("gain", _reservations(case)),
         ("cells", _how_to_read(case)),
@@ -166,7 +166,7 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
         verb, (training, test) = plural_word(len(lost), "diverges", "diverge"), lost.filter(like="diverged_").sum()
         yield (
             f"{model_list(lost['model'])} {verb} on {training:.0f} training and {test:.0f} test windows: a path then "
-            "keeps its last velocity, and its error counts as the distance run at most."
+            "keeps its last velocity, and its error is limited to the distance run."
         )
     saw = families_set_from(results.plan, results.test.spans)
     if saw:
@@ -199,7 +199,7 @@ def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
         alike = len(words) == len(case.ends) == 2 and len(set(words.values())) == 1
         ends = " or ".join(map(str, words))
         for amount, part in [*words.items()][: 1 if alike else None]:
-            yield f"With {ends if alike else amount} {plural_word(max(words) if alike else amount, 'run')} {part}."
+            yield f"With {ends if alike else amount} {plural_word(max(words) if alike else amount, 'run')}, {part}."
 
 
 def _count_of_better(models: Sequence[str], lead: Differences, sides: Sequence[list[str]]) -> str:
@@ -209,12 +209,14 @@ def _count_of_better(models: Sequence[str], lead: Differences, sides: Sequence[l
     if len(better) == len(models) > 1:
         count = "both" if len(models) == 2 else f"all {len(models)}"
     verb = plural_word(len(better), "does", "do") if better else "is shown to do"
-    words = [f"{count} physics models {verb} better than no physics{stricter_list(models, lead.above)}"]
-    if worse:
-        words.append(
-            f"{model_list(worse)} {plural_word(len(worse), 'does', 'do')} worse{stricter_list(models, lead.below)}"
-        )
-    words += [f"for {model_list(unknown)} the test cannot tell"] if unknown else []
+    words = [
+        f"{count} physics models {verb} better than no physics"
+        + (f": {model_list(better)}" if 0 < len(better) < len(models) else "")
+        + stricter_list(models, lead.above)
+    ]
+    do, unsure = plural_word(len(worse), "does", "do"), model_list(unknown) if better or worse else "all of them"
+    words += [f"{model_list(worse)} {do} worse{stricter_list(models, lead.below)}"] if worse else []
+    words += [f"for {unsure} the test cannot tell"] if unknown else []
     return "; ".join(words)
 
 
@@ -223,7 +225,7 @@ def _limit_of_accuracy(case: AnswerCase, place: int) -> str:
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or (limit.low <= limit.limits[0] and limit.high >= limit.limits[1]):
         return ""
-    bounds, A = _bounds(limit, _two_digits), "its error over the horizon, A,"
+    bounds, A = _bounds(limit, _two_digits), "its own mean error over the horizon, A,"
     if limit.above:
         return f"physics pays even if {A} is {metres_text(limit.limits[1])}, the worst tried{bounds}"
     if limit.below:
@@ -282,8 +284,8 @@ def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
     rows = case.rows[case.rows["N_D"] == largest].set_index("model")
     if best is not None:
         yield (
-            f"H is the mean over the horizon, over all {case.ahead}: {case.error(best, largest)} for {best} with "
-            f"{counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
+            f"H is the mean error over all {case.ahead}, not only at their end: {case.error(best, largest)} for {best} "
+            f"with {counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
             + (f" Without physics H is {case.error(NO_MODEL, largest)}." if NO_MODEL in rows.index else "")
         )
 
@@ -311,7 +313,7 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         sides = case.sides(models, paired_difference(ahead, *noise))
         yield from _sentences_on_sides(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
         if len(sides[0]) == len(models):
-            yield f"With {counted_text(largest, 'run')} every compared model beats {constant}."
+            yield f"With {counted_text(largest, 'run')}, every compared model beats {constant}."
 
 
 def _sentences_on_sides(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:
@@ -336,7 +338,7 @@ def _how_to_read(case: AnswerCase) -> Iterator[str]:
         return
     drawn = max((len(errors[0]) for errors in case.table.H.values()), default=1)
     draws = (
-        f"and {drawn} draws of {counted_text(amounts[0], 'training run')}: what other runs of the same kind would give"
+        f"and {drawn} draws of {counted_text(amounts[0], 'training run')}: where the mean of many such runs is expected"
     )
     alone = "of one draw of training runs: errors with other draws may lie outside"
     yield (

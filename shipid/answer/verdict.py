@@ -95,12 +95,12 @@ def ratio_with_interval(differences: Differences, index: int = 0) -> str:
 
 
 def stricter_list(models: Iterable[str], chances: NDArray[np.float64], *, names: bool = True) -> str:
-    """Say which models are shown after Holm's correction, or how many, where those are fewer than by single tests."""
+    """Say which models, or how many, are shown after Holm's correction, where those are fewer than by single tests."""
     shown = which_significant(chances)
     if shown.sum() == (chances <= SIGNIFICANT).sum():
         return ""
     which = model_list(np.array(list(models))[shown]) if names and shown.any() else str(shown.sum() or "none")
-    return f", each by its own test; corrected for their number (Holm), {which}"
+    return f" (after correction for {len(chances)} comparisons, Holm: {which})"
 
 
 def least_to_greatest(*numbers: str) -> str:

@@ -132,7 +132,7 @@ def width_figure(content: ReportContent) -> PageFigure | None:
     hatched = " Hatched: not narrower than the band of no physics at the same N_D." if shown.cells.worse.any() else ""
     return PageFigure(
         id="width-map",
-        title="Better physics, narrower promise",
+        title="Physics and data: the band",
         takeaway=f"The mean radius of the band goes from {ends_of_map(shown.cells)}.",
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour is the mean radius of "
         "its band over the horizon and all test windows, mean over seeds. Cells with too few runs for the level are "

@@ -246,7 +246,7 @@ def error_by_kind(content: ReportContent) -> PageTable:
         f"{row['kind']}: {number_text(row['end'])} m at the horizon, H {number_text(row['mean'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
-    takeaway = f"Least error {of}: {'; '.join(parts)}." if parts else "No model with data has a result."
+    takeaway = f"Least error on the test {of}: {'; '.join(parts)}." if parts else "No model with data has a result."
     shown = frame.assign(how=how, model=frame.model.where(frame.source.ne("naive"), ""))
     return frame_table("kinds", "Errors by kind of run", takeaway, shown, KIND_COLUMNS)
 

@@ -90,8 +90,8 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         title="Physics and data: the map",
         takeaway=_takeaway_map(shown),
         how="Each cell is a model, at its A on a square-root scale, given N_D manoeuvres; colour and number are H, the "
-        "mean error over the horizon, mean over seeds. At N_D = 0 is the physics alone, whose H is A: that number "
-        "counts where rows that would touch are moved apart."
+        "mean error over the horizon, mean over seeds. N_D = 0 is the physics alone, whose H is A: read A "
+        "there, since rows that would touch are moved apart."
         + family_words(content, rows.family)
         + (hatched if cells.worse.any() else "")
         + words_on_left_out(content)
@@ -255,11 +255,13 @@ def _takeaway_map(shown: CellMap) -> str:
     physics = good[~pure & good.N_D.isin(good.N_D[pure])]
     if physics.empty:
         return f"{text}."
+    text += "; by means, without a test, H is"
     if not physics.worse.any():
-        return f"{text}; H is below that of {rival} in all {counted_text(len(physics), 'cell')} with physics."
-    limit, bad = float(physics.A[physics.worse].min()), int(physics.worse.sum())
-    text += f"; in {bad} of {counted_text(len(physics), 'cell')} with physics H is not below that of {rival}"
-    return text + (f", none of them below A = {metres_text(limit)}." if physics.A.lt(limit).any() else ".")
+        return f"{text} below that of {rival} in all {counted_text(len(physics), 'cell')} with physics."
+    limit = float(physics.A[physics.worse].min())
+    return f"{text} not below that of {rival} in {physics.worse.sum()} of {len(physics)} cells with physics" + (
+        f", all with A = {metres_text(limit)} or more." if physics.A.lt(limit).any() else "."
+    )
 
 
 def cells_without_result(content: ReportContent) -> str:
@@ -299,8 +301,8 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         id="gain",
         title="What another manoeuvre buys",
         takeaway=_takeaway_sizes(content, learned),
-        how="Position error at the horizon, or over all predicted points of all windows of all test manoeuvres: that "
-        "mean is H (15), of the physics alone, at N_D = 0, A (14). Where a cell has several seeds, the line joins "
+        how="Position error at the horizon, or over all predicted points of all windows of all test manoeuvres: their "
+        "mean is H (15), or A (14) for the physics alone, at N_D = 0. Where a cell has several seeds, the line joins "
         "their means and the pale points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate "
         "stay as they are at the instant of prediction, the least that any model must beat."
         + (" Colour is A; marker" if span else " Marker")

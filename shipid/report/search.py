@@ -166,7 +166,7 @@ def _takeaway_search(frame: pd.DataFrame, names: list[str]) -> str:
     if correlations:
         most = max(correlations, key=lambda name: abs(correlations[name]))
         text += (
-            f"; the error goes most with {most.replace('_', ' ')}, rank correlation {fixed_text(correlations[most], 2)}"
+            f"; errors vary most with {most.replace('_', ' ')}, rank correlation {fixed_text(correlations[most], 2)}"
         )
     return f"{text}."
 

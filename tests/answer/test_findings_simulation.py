@@ -89,7 +89,7 @@ def test_S1_every_moderate_model_and_most_to_the_end(judged: Any) -> None:
     finding = judged({**H, "moderate-2": (9.5, 1.2, 0.6)})["S1"]
     assert finding["verdict"] == "refuted"
     assert (
-        "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics (8.00 m), whose error is "
+        "at N_D = 10 refuted: 2 of 3 moderate models are shown to beat no physics, whose error of 8.00 m is "
         "0.84 [" in finding["evidence"]
     )
     finding = judged({**H, "moderate-2": (2.5, 4.0, 0.6), "moderate-3": (3.5, 4.0, 0.7)})["S1"]
@@ -170,8 +170,8 @@ def test_S6_names_pairs(judged: Any) -> None:
     finding = judged()["S6"]
     assert finding["verdict"] == "confirmed"
     evidence = finding["evidence"]
-    words = "4 of 6 comparisons show a moderate model better than no physics with more runs, each by its own test; "
-    assert f"{words}corrected for their number (Holm), 2, such as " in evidence
+    words = "4 of 6 comparisons show a moderate model better than no physics with more runs "
+    assert f"{words}(after correction for 6 comparisons, Holm: 2), such as " in evidence
     assert "moderate-1 with 10 runs 1.50 m against 30 runs without physics, 4.00 m" in evidence
     assert "moderate-2 (4.00 m alone) with 30 runs 1.20 m against moderate-1 alone, 2.00 m" in evidence
     assert "100 runs 0.60 m" not in evidence, "100 runs are not few"

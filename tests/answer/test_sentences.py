@@ -38,13 +38,13 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
         "8 s ahead, good (best in validation) with 60 runs errs by 0.50 m on average, nine in ten below 0.75 m. "
         "Without physics: 1.25 m.\n"
     )
-    assert "H is the mean over the horizon, over all 8 s: 0.50 m for good with 60 runs." in advice
+    assert "H is the mean error over all 8 s, not only at their end: 0.50 m for good with 60 runs." in advice
     assert "Its physics alone has A = 2.00 m. Without physics H is 1.25 m." in advice
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, H of good (best in validation) is 1.50 m. " in advice
     assert f"Without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
-    assert "With 60 runs every compared model beats constant u, v, r (H 10.0 m)." in advice
-    assert "With 60 runs 1 of 2 physics models does better than no physics; bad does worse." in advice
+    assert "With 60 runs, every compared model beats constant u, v, r (H 10.0 m)." in advice
+    assert "With 60 runs, 1 of 2 physics models does better than no physics: good; bad does worse." in advice
 
 
 @pytest.mark.parametrize("runs", [1, 8])
@@ -89,7 +89,7 @@ def test_physics_worth_no_run_at_all(made: Any) -> None:
 
 def test_what_holds_at_both_ends_is_said_once(made: Any) -> None:
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, 4.0)})))
-    assert "\nWith 10 or 30 runs both physics models do better than no physics.\n" in advice
+    assert "\nWith 10 or 30 runs, both physics models do better than no physics.\n" in advice
 
 
 def test_the_best_model_is_called_best_without_a_rival_too(made: Any) -> None:
@@ -150,7 +150,7 @@ def test_what_the_brackets_hold_is_said(made: Any) -> None:
     cells = {
         (name, N, seed): value for name in H for N, value in zip((10, 30), H[name], strict=True) for seed in (0, 1)
     }
-    assert f"{words}and 2 draws of 10 training runs: what other runs of the same kind would give." in text(
+    assert f"{words}and 2 draws of 10 training runs: where the mean of many such runs is expected." in text(
         made(cells, runs=8)
     )
 
@@ -161,20 +161,25 @@ def test_how_good_physics_must_be(made: Any) -> None:
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (3.0, 1.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert re.search(
-        r"With 10 runs physics pays if its error over the horizon, A, is below about 6\.0 m \[\d\.\d, \d", advice
+        r"With 10 runs, physics pays if its own mean error over the horizon, A, is below about 6\.0 m \[\d\.\d, \d",
+        advice,
     )
-    assert "\nWith 30 runs none of 5 physics models is shown to do better than no physics; for m0, m1" in advice
+    assert (
+        "\nWith 30 runs, none of 5 physics models is shown to do better than no physics; for all of them the test"
+        in advice
+    )
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (30.0, 20.0)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert (
-        "With 10 or 30 runs physics pays even if its error over the horizon, A, is 16.0 m, the worst tried.\n" in advice
+        "With 10 or 30 runs, physics pays even if its own mean error over the horizon, A, is 16.0 m, the worst tried.\n"
+        in advice
     )
-    assert "\nWith 10 or 30 runs all 5 physics models do better than no physics.\n" in advice
+    assert "\nWith 10 or 30 runs, all 5 physics models do better than no physics.\n" in advice
     H = {name: (A / 2, 1.0) for name, A in alone.items()} | {"none": (0.2, 0.2)}
     advice = text(made(grid(H), alone=alone, claims=None, runs=8))
     assert (
-        "With 10 or 30 runs physics does not pay even if its error over the horizon, A, is 1.00 m, the best tried"
-        in advice
+        "With 10 or 30 runs, physics does not pay even if its own mean error over the horizon, A, is 1.00 m, "
+        "the best tried" in advice
     )
 
 
@@ -188,7 +193,10 @@ def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
 def test_names_are_those_that_the_test_can_tell(made: Any) -> None:
     """`bad` is 1 % below no physics in all eight manoeuvres; another training may differ by 3 %."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (8.91, 2.0), "none": (9.0, 4.0)}), runs=8))
-    assert "With 10 runs 1 of 2 physics models does better than no physics; for bad the test cannot tell.\n" in advice
+    assert (
+        "With 10 runs, 1 of 2 physics models does better than no physics: good; for bad the test cannot tell.\n"
+        in advice
+    )
 
 
 def test_known_orders_are_an_upper_bound_where_they_may_react(made: Any) -> None:
@@ -250,7 +258,7 @@ def test_failed_cells_are_reported_and_not_counted(made: Any) -> None:
     """`bad` has no result at 30 runs: nothing is claimed of every model, and the failure is named."""
     advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, None), "none": (9.0, 4.0)})))
     assert "1 of 6 cells has no result (bad: no training converged)" in advice
-    assert "With 10 or 30 runs 1 of 1 physics models does better than no physics" in advice
+    assert "With 10 or 30 runs, 1 of 1 physics models does better than no physics" in advice
 
 
 def test_nothing_is_claimed_against_a_missing_data_driven_model(made: Any) -> None:

@@ -58,9 +58,9 @@ def test_numbers_in_words() -> None:
 def test_a_stricter_list_is_said_in_the_same_breath() -> None:
     """0.02 is shown by itself; corrected for four it is not, beside one that is."""
     chances = np.array([0.001, 0.02, 0.02, 0.9])
-    assert stricter_list("abcd", chances) == ", each by its own test; corrected for their number (Holm), a"
-    assert stricter_list("abcd", chances, names=False).endswith("(Holm), 1")
-    assert stricter_list("abc", np.array([0.02, 0.02, 0.5])).endswith("(Holm), none")
+    assert stricter_list("abcd", chances) == " (after correction for 4 comparisons, Holm: a)"
+    assert stricter_list("abcd", chances, names=False).endswith("Holm: 1)")
+    assert stricter_list("abc", np.array([0.02, 0.02, 0.5])).endswith("3 comparisons, Holm: none)")
     assert stricter_list("abc", np.array([0.001, 0.9, 0.9])) == stricter_list("ab", chances[1:3]) == ""
 
 

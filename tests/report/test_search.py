@@ -74,7 +74,7 @@ def test_the_rank_correlation_is_scipys_mean_over_cells():
 
 def test_takeaway_names_what_goes_with_the_error(simulation):
     correlation = trial_rank_correlation(simulation.trials, "learning_rate")
-    text = f"the error goes most with learning rate, rank correlation {correlation:.2f}.".replace("-", "−")
+    text = f"errors vary most with learning rate, rank correlation {correlation:.2f}.".replace("-", "−")
     assert text in search(simulation).takeaway
 
 
