@@ -130,7 +130,8 @@ void @_init(@_recorder *self);
 int @_record(@_recorder *self, double t, const double *row);
 
 /* Path from the newest row: @_HORIZON pairs x, y. planned: @_HORIZON rows of commands in force, each the
- * mean over its step, angles as they go on from the newest row; or a null pointer: commands stay as they are.
+ * mean over its step, angles as they go on from the newest row; or a null pointer: commands stay as they are, and a
+ * band that was calibrated with known commands promises nothing.
  * choice: a null pointer, or the band that is wanted: its level, the share of whole paths that it holds, above 0 to 0.99;
  * 1 for the share of positions at each step alone, else 0; the kind of the manoeuvre under way, an entry of
  * @_kind_names, 0 for any. band: then @_HORIZON rows of half axes along the predicted track and across it [m], and the
@@ -157,6 +158,7 @@ int @_path(const double *row, const double *reached, const double *past, const d
     static $ORDERS
     static $ACTUATORS
     double begun[@_NUM_REACHED + 1], *held = work + $WORK, outside = 0, promised = 0;
+    const int as_calibrated = planned || @_NUM_PLANNED == 0;
     int i, k, status;
     $ARRAYS
     clear_results(path, band);
@@ -186,7 +188,7 @@ int @_path(const double *row, const double *reached, const double *past, const d
     @_casadi_predict(arg, res, iw, work, 0);
     status = outside > 0 ? @_OUTSIDE : 0;
     if (!are_finite(path, 2 * @_HORIZON)) status |= @_DIVERGED;
-    if (choice && !(promised > 0 && are_finite(band, 4 * @_HORIZON))) status |= @_NO_BAND;
+    if (choice && !(as_calibrated && promised > 0 && are_finite(band, 4 * @_HORIZON))) status |= @_NO_BAND;
     if (status & ~@_OUTSIDE) clear_results(0, band);
     return status;
 }

@@ -496,7 +496,7 @@ def _degraded_families(named: str, vessel: Vessel) -> list[dict[str, Any]]:
     moderate = {"parameters": damping, "factor": [0.4, 1.6]}
     high = {"parameters": [path for path in INERTIA_PATHS if path in vessel.parameters], "factor": [0.6, 1.4]}
     words = (
-        "the numbers of the truth: the error that current, gusts and sensors leave",
+        "the numbers of the truth: the error that disturbances and sensors leave",
         "each hull coefficient times a separate factor in 0.4-1.6",
         "as moderate, and mass, yaw inertia and added mass times factors in 0.6-1.4",
     )

@@ -190,3 +190,20 @@ def test_the_alarm_of_a_graph_is_raised_as_in_python_also_by_what_is_no_number(s
         )
     assert [bool(graph(*row)) for row in given] == right.tolist()
     assert 0 < right[32:].mean() < 1
+
+
+def test_a_band_of_known_commands_is_not_promised_where_they_stay(tmp_path):
+    strange = drawn("alone", 6, count=4, vessel="mariner")
+    bands = replace(strange.predictor.bands, runs=10)
+    recorder = Recorder(replace(strange.predictor, bands=bands, commands="known", alarm=None), tmp_path)
+    columns, layout = strange.instants.columns, recorder.model.layout
+    recorder.record(0.0, {name: values[0] for name, values in columns.items()})
+    plan = np.array([[columns[name][0] for name in layout.planned]] * layout.horizon)
+    made = {}
+    for words, given in (("stay", None), ("known", pointer(plan))):
+        path, band = (np.zeros((layout.horizon, size)) for size in (2, 4))
+        choice = pointer(np.array([0.9, 0.0, 0.0]))
+        asked = pointer(recorder.kept), given, choice, pointer(path), pointer(band)
+        made[words] = recorder.loaded.odd_predict(*asked) & NO_BAND, path, np.isfinite(band).all()
+    assert [(result, whole) for result, _, whole in made.values()] == [(NO_BAND, False), (0, True)]
+    np.testing.assert_array_equal(made["stay"][1], made["known"][1])
