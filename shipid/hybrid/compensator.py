@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
@@ -60,7 +61,7 @@ class Network(StoredData):
 
 
 @dataclass(frozen=True)
-class PathCorrector(StoredData):
+class PathCorrector(StoredData, ABC):
     """What adds a compensation to the path of the physics, from what is known at the instant.
 
     inputs : which quantities it may take.
@@ -77,9 +78,9 @@ class PathCorrector(StoredData):
         """Return paths (T, S, 2) [m] in the frame (11): those of the physics plus the compensation."""
         return paths + self.compensation(self.inputs.table(physics, instants))
 
+    @abstractmethod
     def compensation(self, table: Mapping[str, Array]) -> Array:
         """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

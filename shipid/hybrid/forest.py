@@ -94,7 +94,7 @@ class ForestCorrector(PathCorrector):
         return np.tensordot(self.basis, unflatten_paths(weights), 1)
 
 
-class ForestProblem(PathProblem):
+class ForestProblem(PathProblem, LearningProblem):
     """A foundation whose inputs and errors of the path, on the basis, are the samples of forests."""
 
     def solve(self, number: int, point: Point, windows: Index) -> ForestCorrector:

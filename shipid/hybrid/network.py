@@ -30,7 +30,7 @@ from shipid.hybrid.recurrent import (
     SequenceReader,
     Sequences,
 )
-from shipid.hybrid.search import LearningProblem, Point
+from shipid.hybrid.search import Point, SearchProblem
 from shipid.hybrid.training import Length, train_reader
 
 
@@ -157,7 +157,7 @@ class NetworkMethod(Recurrent):
     The settings are those of `Recurrent`; `units` is the subclass's own.
     """
 
-    problem: ClassVar[type[LearningProblem]] = NetworkProblem
+    problem: ClassVar[type[SearchProblem]] = NetworkProblem
     corrector: ClassVar[type[Any]] = NetworkCorrector
 
     @abstractmethod

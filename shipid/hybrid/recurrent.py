@@ -22,11 +22,11 @@ from shipid.hybrid.features import Inputs, Memory, count_steps, feature_table
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import (
-    LearningProblem,
     PathProblem,
     Point,
     Scale,
     SearchedAlone,
+    SearchProblem,
     TrialWorth,
     mean_squared_error,
     seed_of,
@@ -199,7 +199,7 @@ class Recurrent(SearchedAlone):
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = ("learning_rate",)
-    problem: ClassVar[type[LearningProblem]] = RecurrentProblem
+    problem: ClassVar[type[SearchProblem]] = RecurrentProblem
     corrector: ClassVar[type[Any]] = RecurrentCorrector
 
     trials: PositiveInt = 3

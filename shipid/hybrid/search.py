@@ -7,6 +7,7 @@ gives the digits of one that was not. A budget becomes a number of trials by the
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count, islice
 from math import exp, log
@@ -297,17 +298,29 @@ def mean_squared_error(paths: Array, future: Array) -> float:
     return value if np.isfinite(value) else float("inf")
 
 
-class LearningProblem:
-    """A foundation of a task as a method sees it: what its trials share, and how one is solved and judged."""
+class SearchProblem(ABC):
+    """A foundation of a task as a method sees it: what its trials share, and how one is judged."""
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
         self.method, self.task, self.name = method, task, name
         self.case, self.instants = task.cases[name], task.instants(name)
         self.future, self.targets = task.windows.future, task.targets[name]
 
+    @abstractmethod
+    def judge(self, number: int, point: Point) -> TrialWorth:
+        """Return the mean error [m^2] of a trial over the folds, what it chose, and its epochs."""
+
+    @abstractmethod
+    def corrector(self, best: Sequence[Row]) -> Any:
+        """Return the corrector that the best trials make, of which there are `num_chosen` at most."""
+
+
+class LearningProblem(SearchProblem):
+    """A problem whose trials learn from any windows that they are given."""
+
+    @abstractmethod
     def solve(self, number: int, point: Point, windows: Index) -> Any:
-        """Return the corrector of a trial, learned from these windows alone; unless `judge` and `corrector` do it."""
-        raise NotImplementedError
+        """Return the corrector of a trial, learned from these windows alone."""
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Return the mean error over the folds on validation windows of what the training windows taught."""
@@ -323,7 +336,7 @@ class LearningProblem:
         return self.solve(best[0]["number"], best[0]["params"], windows_of_folds(self.task))
 
 
-class PathProblem(LearningProblem):
+class PathProblem(SearchProblem):
     """A foundation whose errors of the path, on a basis (T, r) [m], follow from what is known at the instant.
 
     table : inputs (S,) by name. weights : (r, S, 2), the errors on the basis.
@@ -348,7 +361,7 @@ class SearchedAlone(SearchMethod):
     CHAINED : whether a trial begins with what the one before left behind.
     """
 
-    problem: ClassVar[type[LearningProblem]]
+    problem: ClassVar[type[SearchProblem]]
     IDLE: ClassVar[frozenset[str]] = frozenset()
     CHAINED: ClassVar[bool] = False
 
