@@ -239,7 +239,7 @@ class Predictor(DeployedMethod):
         if self.alarm is None:
             return np.asarray(lost | self.outside(known))
         raised = lost | self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
-        return np.asarray(raised | replace(self, limits={"u": (-np.inf, np.inf)}).outside(known))
+        return np.asarray(raised | self._is_unsettled(known, raised.shape))
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
         """Return whether each instant (S,) is outside what training has seen, in any column; all are without limits.
@@ -257,10 +257,12 @@ class Predictor(DeployedMethod):
             if name in known:
                 low, high = widen_range(*ends)
                 outside |= ~((known[name] >= low) & (known[name] <= high))
-        if self.run_up > 0:
-            age = known.get(AGE_COLUMN, np.zeros(shape))
-            outside |= ~(age >= self.run_up - 1e-3 * self.physics.step)
-        return outside
+        return np.asarray(outside | self._is_unsettled(known, shape))
+
+    def _is_unsettled(self, columns: Mapping[str, Array], shape: tuple[int, ...]) -> Array:
+        """Whether nobody knows that the observer has settled, if there is one."""
+        age = columns.get(AGE_COLUMN, np.zeros(shape))
+        return np.full(shape, self.run_up > 0) & ~(age >= self.run_up - 1e-3 * self.physics.step)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Write one `.npz` of arrays and a JSON header; it appears whole or not at all.
