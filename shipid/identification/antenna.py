@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.document import short_names
 from shipid.identification.covariance import invert_information
 from shipid.identification.late_fit import OUTSIDE
@@ -18,7 +17,6 @@ from shipid.identification.statistics import LinearFit, Statistics, fit_statisti
 from shipid.logs.repairs import HeadingOffset, LeverArm, move_origin, turn_heading
 from shipid.units import join_names, percent_text, significant_digits
 
-Array = NDArray[np.float64]
 AHEAD, ABEAM = ("antenna.x", "antenna.y")  # unknowns beside the factors, in lengths of the ship
 ARM = 0.1  # of the length: by which the log is moved for the derivatives
 OFF = 0.02  # [rad] by which the heading is turned for the derivatives

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from shipid.data.dataset import Array
 from shipid.document import short_names
 from shipid.errors import DataError, ShipidError
 from shipid.identification.settings import free_factors
@@ -25,7 +25,6 @@ from shipid.identification.statistics import Statistics
 from shipid.units import join_names, significant_digits
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 Measure = Callable[[Vessel], Mapping[str, float]]
 LONG = 10.0  # a horizon is long from this multiple of the correlation time of the residuals on
 SMALL = 1e-4  # of the standard deviation along the greatest axis of a covariance: shorter axes are left out

@@ -16,12 +16,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipid.data.dataset import Array
 from shipid.document import short_names
 from shipid.units import join_names, significant_digits
-
-Array = NDArray[np.float64]
 
 MOST_COLLINEAR = 15.0  # Brun et al.: "critical" from 10 to 15 on
 UNSEEN = 1e-10  # of the largest eigenvalue, with columns of unit length: below it no data, only rounding

@@ -6,15 +6,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipid.data.dataset import Array
 from shipid.engine.native import C, StagedSource, compile_source, compiler_target, step_statements
 from shipid.engine.printing import print_function
 from shipid.engine.threads import run_tasks, threaded_source
 from shipid.engine.vectors import CompilerTarget, vector_source
 from shipid.identification.sensitivities import FitLayout, Variation, build_variation
 
-Array = NDArray[np.float64]
 STAGES = (("fixed",), ("known",))  # once an interval; once a step
 _ARRAYS = dict.fromkeys(("numbers", "inputs", "signals", "state", "records"), "double")
 

@@ -16,9 +16,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.document import short_names
 from shipid.identification.covariance import invert_information
 from shipid.identification.fit import local_linearisation
@@ -27,7 +26,6 @@ from shipid.identification.solution import Solution
 from shipid.identification.statistics import Statistics
 from shipid.units import join_names
 
-Array = NDArray[np.float64]
 Beside = Callable[[Array], tuple[Array, Array]]
 """Change of the factors (n,) from the estimate -> residuals (m,) and Jacobian (m, n) there, priors included."""
 

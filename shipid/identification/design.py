@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.engine.rollout import rollout
 from shipid.errors import ShipidError, suggest_name
 from shipid.identification.settings import WEIGHTED
@@ -35,8 +35,6 @@ from shipid.simulation.standard import define_standard, shaft_speed
 from shipid.units import GRAVITY, RPM, percent_text
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
-
-Array = NDArray[np.float64]
 
 PERTURBED, START = 0.01, {"u": 0.01, "v": 0.01, "r": 0.001, "psi": 0.001, "north": 0.1, "east": 0.1}
 UNKNOWN = 1.0  # standard deviation of a factor of which nothing is known

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, stretches_of_runs
+from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.rollout import SPEED_LIMIT, rollout
 from shipid.errors import DataError
 from shipid.identification.residuals import CURRENT, build_problem
@@ -21,7 +20,6 @@ from shipid.simulation.log import LEANING, body_velocities, horizontal_velocitie
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 CHANNELS = ("north", "east", "psi", "u", "v", "r")
 MOST_STEPS = 1e7  # of all runs together
 MEASURED, ALL = "measured", "all"

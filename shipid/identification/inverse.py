@@ -22,15 +22,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, stretches_of_runs
+from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError
 from shipid.physics.signals import is_wrapped_angle
 from shipid.simulation.log import body_velocities
 from shipid.vessel.dynamics import Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
-
-Array = NDArray[np.float64]
 
 MEASURED = ("u", "v", "r")
 LEAST_SAMPLES, LENGTHS = 8, 1.0  # a bump lasts so many samples, and so many ship lengths of way, at least

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, stretches_of_runs
+from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.document import short_names
 from shipid.identification.covariance import invert_information
 from shipid.identification.late import COARSE, row_interval
@@ -19,7 +18,6 @@ from shipid.identification.statistics import Statistics
 from shipid.units import significant_digits
 from shipid.vessel.dynamics import vessel_dynamics
 
-Array = NDArray[np.float64]
 HALF = 0.5  # rows by which commands that change between rows and are held from their row are late on average
 LEAST_ROWS = 0.2  # rows by which the fit is best with earlier commands: below, the log has them in time
 FARTHER = 0.5  # rows more or less than rows explain: the log, or an actuator, has another delay

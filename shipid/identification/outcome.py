@@ -12,12 +12,11 @@ from typing import Any, cast
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from shipid import document as documents
 from shipid.arguments import as_names, check_class, check_function_or_none, check_number
-from shipid.data.dataset import Dataset, without_shared_moments
+from shipid.data.dataset import Array, Dataset, without_shared_moments
 from shipid.data.held import constant_commands, warn_of_constant_commands
 from shipid.data.outputs import compare_outputs, outputs_in_common
 from shipid.data.windows import gaps_in_words
@@ -58,7 +57,6 @@ from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import patch_text
 from shipid.vessel.ranges import find_contradictions
 
-Array = NDArray[np.float64]
 BEFORE, AFTER = "before", "after"
 BETTER = 0.01  # of the limit of a profile: a point this much below the estimate is a better fit
 ERRORS_OF = ("u", "v", "r", "position")  # what free runs are judged by

@@ -15,12 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from shipid.data.dataset import Array
 from shipid.identification.statistics import LEVEL, Statistics, declared_error
 
-Array = NDArray[np.float64]
 Refit = Callable[[str, float, Array], tuple[float, Array]]
 """(path, value at which its factor is held, factors to start from (n,)) -> objective, factors (n,)."""
 

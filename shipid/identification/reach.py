@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.physics.signals import is_steering
 from shipid.units import DEGREE, join_names
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 ORDINARY = 0.995  # of the rows: what only fewer rows exceed may be noise
 MARGIN = 1.1  # a manoeuvre within this factor of the data is no extrapolation
 SLOW = 0.1  # of the greatest speed: slower rows have no drift angle

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, stretches_of_runs
+from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.engine.libraries import NoLibrary
 from shipid.engine.native import find_compiler, refuse_compiling
 from shipid.errors import DataError, DocumentError, suggest_name
@@ -31,7 +31,6 @@ from shipid.simulation.log import state_column
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 MISSED = 0.02  # of speed, length and 1 rad: what a fitted model misses; 0.1 m/s and 0.2 deg/s at 5 m/s and 29 m
 NORMAL_MEDIAN = 0.6745  # of the absolute values of a standard normal variable
 # Steps times entries of the sensitivities: below it CasADi's virtual machine is faster than compiling.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset, clock_slack, sample_columns, stretch_rows, stretches_of_runs
+from shipid.data.dataset import Array, Dataset, clock_slack, sample_columns, stretch_rows, stretches_of_runs
 from shipid.data.windows import is_without_rows
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, suggest_name
@@ -17,7 +17,6 @@ from shipid.identification.late import COARSE, Changes, held_over_steps, interpo
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 LEAST_STEPS = 2
 
 

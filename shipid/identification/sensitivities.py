@@ -15,8 +15,8 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 from casadi import SX
-from numpy.typing import NDArray
 
+from shipid.data.dataset import Array
 from shipid.engine.casadi import summed_rates
 from shipid.engine.integrate import Method, integrate_step
 from shipid.identification.settings import MOVING
@@ -25,7 +25,6 @@ from shipid.physics.signals import is_output
 from shipid.simulation.log import body_velocities, horizontal_velocities
 from shipid.vessel.dynamics import Dynamics
 
-Array = NDArray[np.float64]
 THRUST = re.compile(r"thruster\.[^.]+\.(?:k_T|(?:K_T|K_T_astern|C_T)\..+|k_P|k_J|T_nn|T_nu|T_uu|dT_nu)")
 """Parameters in which the thrust of azimuth units and screws is linear."""
 

@@ -9,11 +9,11 @@ from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
 
 from shipid import document as documents
 from shipid.checked import CheckedModel
+from shipid.data.dataset import Array
 from shipid.engine.integrate import Method
 from shipid.errors import DocumentError, suggest_name
 from shipid.identification.late import Changes
@@ -23,7 +23,6 @@ from shipid.vessel.load import Vessel
 from shipid.vessel.perturb import select_paths
 from shipid.vessel.schema import SHARED
 
-Array = NDArray[np.float64]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 BLOCK = "identify"
 POSITIVE = 1e-3  # least factor of a number that must not be 0: a mass, a diameter, a resistance

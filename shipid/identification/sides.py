@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.identification.free_run import MEASURED
 from shipid.identification.segments import near_a_row
 from shipid.physics.signals import is_steering
@@ -23,7 +23,6 @@ from shipid.units import DEGREE, percent_text
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 LEVELS = (2.5, 7.5, 12.5, 17.5, 22.5, 27.5, 32.5)  # deg, between levels of helm that trials have
 TURNING = 0.1  # of the greatest yaw rate: slower rows turn to no side
 WORSE, LEAST = 2.0, 0.05  # a side is worse from this ratio of errors on, and from this error of the turning on

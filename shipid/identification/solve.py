@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.arguments import as_float_array, as_names, check_class, check_function_or_none, check_mapping
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, suggest_name
 from shipid.identification.covariance import invert_information
 from shipid.identification.fit import BEGIN, Point, Progress, Result, evaluate_factors, initial_point, search_factors
@@ -23,7 +23,6 @@ from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.identification.stream import LEAST_RUNS, current_sentence, estimate_currents
 from shipid.vessel.load import Vessel
 
-Array = NDArray[np.float64]
 DISCOUNTS, LEAST = 2, 1e-3  # fits with discounted residuals; least factor on a deviation
 UNEVEN = 0.01  # of the time between rows: a difference above it counts
 FAR = 0.05  # of the time in which a ship goes her length: between rows so far apart, lines miss how she turns

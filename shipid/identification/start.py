@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError
 from shipid.identification.fit import BEGIN, Progress, Result, initial_point, search_factors
 from shipid.identification.inverse import inverse_dynamics
@@ -16,7 +15,6 @@ from shipid.identification.residuals import Problem, build_problem
 from shipid.identification.segments import ShootingSegment
 from shipid.identification.settings import ENVIRONMENT, resolve_overrides
 
-Array = NDArray[np.float64]
 HORIZONS = (2.0, 5.0, 15.0, 60.0)  # s
 ENOUGH = 20000  # steps of all predictions of a short horizon: more take time and change a start little
 ROUGH, MOST = 1e-3, 25  # tolerance and evaluations of a short horizon

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.identification.covariance import invert_information
 from shipid.identification.free_run import with_current
 from shipid.identification.residuals import CURRENT, build_problem, predict_residuals, typical_errors
@@ -17,7 +16,6 @@ from shipid.identification.solution import Solution
 from shipid.identification.statistics import LinearFit, residual_whiteness
 from shipid.units import percent_text, significant_digits
 
-Array = NDArray[np.float64]
 CurrentKind = Literal["none", "one", "by run"]
 LEAST_RUNS = 2  # of one run a current is as well a wrong vessel
 

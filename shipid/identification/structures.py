@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipid import document as documents
-from shipid.data.dataset import Dataset
+from shipid.data.dataset import Array, Dataset
 from shipid.errors import DataError, DocumentError, ShipidError, suggest_name
 from shipid.identification.inverse import force_equations
 from shipid.identification.settings import Identify, measured_constants, without_zeros
@@ -28,7 +27,6 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
 from shipid.vessel.perturb import select_paths
 
-Array = NDArray[np.float64]
 PRESENT = "present"
 """Name of the hull as the vessel has it, with the numbers that the settings leave free."""
 OF_VALUE, SHARE = 0.3, 0.03  # standard deviation of a prior: of the value at the start, of the hull's force

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.engine.casadi import evaluate_samples
-from shipid.engine.integrate import Method
+from shipid.engine.integrate import Array, Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import course_helmsman
@@ -22,8 +22,6 @@ from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
 from shipid.vessel.stability import balanced_shaft_speed, bisect_root, straight_acceleration
-
-Array = NDArray[np.float64]
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
 FROUDE = 0.2  # of the service speed of a ship whose document gives none

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, 
 
 from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.errors import DocumentError, suggest_name
-from shipid.measures.record import Measures, Record
+from shipid.measures.record import Array, Measures, Record
 from shipid.measures.spiral import SpiralLevels, helm_levels, spiral_measures
 from shipid.measures.stopping import stopping_measures
 from shipid.measures.turning import pull_out_measures, turning_measures
@@ -31,7 +31,6 @@ from shipid.units import DEGREE, RPM
 from shipid.vessel.perturb import check_rising
 from shipid.vessel.schema import term_blocks
 
-Array = NDArray[np.float64]
 Range = tuple[FiniteFloat, FiniteFloat]
 MOST_HELM, MOST_HEADING = 90.0, 180.0  # deg
 Helm = Annotated[FiniteFloat, Field(ge=-MOST_HELM, le=MOST_HELM)]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shipid.arguments import as_float_array, as_names, check_choice, check_mapping, check_positive, whole_steps
 from shipid.engine.casadi import evaluate_samples
 from shipid.engine.engines import engine_by_name
-from shipid.engine.integrate import Method
+from shipid.engine.integrate import Array, Method
 from shipid.engine.rollout import Trajectories, rollout
 from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics.helm import Helmsman
@@ -23,8 +23,6 @@ from shipid.simulation.manoeuvre import ApproachedManoeuvre, Manoeuvre
 from shipid.units import DEGREE
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
-
-Array = NDArray[np.float64]
 
 
 def perform_manoeuvres(

@@ -16,7 +16,7 @@ from shipid.arguments import check_class, whole_steps
 from shipid.capacity import excess_memory_words
 from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.document import requirement_words, taken_for_numbers
-from shipid.engine.integrate import Method
+from shipid.engine.integrate import Array, Method
 from shipid.errors import DocumentError, ShipidError, suggest_name
 from shipid.physics.signals import ACTUAL, is_output, is_wrapped_angle, measurable_signals
 from shipid.simulation.approach import Controls
@@ -43,7 +43,6 @@ At = Callable[[str], float]
 SHARED = ("name", "duration")  # keys of a kind that [truth] sets for all runs
 SEEDS = 2**31  # number of different seeds that may be drawn
 COURSE = "course_deg"
-Array = np.ndarray
 SpeedRange = Annotated[tuple[NotNegative, NotNegative], AfterValidator(check_rising)]
 MOST_LOST = 0.05  # largest share of the energy of a sea outside the frequencies of a vessel's tables
 WEATHER = ("V_w", "beta_w", "V_c", "beta_c")  # drawn from wind_speed, current_speed, and directions from anywhere
