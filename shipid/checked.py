@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import BaseModel, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from shipid.document import check_numbers, parse_model
 from shipid.errors import DocumentError
@@ -37,7 +37,12 @@ else:
 
 
 class CheckedModel(BaseModel, metaclass=OneLine):
-    """A pydantic model of which constructor and `model_validate` raise DocumentError, as for a file."""
+    """A pydantic model of which constructor and `model_validate` raise DocumentError, as for a file.
+
+    Unknown keys are refused, and values do not change.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     @classmethod
     def model_validate(cls, obj: Any, **_: Any) -> Self:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator, model_validator
+from pydantic import BaseModel, Field, FiniteFloat, field_validator, model_validator
 
 from shipid import document as documents
 from shipid.checked import CheckedModel
@@ -63,7 +63,6 @@ class Identify(CheckedModel, BaseModel):
     (current, velocity_bias), rad (heading_bias), m (lever_arm), s (latency), 1 (thrust_scale).
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     parameters: Annotated[list[str], Field(min_length=1)] = Field(
         description="dotted paths; * and [order >= 3] select, as in a family, but no constants and no dimensions"
     )

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt
+from pydantic import AfterValidator, BaseModel, Field, FiniteFloat, PositiveInt
 
 from shipid.checked import CheckedModel, NotNegative, Positive
 from shipid.errors import DocumentError, suggest_name
@@ -63,7 +63,6 @@ class StartState:
 class Manoeuvre(CheckedModel, BaseModel, ABC):
     """Base class of all kinds of manoeuvre: name, initial heading, initial state and orders."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     name: Annotated[str | None, Field(description="of the run; absent: M001, M002, ...")] = None
     course_deg: Annotated[FiniteFloat, Field(description="deg, heading at t = 0")] = 0.0
 

@@ -159,7 +159,6 @@ class Truth(CheckedModel, BaseModel):
     do not change the others. Directions are in [0, 360) deg.
     """
 
-    model_config = ConfigDict(extra="forbid")
     vessel: str
     set: dict[str, Any] = Field(default={}, description="dotted path -> number or block, added to the vessel")
     manoeuvres: Annotated[int, Field(ge=2, le=100000)]
@@ -399,7 +398,6 @@ def _script_manoeuvres(script: Script, vessel: Vessel) -> list[Manoeuvre]:
 class Sensor(CheckedModel, BaseModel):
     """One sensor of a `sensors` table: column -> block, in the SI unit of the column."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     noise: Annotated[NotNegative, Field(description="standard deviation of the white noise on each sample")] = 0.0
     bias: Annotated[
         NotNegative, Field(description="standard deviation over runs of an offset that is constant in a run")

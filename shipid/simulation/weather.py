@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import (
     AfterValidator,
     BaseModel,
-    ConfigDict,
     Field,
     FiniteFloat,
     PositiveFloat,
@@ -38,7 +37,6 @@ SIDE = {axis: 1 if place in EVEN else -1 for place, axis in enumerate(AXES)}  # 
 class Gusts(CheckedModel, BaseModel):
     """A `gusts` block: spectrum, which depends on wind speed and height only, and frequency band [Hz]."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
     kind: Literal["npd"]
     height: Annotated[Positive, Field(description="m above the sea")] = 10.0
     frequencies: Annotated[
@@ -119,7 +117,6 @@ class Sea(CheckedModel, BaseModel):
     Its components hold 99 % of the energy: those from half to 3.2 times the peak frequency.
     """
 
-    model_config = ConfigDict(extra="forbid")
     H_s: Annotated[FiniteFloat, Field(ge=0, description="m, significant wave height")]
     T_p: Annotated[PositiveFloat, Field(description="s, peak period")]
     gamma: Annotated[FiniteFloat, Field(ge=1, le=10, description="peak enhancement; 1 is Pierson-Moskowitz")] = 3.3

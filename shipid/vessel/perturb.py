@@ -180,7 +180,6 @@ def _block_model(rules: tuple[tuple[str, PerturbationRule], ...]) -> type[BaseMo
 class Family(CheckedModel, BaseModel):
     """A `[[family]]` block of a document: so many members of one base, perturbed by the same rules."""
 
-    model_config = ConfigDict(extra="forbid")
     name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_.+-]{0,79}$")]
     base: str | None = None
     extends: str | None = Field(default=None, description="a family whose base and perturbations come first")
