@@ -1,8 +1,7 @@
 """Experiment design: the manoeuvre with the greatest expected information gain (Bayesian D-optimality).
 
-Each candidate is simulated with the present parameters, cut into predictions of one horizon, and replayed with every
-perturbed parameter set: central differences give the sensitivities J of the measured signals, free initial states are
-projected out. Added to the present information M it gains
+Each candidate is simulated with the present parameters and cut into the predictions of a fit, each of whose initial
+states is known by its row alone. Added to the present information M their marginal Jacobian J gains
 
 gain = 1/2 log2 det(M + J^T J) / det(M)     bits.
 
@@ -14,29 +13,26 @@ Sources: Lindley, Annals of Mathematical Statistics 27 (1956) 986; Chaloner, Ver
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from shipid.data.dataset import Array, Dataset
-from shipid.engine.rollout import rollout
-from shipid.errors import ShipidError, suggest_name
-from shipid.identification.settings import WEIGHTED
+from shipid.errors import ShipidError
+from shipid.identification.residuals import build_problem, predict_residuals
+from shipid.identification.settings import Identify, free_factors
 from shipid.physics.signals import ACTUAL
 from shipid.simulation.approach import FROUDE, Controls, NotStraight
-from shipid.simulation.log import body_velocities, horizontal_velocities
 from shipid.simulation.manoeuvre import ApproachedManoeuvre, Excitation
 from shipid.simulation.perform import perform_manoeuvres
 from shipid.simulation.standard import define_standard, shaft_speed
-from shipid.units import GRAVITY, RPM, percent_text
-from shipid.vessel.dynamics import vessel_dynamics
+from shipid.units import GRAVITY, RPM
 from shipid.vessel.load import Vessel
 
-PERTURBED, START = 0.01, {"u": 0.01, "v": 0.01, "r": 0.001, "psi": 0.001, "north": 0.1, "east": 0.1}
+MEASURED_ONCE = 1.0  # standard deviations of the signals: an initial state is known by its row alone
 UNKNOWN = 1.0  # standard deviation of a factor of which nothing is known
 SWING = 0.3  # of the shaft speed: how far it moves in speed runs
 RUN = 20.0  # ship lengths at the speed of the approach that a run of excitation takes
@@ -129,38 +125,33 @@ def within_limits(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:
 
 
 def information_of_candidates(
-    vessel: Vessel,
-    choice: Sequence[Candidate],
-    groups: Sequence[Sequence[str]],
-    *,
-    scale: Sequence[Sequence[float]] | None = None,
-    weights: Mapping[str, float],
-    horizon: float = 30.0,
-    interval: float = 1.0,
-    step: float | None = None,
+    vessel: Vessel, choice: Sequence[Candidate], settings: Identify, factors: Array | None = None
 ) -> list[InformedCandidate]:
-    """Simulate candidates and compute the Fisher information of the factors that each adds.
+    """Simulate candidates and compute the Fisher information of the free factors that each adds.
 
-    groups : parameter paths that share each of the n factors. scale : their values at factor 1; default: the vessel's.
-    weights : measured signal (u, v, r, psi, position) -> standard deviation [m/s, rad/s, rad, m].
-    horizon : of a prediction [s], 0 for whole runs. interval : between measured rows [s].
-    step : of the integration (RK4) [s]; default: a part of the interval of about 0.2 s by Froude's scale.
+    vessel : the base. settings : of the fit: rows are its step apart. factors : (n,) of the ship that performs them;
+    default: those of the base.
 
-    Raises ShipidError for an unknown signal, no candidate, or one that cannot be simulated.
+    Raises ShipidError for no candidate, or one that cannot be simulated.
     """
-    unknown = next((name for name in weights if name not in WEIGHTED), None)
-    if unknown is not None:
-        raise ShipidError(f"no signal {unknown!r}: {suggest_name(unknown, WEIGHTED)}", path="weights")
     if not choice:
         raise ShipidError("no manoeuvre is within the limits of the actuators")
-    every = steps_between(vessel, interval) if step is None else max(round(interval / step), 1)
-    fine = interval / every
-    log = perform_candidates(vessel, choice, step=fine)
-    cut = _cut_predictions(vessel, log, round(horizon / interval) * every, every)
-    signals = {name: width for signal, width in weights.items() for name in WEIGHTED[signal]}
-    by_factor, by_start = _finite_difference_sensitivities(vessel, cut, groups, scale, signals, fine, every)
-    each = _project_out_start(by_factor, by_start)
-    return [InformedCandidate(one, each[cut.runs == number].sum(axis=0)) for number, one in enumerate(choice)]
+    horizon = settings.horizon if settings.horizon <= min(one.manoeuvre.length for one in choice) else 0.0
+    alone = {"nuisance": {"initial_state": MEASURED_ONCE}, "current": "none", "runs": {}, "commands": "held"}
+    settings = settings.model_copy(update={**alone, "loss": "squared", "horizon": horizon})
+    unknown = free_factors(vessel, settings)
+    factors = unknown.centre if factors is None else factors
+    ship = vessel.with_values(unknown.values(factors))
+    step = settings.step / steps_between(ship, settings.step)
+    log = perform_candidates(ship, choice, step=step, interval=settings.step)
+    rows = log[[name for name in log if not str(name).startswith(ACTUAL)]]
+    dataset = Dataset(rows, {"clock": "run", "flags": []})
+    problem = build_problem(vessel, dataset, dataset.runs, settings)
+    at = predict_residuals(problem, factors, np.zeros((len(choice), 0)))
+    if not np.isfinite(at.by_factor).all():
+        raise ShipidError(f"{ship.name} diverges in steps of {settings.step:g} s: take a shorter step")
+    slopes = [at.marginal()[1][at.rows(number)] for number in range(len(choice))]
+    return [InformedCandidate(one, J.T @ J) for one, J in zip(choice, slopes, strict=True)]
 
 
 def information_where_possible(
@@ -205,112 +196,6 @@ def steps_between(vessel: Vessel, interval: float) -> int:
     length = vessel.length or 30.0
     passing = length / (FROUDE * float(np.sqrt(GRAVITY * length)))
     return max(int(np.ceil(40 * interval / passing)), 1)
-
-
-@dataclass(frozen=True)
-class _Cut:
-    """S predictions: name -> (S,) initial states and actuator states, name -> (T, S) commands and environment.
-
-    runs : (S,) index of the candidate. seen : (R, S) whether a record lies within its run.
-    """
-
-    start: dict[str, Array]
-    memory: dict[str, Array]
-    commands: dict[str, Array]
-    environment: dict[str, Array]
-    runs: NDArray[np.int64]
-    seen: NDArray[np.bool_]
-
-
-def _cut_predictions(vessel: Vessel, log: pd.DataFrame, steps: int, every: int) -> _Cut:
-    """Cut logs into predictions of `steps` steps (0: whole runs); the last, shorter one of each run is kept."""
-    model, names = vessel_dynamics(vessel), log["run"].to_numpy()
-    bounds = [(np.flatnonzero(names == run)[0], int((names == run).sum())) for run in dict.fromkeys(names)]
-    whole = max(count - 1 for _, count in bounds)
-    most = steps or -(-whole // every) * every
-    firsts, lasts, runs = [], [], []
-    for run, (first, count) in enumerate(bounds):
-        for begin in range(0, max(count - 1 - every, 1), most):
-            firsts.append(first + begin)
-            lasts.append(first + min(begin + most, count - 1))
-            runs.append(run)
-    rows = np.minimum(np.array(firsts) + np.arange(most)[:, None], np.array(lasts))  # (T, S)
-    records = np.array(firsts) + np.arange(0, most + 1, every)[:, None]
-    columns = {str(name): log[name].to_numpy() for name in log.columns if name != "run"}
-    columns |= {**body_velocities(columns), "down": columns.get("z", np.zeros(len(log)))}
-    still = np.zeros(len(log))
-    return _Cut(
-        {name: columns.get(name, still)[rows[0]] for name in (*model.state, *model.hidden)},
-        {name: columns[f"{ACTUAL}{name}"][rows[0]] for name in model.memory},
-        {name: columns[name][rows] for name in model.commands},
-        {name: columns.get(name, still)[rows] for name in model.environment},
-        np.array(runs),
-        records <= np.array(lasts),
-    )
-
-
-def _finite_difference_sensitivities(
-    vessel: Vessel,
-    cut: _Cut,
-    groups: Sequence[Sequence[str]],
-    scale: Sequence[Sequence[float]] | None,
-    signals: Mapping[str, float],
-    step: float,
-    every: int,
-) -> tuple[Array, Array]:
-    """Central differences of the signals over their standard deviations.
-
-    To the factors (S, R * signals, n) and to the initial states (S, R * signals, q).
-    """
-    names, base = list(vessel.parameters), np.array(list(vessel.parameters.values()))
-    moves = np.zeros((len(groups), len(base)))
-    for j, group in enumerate(groups):
-        for path, size in zip(group, [vessel.parameters[p] for p in group] if scale is None else scale[j], strict=True):
-            moves[j, names.index(path)] = PERTURBED * size
-    copies = np.concatenate([base + moves, base - moves])
-    how: dict[str, Any] = {
-        "step": step,
-        "num_steps": len(next(iter(cut.commands.values()))),
-        "every": every,
-        "method": "rk4",
-    }
-
-    def records(start: dict[str, Array], times: int, parameters: Array) -> Array:  # (R, V, S, signals), whitened
-        def tiled(given: dict[str, Array]) -> dict[str, Array]:
-            return {name: np.concatenate([values] * times, axis=-1) for name, values in given.items()}
-
-        path = rollout(
-            vessel, start, tiled(cut.commands), tiled(cut.environment), parameters=parameters,
-            memory=tiled(cut.memory) if cut.memory else None, **how,
-        )  # fmt: skip
-        if path.diverged.any():
-            raise ShipidError(
-                f"{vessel.name} diverges with a factor changed by {percent_text(PERTURBED)}: take a shorter step"
-            )
-        states = {name: path[name] for name in vessel_dynamics(vessel).state}
-        seen = states | horizontal_velocities(states)
-        return np.stack([seen[name] / width for name, width in signals.items()], axis=-1)
-
-    def rows(values: Array) -> Array:  # (R, k, S, signals) -> (S, R * signals, k)
-        inside = np.where(cut.seen[:, None, :, None], values, 0.0)
-        return inside.transpose(2, 0, 3, 1).reshape(len(cut.runs), -1, values.shape[1])
-
-    family = records(cut.start, 1, copies)
-    by_factor = rows((family[:, : len(groups)] - family[:, len(groups) :]) / (2 * PERTURBED))
-    free = [name for name in START if name in ("u", "v", "r") or name in signals]
-    starts = [{**cut.start, name: cut.start[name] + sign * START[name]} for sign in (1, -1) for name in free]
-    begun = {name: np.concatenate([start[name] for start in starts]) for name in cut.start}
-    moved = records(begun, len(starts), base[None])[:, 0]
-    apart = moved.reshape(len(moved), 2, len(free), len(cut.runs), len(signals))
-    sizes = np.array([START[name] for name in free])[:, None, None]
-    return by_factor, rows((apart[:, 0] - apart[:, 1]) / (2 * sizes))
-
-
-def _project_out_start(by_factor: Array, by_start: Array) -> Array:
-    """Fisher information (S, n, n) of the factors from each prediction, its initial state projected out."""
-    crossed = by_start.swapaxes(1, 2) @ by_factor
-    known = by_start.swapaxes(1, 2) @ by_start
-    return np.asarray(by_factor.swapaxes(1, 2) @ by_factor - crossed.swapaxes(1, 2) @ np.linalg.pinv(known) @ crossed)
 
 
 def rank_candidates(

@@ -633,10 +633,8 @@ def _next_manoeuvres(
     spread = {name: width * (residual_level(judged, name) or EXACT) for name, width in motions.items()}
     try:
         choice = design.candidate_manoeuvres(vessel, (speed / 2, speed), limits)
-        contributions = design.information_where_possible(
-            vessel, choice, unknown.groups[:own], scale=unknown.scale[:own], weights=spread, horizon=settings.horizon,
-            interval=settings.step,
-        )  # fmt: skip
+        settings = settings.model_copy(update={"weights": spread})
+        contributions = design.information_where_possible(solution.vessel, choice, settings, solution.factors[:own])
     except ShipidError as error:  # no shaft speed gives these speeds, or the ship has no length
         return None, f"no manoeuvres to run next: {error.message}"
     possible = {one.candidate.title for one in contributions}

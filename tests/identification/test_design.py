@@ -17,6 +17,7 @@ from shipid.identification.design import (
     rank_candidates,
     within_limits,
 )
+from shipid.identification.settings import Identify
 from shipid.simulation.manoeuvre import (
     ApproachedManoeuvre,
     CrashStop,
@@ -31,14 +32,14 @@ from shipid.vessel.load import load_vessel
 SHIP = load_vessel("gunnerus-28.9")
 WEIGHTS = {"u": 0.1, "v": 0.1, "r": 0.0035}
 PATHS = tuple(f"hull.derivatives.{name}" for name in ("X_u|u|", "Y_ur", "N_ur", "N_r|r|"))
-GROUPS = [[path] for path in PATHS]
+SETTINGS = Identify(parameters=list(PATHS), weights=WEIGHTS)
 CHOICE = candidate_manoeuvres(SHIP, [3.0])
 
 
 @cache
 def informed_choice() -> list[InformedCandidate]:
     """What each candidate tells of the four factors."""
-    return information_of_candidates(SHIP, CHOICE, GROUPS, weights=WEIGHTS)
+    return information_of_candidates(SHIP, CHOICE, SETTINGS)
 
 
 def kind(title: str) -> str:
@@ -82,10 +83,11 @@ def test_information_adds() -> None:
 
 def test_sensitivities_are_those_of_the_trajectory() -> None:
     """Free starts cost information; half the standard deviation brings four times as much; longer predictions more."""
-    short = information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights=WEIGHTS, horizon=5.0)[0].information
-    sharp = information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights={k: w / 2 for k, w in WEIGHTS.items()})[
-        0
-    ].information
+    half = {name: width / 2 for name, width in WEIGHTS.items()}
+    short, sharp = (
+        information_of_candidates(SHIP, CHOICE[:1], SETTINGS.model_copy(update=change))[0].information
+        for change in ({"horizon": 5.0}, {"weights": half})
+    )
     assert (np.diag(short) < np.diag(informed_choice()[0].information)).all()
     np.testing.assert_allclose(sharp, 4 * informed_choice()[0].information, rtol=1e-9)
 
@@ -93,18 +95,16 @@ def test_sensitivities_are_those_of_the_trajectory() -> None:
 def test_what_the_ship_cannot_perform_is_left_out_and_the_others_are_as_they_were() -> None:
     wild = SHIP.with_values({"hull.derivatives.N_rrr": 2e10})  # she spins up in a hard turn
     with pytest.raises(ShipidError, match="diverges"):
-        information_of_candidates(wild, CHOICE, GROUPS, weights=WEIGHTS)
-    some = information_where_possible(wild, CHOICE, GROUPS, weights=WEIGHTS)
+        information_of_candidates(wild, CHOICE, SETTINGS)
+    some = information_where_possible(wild, CHOICE, SETTINGS)
     titles = {kind(one.candidate.title) for one in some}
     assert "speed" in titles
     assert "turning" not in titles
     speed = next(one for one in some if kind(one.candidate.title) == "speed")
-    alone = information_of_candidates(wild, [speed.candidate], GROUPS, weights=WEIGHTS)[0]
+    alone = information_of_candidates(wild, [speed.candidate], SETTINGS)[0]
     np.testing.assert_allclose(speed.information, alone.information, rtol=1e-9)
     with pytest.raises(ShipidError, match="diverges"):
-        information_where_possible(
-            wild, [one for one in CHOICE if kind(one.title) == "turning"], GROUPS, weights=WEIGHTS
-        )
+        information_where_possible(wild, [one for one in CHOICE if kind(one.title) == "turning"], SETTINGS)
 
 
 @pytest.mark.parametrize(
@@ -128,8 +128,6 @@ def test_no_kind_orders_more_than_the_limits(manoeuvre: ApproachedManoeuvre, hel
     assert np.abs(manoeuvre.shaft(time)).max() <= rpm / 60 + 1e-9
 
 
-def test_mistakes_are_reported() -> None:
-    with pytest.raises(ShipidError, match="position"):
-        information_of_candidates(SHIP, CHOICE[:1], GROUPS, weights={"north": 1.0})
+def test_without_a_candidate_it_is_said() -> None:
     with pytest.raises(ShipidError, match="within the limits"):
-        information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], Limits(n_rpm=1.0)), GROUPS, weights=WEIGHTS)
+        information_of_candidates(SHIP, candidate_manoeuvres(SHIP, [3.0], Limits(n_rpm=1.0)), SETTINGS)
