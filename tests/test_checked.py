@@ -57,7 +57,6 @@ def test_a_wrong_value_is_named(kind: Any, given: dict[str, Any], line: str) -> 
     with pytest.raises(DocumentError) as caught:
         kind(**given)
     assert str(caught.value).startswith(line)
-    assert "\n" not in str(caught.value)
 
 
 def test_an_argument_without_its_name_is_one_line() -> None:

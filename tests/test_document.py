@@ -93,7 +93,6 @@ def test_read_refuses_what_is_no_document(tmp_path: Path) -> None:
         with pytest.raises(DocumentError, match=remedy) as caught:
             documents.read_document(file)
         assert caught.value.file == str(file)
-        assert "\n" not in str(caught.value)
     for missing in (tmp_path / "gone.toml", tmp_path):
         with pytest.raises(DocumentError, match="cannot be read"):
             documents.read_document(missing)
@@ -144,7 +143,6 @@ def test_parse_says_where_what_and_what_would_be_right(data: Any, path: str, mes
         documents.parse_model(Outer, data, "x.toml", "top")
     assert caught.value.path == path
     assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 class Numbers(BaseModel):

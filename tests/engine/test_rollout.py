@@ -239,7 +239,6 @@ def test_a_missing_channel_is_named(bundled_vessel: Vessel, draw_inputs: Draw, g
     given[group][name + "_"] = given[group].pop(name)
     with pytest.raises(DataError, match=f"{name!r} is needed") as caught:
         rollout(bundled_vessel, **given, step=1.0, num_steps=2)
-    assert "\n" not in str(caught.value)
     assert bundled_vessel.name in str(caught.value)
 
 

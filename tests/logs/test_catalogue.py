@@ -56,9 +56,8 @@ def test_failed_downloads(failure: Exception, remedy: str, monkeypatch: pytest.M
 
     monkeypatch.delenv("SHIPID_DATA", raising=False)
     monkeypatch.setattr(pooch, "retrieve", refuse)
-    with pytest.raises(DataError, match=remedy) as caught:
+    with pytest.raises(DataError, match=remedy):
         fetch_log(NAME)
-    assert "\n" not in str(caught.value)
 
 
 def test_download_keeps_the_checksum(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

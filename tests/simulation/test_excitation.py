@@ -100,9 +100,8 @@ def test_rate_limit_is_respected_and_caught_up_with() -> None:
     ],
 )
 def test_wrong_orders_are_refused(call: Any, message: str) -> None:
-    with pytest.raises(DocumentError, match=message) as caught:
+    with pytest.raises(DocumentError, match=message):
         call()
-    assert "\n" not in str(caught.value)
 
 
 def held(series: np.ndarray, step: float = 0.1) -> np.ndarray:

@@ -170,9 +170,8 @@ def test_a_lock_is_verified_and_says_what_is_another(document: Path, tmp_path: P
     ):
         lock.write_text(re.sub(old, new, text, count=1))
         assert lock.read_text() != text
-        with pytest.raises(ShipidError, match=f"not as locked: .*{path}") as caught:
+        with pytest.raises(ShipidError, match=f"not as locked: .*{path}"):
             shipid.verify_lock(lock)
-        assert "\n" not in str(caught.value)
     with pytest.raises(DocumentError, match=r"holds no \[lock\]"):
         shipid.verify_lock(document)
 

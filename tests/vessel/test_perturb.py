@@ -211,7 +211,6 @@ def test_families_that_cannot_be_written_out(families: list[dict[str, Any]], rem
     with pytest.raises(DocumentError, match=remedy) as caught:
         resolve_families([Family(**given) for given in families], "study.toml")
     assert caught.value.path == path
-    assert "\n" not in str(caught.value)
 
 
 def test_a_member_is_a_whole_number() -> None:

@@ -142,9 +142,8 @@ def test_times_of_a_model_are_those_of_the_ship_over_root_scale() -> None:
 
 @pytest.mark.parametrize("propulsor", ["propeller-rudder", "azimuth"])
 def test_the_engines_rpm_is_refused(propulsor: str) -> None:
-    with pytest.raises(ShipidError, match="s it the engine's speed") as caught:
+    with pytest.raises(ShipidError, match="s it the engine's speed"):
         first_guess(replace(MARINER, rpm=1800, propulsor=propulsor), "m", "m.toml")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -179,7 +178,6 @@ def test_what_the_formulae_do_not_know_is_refused(change: dict[str, object], com
     with pytest.raises(ShipidError) as caught:
         first_guess(replace(MARINER, **change), "ship", "ship.toml")  # type: ignore[arg-type]
     assert complaint in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_no_motion_of_the_water_has_an_energy_below_0() -> None:

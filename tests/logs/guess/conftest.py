@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
+
+from shipid.logs.guess.sniff import LogTable, recognise_log
 
 T = np.arange(0.0, 10.0, 0.5)
 TABLE = pd.DataFrame({"time": T, "N": 1.5 * T, "psi": 30.0 + T})
@@ -22,3 +25,9 @@ def log_of(tmp_path: Path, lines: list[str], name: str = "log.csv") -> Path:
     file = tmp_path / name
     file.write_text("\n".join(lines) + "\n")
     return file
+
+
+def sniff(tmp_path: Path, table: pd.DataFrame, **written: Any) -> LogTable:
+    """Recognise a table that is written as a log."""
+    table.to_csv(tmp_path / "log.csv", index=False, **written)
+    return recognise_log(tmp_path / "log.csv")

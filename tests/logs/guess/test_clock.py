@@ -12,7 +12,7 @@ import pytest
 from shipid.errors import DataError
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.mapping import clock_seconds
-from tests.logs.guess.conftest import TABLE, T, log_of
+from tests.logs.guess.conftest import TABLE, T, log_of, sniff
 
 
 @pytest.mark.parametrize(
@@ -29,8 +29,7 @@ from tests.logs.guess.conftest import TABLE, T, log_of
     ],
 )
 def test_the_unit_of_the_clock(clock: object, unit: str, t: np.ndarray, tmp_path: Path) -> None:
-    TABLE.assign(time=clock).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, TABLE.assign(time=clock))
     assert sniffed.clock == {"from": "time", "unit": unit}
     np.testing.assert_allclose(sniffed.t, t, atol=1e-6)
 
@@ -76,17 +75,15 @@ def test_seconds_that_may_not_count_from_1970_are_asked(
 ) -> None:
     """A date of ten years ago, or of the future, was given without a word."""
     clock = unit * (pd.Timestamp("2024-05-14 08:00:00").timestamp() - begin + T)
-    TABLE.assign(time=clock).rename(columns={"time": name}).to_csv(tmp_path / "log.csv", index=False)
-    doubts = recognise_log(tmp_path / "log.csv").doubts
+    doubts = sniff(tmp_path, TABLE.assign(time=clock).rename(columns={"time": name})).doubts
     assert [words in doubt for doubt in doubts] == [True] * bool(words)
 
 
 def test_a_date_without_a_century_in_one_number_is_refused(tmp_path: Path) -> None:
     moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(np.arange(200), "s")
     log = pd.DataFrame({"time": moments.strftime("%d%m%y%H%M%S"), "N": 1.0, "psi": 2.0})
-    log.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match="'time' is a date and a time of day in one number, 140524081320: write 2024"):
-        recognise_log(tmp_path / "log.csv")
+        sniff(tmp_path, log)
 
 
 @pytest.mark.parametrize(("name", "step"), [("utc", 0.2), ("t", 10.0)])
@@ -94,8 +91,7 @@ def test_hours_minutes_and_seconds_in_one_number_are_no_seconds(name: str, step:
     t = step * np.arange(900)
     moments = pd.Timestamp("2024-05-14 08:13:20") + pd.to_timedelta(t, "s")
     log = pd.DataFrame({name: moments.strftime("%H%M%S.%f").str[:-4], "N": t, "psi": t})
-    log.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, log)
     assert sniffed.clock == {"from": name, "unit": "hhmmss"}
     np.testing.assert_allclose(sniffed.t, 8 * 3600 + 13 * 60 + 20 + t, atol=1e-6)
 
@@ -114,8 +110,7 @@ def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, 
     """A double has such a day to 1e-5 s, a table to as much as it writes."""
     t = step * np.arange(60)
     table = pd.DataFrame({name: [f"{DAYS_OF[unit] + one / 86400:.10f}" for one in t], "N": t, "psi": t})
-    table.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, table)
     assert sniffed.clock == {"from": name, "unit": unit}
     np.testing.assert_allclose(sniffed.t, START.timestamp() + t, atol=3e-5)
 
@@ -145,8 +140,7 @@ def test_days_of_matlab_and_excel_are_known_by_their_size(unit: str, name: str, 
 )
 def test_what_a_clock_counts_in(name: str, values: np.ndarray, unit: str, tmp_path: Path) -> None:
     table = TABLE.assign(time=values).rename(columns={"time": name})
-    table.to_csv(tmp_path / "log.csv", index=False, float_format="%.10f")
-    assert recognise_log(tmp_path / "log.csv").clock["unit"] == unit
+    assert sniff(tmp_path, table, float_format="%.10f").clock["unit"] == unit
 
 
 @pytest.mark.parametrize("day", ["%d.%m.%Y", "%m/%d/%Y"])
@@ -154,8 +148,7 @@ def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
     moments = pd.to_datetime(1.7e9 + T, unit="s")
     split = TABLE.assign(time=moments.strftime("%H:%M:%S.%f"))
     split.insert(0, "Day", moments.strftime(day))
-    split.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, split)
     assert sniffed.clock == {"from": "time", "unit": "date", "date": "Day"}
     np.testing.assert_allclose(sniffed.t, 1.7e9 + T, atol=1e-5)
     assert sniffed.notes == ()
@@ -163,8 +156,7 @@ def test_a_date_beside_times_of_day(day: str, tmp_path: Path) -> None:
 
 def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
     t = np.arange(0.0, 60.0, 0.1)
-    pd.DataFrame({"time": np.floor(t + 1e-9), "N": t, "psi": t}).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, pd.DataFrame({"time": np.floor(t + 1e-9), "N": t, "psi": t}))
     assert sniffed.clock == {"from": "time", "unit": "s", "every": 0.1}
     np.testing.assert_allclose(np.diff(sniffed.t), 0.1, rtol=1e-6)
 
@@ -172,10 +164,8 @@ def test_a_clock_rounded_to_seconds_has_its_rate(tmp_path: Path) -> None:
 def test_a_clock_is_preferred_by_its_name_and_to_numbers_of_rows(tmp_path: Path) -> None:
     counted = TABLE.rename(columns={"time": "time_s"})
     counted.insert(0, "row", range(len(T)))
-    counted.to_csv(tmp_path / "log.csv", index=False)
-    assert recognise_log(tmp_path / "log.csv").clock["from"] == "time_s"
-    counted.rename(columns={"time_s": "x"}).assign(N=1.0, psi=2.0).to_csv(tmp_path / "log.csv", index=False)
-    assert recognise_log(tmp_path / "log.csv").clock["from"] == "x"
+    assert sniff(tmp_path, counted).clock["from"] == "time_s"
+    assert sniff(tmp_path, counted.rename(columns={"time_s": "x"}).assign(N=1.0, psi=2.0)).clock["from"] == "x"
 
 
 @pytest.mark.parametrize(
@@ -262,8 +252,7 @@ def test_clocks_that_begin_again_and_days_of_the_year(
 def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) -> None:
     """As MATLAB writes those of a timetable, and pandas its own."""
     times = [write.format(0.5 * k) if isinstance(write, str) else write(0.5 * k) for k in range(600)]
-    with_clock("Time", times).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, with_clock("Time", times))
     assert sniffed.clock == {"from": "Time", "unit": "date"}
     np.testing.assert_allclose(sniffed.t, 0.5 * np.arange(600), atol=1e-6)
 
@@ -282,9 +271,8 @@ def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp
 def test_a_counter_that_is_full_has_its_remedy(size: int, step: int, tmp_path: Path) -> None:
     """As of milliseconds in 16 bits, or microseconds in 32."""
     values = [(size - 100 * step + 7 + step * k) % size for k in range(600)]
-    with_clock("time", values).assign(north=0.0).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=rf"'time' is a counter that begins again at {size} in row 101: add {size}"):
-        recognise_log(tmp_path / "log.csv")
+        sniff(tmp_path, with_clock("time", values).assign(north=0.0))
 
 
 @pytest.mark.parametrize(
@@ -383,8 +371,7 @@ def test_a_second_clock_that_goes_otherwise_is_asked(
         time=long, **{name: 10.0 * values if name != "timestamp" else values for name, values in second.items()}
     )
     log = log.assign(timestamp=1.7e9 + long) if "timestamp" in second else log
-    log.to_csv(tmp_path / "log.csv", index=False)
-    doubts = recognise_log(tmp_path / "log.csv").doubts
+    doubts = sniff(tmp_path, log).doubts
     assert [doubt.partition(",")[0] for doubt in doubts] == [f"{next(iter(second))!r} is a clock"] * asked
 
 

@@ -13,7 +13,7 @@ from shipid.logs.formats import TextFormat
 from shipid.logs.guess.clock import name_without_unit
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.readers import read_log_table
-from tests.logs.guess.conftest import TABLE, T, log_of, text
+from tests.logs.guess.conftest import TABLE, T, log_of, sniff, text
 
 
 @pytest.mark.parametrize(
@@ -217,8 +217,7 @@ def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, di
 
     large = np.round(7_034_120.4 + 97.3 * T * (-1) ** np.arange(len(T)), digits) if digits else np.round(1800 + 3 * T)
     table = TABLE.assign(lat=63.4399978 + 1e-5 * T, N=[written(one) for one in large])
-    table.to_csv(tmp_path / "log.csv", index=False, sep=separator, decimal=decimal)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, table, sep=separator, decimal=decimal)
     assert sniffed.form.items() >= {"decimal": decimal, "thousands": mark, "separator": separator}.items()
     np.testing.assert_allclose(sniffed.columns["N"], large)
     np.testing.assert_allclose(sniffed.columns["lat"], table["lat"])
@@ -228,8 +227,7 @@ def test_marks_of_thousands_are_read(decimal: str, mark: str, separator: str, di
 def test_three_decimals_are_no_groups(decimal: str, tmp_path: Path) -> None:
     """1,800 is 1.8 where nothing in the log says that it is 1800."""
     table = TABLE.assign(time=TABLE["time"] + 1.0)
-    table.to_csv(tmp_path / "log.csv", index=False, sep=";", decimal=decimal, float_format="%.3f")
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, table, sep=";", decimal=decimal, float_format="%.3f")
     assert "thousands" not in sniffed.form
     np.testing.assert_allclose(list(sniffed.columns.values()), [1.5 * T, 30.0 + T])
 

@@ -13,7 +13,7 @@ from shipid.errors import DataError
 from shipid.logs.guess.clock import name_without_unit
 from shipid.logs.guess.layout import split_cells
 from shipid.logs.guess.sniff import recognise_log
-from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, text
+from tests.logs.guess.conftest import SUMMER_TIME_ENDS, TABLE, T, log_of, sniff, text
 
 
 def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None:
@@ -29,8 +29,7 @@ def test_cells_of_a_matlab_file_are_left_out_with_a_note(tmp_path: Path) -> None
 
 
 def test_words_and_empty_columns_are_left_out_with_a_note(tmp_path: Path) -> None:
-    TABLE.assign(mode="auto", spare=np.nan, N=TABLE["N"].where(T != 2.0)).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, TABLE.assign(mode="auto", spare=np.nan, N=TABLE["N"].where(T != 2.0)))
     assert list(sniffed.columns) == ["N", "psi"]
     assert sniffed.notes == ("column 'mode' holds words, not numbers", "column 'spare' is empty")
     assert np.flatnonzero(np.isnan(sniffed.columns["N"])).tolist() == [4]
@@ -198,8 +197,7 @@ def test_degrees_and_minutes_in_columns(
     parts = [-np.floor(size), np.floor(size % 1 * 60), size % 1 * 60 % 1 * 60]
     parts = [parts[0], size % 1 * 60] if len(names) == 2 else parts
     parts = [-size, -size] if columns is None else parts
-    TABLE.assign(**dict(zip(names, parts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, TABLE.assign(**dict(zip(names, parts, strict=True))))
     assert sniffed.in_parts == (columns or {} if columns is None else columns or {" + ".join(names): names})
     if columns is not None:
         np.testing.assert_allclose(sniffed.columns[" + ".join(names)], -size)
@@ -223,8 +221,7 @@ def test_positions_as_text(
     texts = [south, [f"010°{one % 1 * 60:.5f}'E" for one in degrees]]
     texts = [[f"{one} {other}" for one, other in zip(*texts, strict=True)]] if len(names) == 1 else texts
     texts[0][3] = nothing
-    TABLE.assign(**dict(zip(names, texts, strict=True))).to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, TABLE.assign(**dict(zip(names, texts, strict=True))))
     assert sniffed.in_parts == made
     assert sniffed.sides == ({"S", "E"} if names[-1] != "remark" else {"S"})
     latitude = sniffed.columns["Position latitude" if made else "Latitude"]
@@ -239,8 +236,7 @@ def test_what_recorders_write_for_no_value_is_missing(value: str, tmp_path: Path
     """The largest number of an integer of 16 or 32 bits, perhaps in tenths, and what netCDF and well logs have."""
     table = TABLE.assign(rudder=np.sin(T)).astype(object)
     table.loc[4:7, "rudder"] = value
-    table.to_csv(tmp_path / "log.csv", index=False)
-    sniffed = recognise_log(tmp_path / "log.csv")
+    sniffed = sniff(tmp_path, table)
     assert value in sniffed.form["missing"]
     assert np.flatnonzero(np.isnan(sniffed.columns["rudder"])).tolist() == [4, 5, 6, 7]
 
@@ -261,6 +257,5 @@ def test_minus_one_is_asked_where_nothing_else_is_negative(
     name: str, others: np.ndarray, asked: bool, tmp_path: Path
 ) -> None:
     values = np.where(np.isin(np.arange(len(T)), (3, 11)), -1.0, others)
-    TABLE.drop(columns="psi").assign(**{name: values}).to_csv(tmp_path / "log.csv", index=False)
-    doubts = recognise_log(tmp_path / "log.csv").doubts
+    doubts = sniff(tmp_path, TABLE.drop(columns="psi").assign(**{name: values})).doubts
     assert [doubt.partition(" and ")[0] for doubt in doubts] == [f"{name!r} is -1 in 2 rows"] * asked
