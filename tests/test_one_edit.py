@@ -27,7 +27,6 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.stepping import Stepper, step_alone
 from shipid.logs.guess.columns import guess
-from shipid.logs.importing import import_log, read_mapping
 from shipid.physics import TERMS, Term, helm, signals
 from shipid.physics.frames import wrench_of_force
 from shipid.physics.signals import Signal
@@ -45,7 +44,7 @@ from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document, load_vessel
 from tests.documented import entries, module, new_module
 from tests.export.compiled import inputs_of_model
-from tests.logs.conftest import PLAIN, as_log, turning
+from tests.logs.conftest import PLAIN, as_log, import_written, turning
 from tests.logs.simulated import as_bridge, si_log
 
 FLAP = Signal(
@@ -193,10 +192,9 @@ def test_a_guess_and_the_importer_take_the_depth(tmp_path: Path) -> None:
     proposal = guess(tmp_path / "log.csv").column("depth")
     assert proposal is not None
     assert (proposal.source, proposal.unit) == ("Water depth [m]", "m")
-    log = as_log(turning(T), tmp_path / "plain.csv")
-    pd.read_csv(log).assign(d=1250.0).to_csv(log, index=False)
-    (tmp_path / "mapping.toml").write_text(PLAIN.read_text() + '[columns.depth]\nfrom = "d"\nunit = "cm"\n')
-    assert (import_log(read_mapping(tmp_path / "mapping.toml"), log).frame["depth"] == 12.5).all()
+    log = pd.read_csv(as_log(turning(T), tmp_path / "plain.csv")).assign(d=1250.0)
+    mapping = PLAIN.read_text() + '[columns.depth]\nfrom = "d"\nunit = "cm"\n'
+    assert (import_written(mapping, log, tmp_path).frame["depth"] == 12.5).all()
 
 
 def test_physics_feels_the_depth_and_methods_see_it(depth: Vessel, tmp_path: Path) -> None:

@@ -105,13 +105,6 @@ def test_files_beside_that_of_a_method_are_part_of_its_code(
 
 
 def test_functions_of_a_user_have_a_digest_in_any_dress() -> None:
-    """A term may hold a plain function, a part of one, or an object that is called."""
-
-    class Called:
-        def __call__(self) -> None: ...
-
-    def plain() -> None: ...
-
     users = (plain, partial(plain), Called(), lambda: None)
     assert len({users_code((one,)) for one in users}) == 1  # all are in this file
     assert users_code(users) != "unknown"

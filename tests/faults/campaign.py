@@ -41,7 +41,6 @@ ROWS: dict[str, Row] = {
     "memory": Row(documents.memory, 100, "sizes beyond the machine"),
     "cluster": Row(clusters.died, 10, "SIGKILL of scheduler or worker", 180.0),
 }
-SMALLEST = 1.0 / 100
 EVERY = 30.0  # s between lines of progress
 
 

@@ -103,6 +103,7 @@ def log(tmp_path: Path) -> pd.DataFrame:
 
 
 def mapping_with(tmp_path: Path, form: str, *changes: tuple[str, str]) -> Path:
+    """Write the plain mapping with a format and changes."""
     text = PLAIN.read_text().replace("[clock]", f"[format]\n{form}\n[clock]")
     for old, new in changes:
         assert old in text
@@ -110,6 +111,15 @@ def mapping_with(tmp_path: Path, form: str, *changes: tuple[str, str]) -> Path:
     file = tmp_path / "mapping.toml"
     file.write_text(text)
     return file
+
+
+def import_written(mapping: Path | str, log: pd.DataFrame, folder: Path) -> Dataset:
+    """Import a table, written as a text, by a mapping: its file, or its text."""
+    file = folder / "mapping.toml" if isinstance(mapping, str) else mapping
+    if isinstance(mapping, str):
+        file.write_text(mapping)
+    log.to_csv(folder / "log.csv", index=False)
+    return import_log(read_mapping(file), folder / "log.csv")
 
 
 def assert_is_the_motion(mapping: Path, file: Path) -> None:

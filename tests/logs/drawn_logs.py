@@ -39,7 +39,6 @@ FACTORS = {  # SI units in one unit
     **{"rad/s": 1.0, "deg/s": np.pi / 180, "deg/min": np.pi / 10800, "rpm": 1 / 60, "rev/s": 1.0},
 }
 CLOCKS = ("seconds", "ms", "us", "ns", "min", "h", "d", "datenum", "excel", "iso")
-DECIMALS = {"m": 3, "m/s": 3, "kn": 2, "km/h": 2, "rad": 4, "deg": 2, "rad/s": 5, "deg/s": 3, "deg/min": 1, "rpm": 1}
 
 
 @dataclass

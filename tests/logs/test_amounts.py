@@ -11,10 +11,11 @@ import pytest
 from shipid.errors import DataError
 from shipid.files import write_new
 from shipid.logs.amounts import split_amounts, without_prefix
-from shipid.logs.guess.columns import Guess, guess
+from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_text
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.simulated import KNOT, as_bridge, si_log
+from tests.logs.conftest import import_written
+from tests.logs.simulated import KNOT, as_bridge, guess_of, si_log
 
 LOG = si_log()
 GROUND = (LOG["u"] + 1j * LOG["v"]) * np.exp(1j * LOG["psi"])
@@ -31,11 +32,6 @@ def written(decimal: str = ".") -> pd.DataFrame:
     return pd.DataFrame({name: texts[name].str.replace(".", decimal) for name in texts})
 
 
-def drafted(file: Path) -> tuple[Guess, Path]:
-    proposal = guess(file)
-    return proposal, write_new(draft_text(proposal), file.parent / "draft.toml")
-
-
 @pytest.mark.parametrize(("decimal", "separator"), [(",", ";")])
 def test_units_in_cells_are_those_of_their_columns(decimal: str, separator: str, tmp_path: Path) -> None:
     """Such a log was refused as no table of numbers."""
@@ -43,13 +39,13 @@ def test_units_in_cells_are_those_of_their_columns(decimal: str, separator: str,
     frame = written(decimal)
     frame.loc[[7, 8, 9], "sog"] = "---"
     frame.to_csv(file, index=False, sep=separator, encoding="utf-8")
-    proposal, mapping = drafted(file)
+    proposal = guess(file)
     assert {one.name: one.unit for one in proposal.columns if one.name in ("speed", "psi", "r")} == {
         "speed": "kn",
         "psi": "deg",
         "r": "deg/s",
     }
-    rows = import_log(read_mapping(mapping), file).frame
+    rows = import_log(read_mapping(write_new(draft_text(proposal), tmp_path / "draft.toml")), file).frame
     np.testing.assert_allclose(rows["north"], LOG["north"], atol=1e-3)
     np.testing.assert_allclose(rows["u"].drop([7, 8, 9]), LOG["u"].drop([7, 8, 9]), atol=0.01)
     np.testing.assert_allclose(rows["r"], LOG["r"], atol=1e-5)
@@ -59,17 +55,14 @@ def test_units_in_cells_are_those_of_their_columns(decimal: str, separator: str,
 def test_true_and_magnetic_north_in_a_column_are_refused(first: str, second: str, tmp_path: Path) -> None:
     """Both are degrees, but in places 20 deg apart: headings of a half of the log were wrong."""
     frame = written()
-    frame.to_csv(tmp_path / "log.csv", index=False)
-    _, mapping = drafted(tmp_path / "log.csv")
-    mapping.write_text(mapping.read_text().replace("sha256", "# sha256"))
+    mapping = draft_text(guess_of(tmp_path, frame)).replace("sha256", "# sha256")
     frame["psi"] = BRIDGE["psi"].astype(str) + np.where(BRIDGE.index < 300, first, second)
-    frame.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=r"no column can be the heading: 'psi' holds .*, and other units: write one"):
-        guess(tmp_path / "log.csv")
+        guess_of(tmp_path, frame)
     kind = "magnetic" if "M" in first else "true"
     said = rf"row 301: .* is not of {kind} north, as .* \(column 'psi'; {len(frame) - 300} such rows\): write one north"
     with pytest.raises(DataError, match=said):
-        import_log(read_mapping(mapping), tmp_path / "log.csv")
+        import_written(mapping, frame, tmp_path)
 
 
 @pytest.mark.parametrize(

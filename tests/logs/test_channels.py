@@ -10,7 +10,7 @@ from shipid.data.checks import check_dataset
 from shipid.data.dataset import Dataset
 from shipid.errors import DataError, DocumentError
 from shipid.logs.importing import import_log, log_digest, read_mapping
-from tests.logs.conftest import PLAIN, as_log, turning
+from tests.logs.conftest import PLAIN, as_log, import_written, mapping_with, turning
 
 T = np.arange(0.0, 120.0, 0.5)
 STATES = ["north", "east", "psi", "u", "v", "r"]
@@ -18,15 +18,6 @@ STATES = ["north", "east", "psi", "u", "v", "r"]
 
 def logged(frame: pd.DataFrame, folder: Path) -> Path:
     return as_log(frame, folder / "log.csv")
-
-
-def changed(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = PLAIN.read_text()
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    (folder / "mapping.toml").write_text(text)
-    return folder / "mapping.toml"
 
 
 def without(columns: set[str], more: str, folder: Path) -> Path:
@@ -95,7 +86,7 @@ latency = {late["compass"]}
 
 
 def test_a_step_of_the_mapping_holds_orders_and_passes_north(tmp_path: Path) -> None:
-    mapping = changed(tmp_path, ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.2'))
+    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nmax_gap = 3.0\nstep = 0.2'))
     frame = import_log(read_mapping(mapping), logged(turning(T), tmp_path)).frame
     np.testing.assert_allclose(np.diff(frame["t"]), 0.2)
     np.testing.assert_allclose(frame["psi"], turning(frame["t"].to_numpy())["psi"], atol=1e-9)
@@ -103,7 +94,7 @@ def test_a_step_of_the_mapping_holds_orders_and_passes_north(tmp_path: Path) -> 
 
 
 def test_channels_that_share_no_time(tmp_path: Path) -> None:
-    mapping = changed(tmp_path, GAP, ('from = "rpm"', 'from = "rpm"\nlatency = 1000.0'))
+    mapping = mapping_with(tmp_path, "", GAP, ('from = "rpm"', 'from = "rpm"\nlatency = 1000.0'))
     with pytest.raises(DataError, match="share no time"):
         import_log(read_mapping(mapping), logged(turning(T), tmp_path))
 
@@ -133,12 +124,12 @@ def test_channels_that_share_no_time(tmp_path: Path) -> None:
 )
 def test_mistakes_in_a_mapping(change: tuple[str, str], path: str, remedy: str, tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=remedy) as caught:
-        read_mapping(changed(tmp_path, change))
+        read_mapping(mapping_with(tmp_path, "", change))
     assert caught.value.path == path
 
 
 def test_one_run_a_file(tmp_path: Path) -> None:
-    mapping = changed(tmp_path, ('name = "plain"', 'name = "plain"\n[source]\nruns = "Z_*.csv"'))
+    mapping = mapping_with(tmp_path, "", ('name = "plain"', 'name = "plain"\n[source]\nruns = "Z_*.csv"'))
     for run, rate in (("10_10", 0.05), ("20_20", -0.03)):
         as_log(turning(T, r=rate), tmp_path / f"Z_{run}.csv")
     dataset = import_log(read_mapping(mapping), tmp_path)
@@ -188,12 +179,10 @@ def test_a_longitude_goes_on_the_short_way_where_it_begins_anew(convention: floa
     longitude = convention + way * 1e-5 * (T - 60.2)
     longitude = np.where(longitude > convention, longitude - 360.0, longitude)
     log = pd.DataFrame({"t": T, "lat": -17.5, "lon": longitude, "psi": way * np.pi / 2, "u": 2.13, "v": 0.0, "r": 0.0})
-    log.to_csv(tmp_path / "log.csv", index=False)
     units = {"latitude": ("lat", "deg"), "longitude": ("lon", "deg"), "psi": ("psi", "rad")}
     units |= {name: (name, "rad/s" if name == "r" else "m/s") for name in ("u", "v", "r")}
     text = 'name = "m"\n[clock]\nfrom = "t"\nstep = 0.13\nmax_gap = 3\n'
     text += "".join(f'[columns.{name}]\nfrom = "{a}"\nunit = "{unit}"\n' for name, (a, unit) in units.items())
-    (tmp_path / "m.toml").write_text(text)
-    frame = import_log(read_mapping(tmp_path / "m.toml"), tmp_path / "log.csv").frame
+    frame = import_written(text, log, tmp_path).frame
     metre = way * 1e-5 * np.radians(1.0) * 6378137.0 * np.cos(np.radians(17.5))
     np.testing.assert_allclose(frame["east"], metre * frame["t"], rtol=1e-3, atol=0.01)

@@ -11,14 +11,15 @@ from shipid.errors import DataError
 from shipid.logs.dates import date_texts, format_date, format_moment, format_span, parse_dates, time_texts
 from shipid.logs.guess.sniff import recognise_log
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.conftest import T, mapping_with
+from tests.logs.conftest import T, import_written, mapping_with
+
+DATED = ('from = "time"', 'from = "time"\nunit = "date"')
 
 
 def test_dates(log: pd.DataFrame, tmp_path: Path) -> None:
     since = pd.Timestamp("2022-10-27T08:00:00Z")
-    log.assign(time=[(since + pd.Timedelta(seconds=t)).isoformat() for t in log["time"]]).to_csv(tmp_path / "log")
-    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
-    frame = import_log(read_mapping(mapping), tmp_path / "log").frame
+    log = log.assign(time=[(since + pd.Timedelta(seconds=t)).isoformat() for t in log["time"]])
+    frame = import_written(mapping_with(tmp_path, "", DATED), log, tmp_path).frame
     np.testing.assert_allclose(frame["t"] - 1666857600.0, T, atol=1e-5)  # date -u -d 2022-10-27T08:00 +%s
 
 
@@ -76,12 +77,11 @@ def test_an_hour_that_occurs_twice_is_refused(name: str, log: pd.DataFrame, tmp_
     """Half a minute before the clocks of Berlin were set back to half a minute after."""
     style, span = TWICE[name]
     moments = pd.Timestamp("2024-10-27T00:59:30Z").tz_convert("Europe/Berlin") + pd.to_timedelta(T, "s")
-    log.assign(time=moments.strftime(style)).to_csv(tmp_path / "log.csv", index=False)
     unit = "hhmmss" if name == "hhmmss" else "date"
     mapping = mapping_with(tmp_path, "", ('from = "time"', f'from = "time"\nunit = "{unit}"\nevery = 0.5'))
     message = f"time goes back by an hour, from {span}: is it local time as daylight saving ends"
     with pytest.raises(DataError, match=message) as caught:
-        import_log(read_mapping(mapping), tmp_path / "log.csv")
+        import_written(mapping, log.assign(time=moments.strftime(style)), tmp_path)
     assert caught.value.path == "row 61"
     if name != "hhmmss":  # numbers that go back may be anything
         with pytest.raises(DataError, match=message) as caught:
@@ -115,19 +115,15 @@ def test_a_date_without_a_zone_beside_others_with_one_is_refused(zone: str, log:
     assert np.isfinite(parse_dates(zoned)).all()
     assert np.isfinite(parse_dates(moments)).all()
     zoned[3] = moments[3]
-    log.assign(time=zoned).to_csv(tmp_path / "log", index=False)
-    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
     with pytest.raises(DataError, match=f"{moments[3]}' has no time zone, while other rows have one") as caught:
-        import_log(read_mapping(mapping), tmp_path / "log")
+        import_written(mapping_with(tmp_path, "", DATED), log.assign(time=zoned), tmp_path)
     assert caught.value.path == "row 4"
 
 
 @pytest.mark.parametrize("text", ["14.05.2024 08:00:00 +02:00", "1715731140.5", "080000"])
 def test_a_time_that_cannot_be_read_is_shown(text: str, log: pd.DataFrame, tmp_path: Path) -> None:
-    log.assign(time=text).to_csv(tmp_path / "log", index=False)
-    mapping = mapping_with(tmp_path, "", ('from = "time"', 'from = "time"\nunit = "date"'))
     with pytest.raises(DataError, match=rf"'{re.escape(text)}' is no date or time of day .* unit = \"s\"") as caught:
-        import_log(read_mapping(mapping), tmp_path / "log")
+        import_written(mapping_with(tmp_path, "", DATED), log.assign(time=text), tmp_path)
     assert caught.value.path == "row 1"
 
 

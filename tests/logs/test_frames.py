@@ -12,10 +12,9 @@ from pymap3d import geodetic2ned, ned2geodetic
 
 from shipid.data.dataset import Dataset
 from shipid.logs.frames import PARALLEL, meridian_convergence, unwrap_in_place
-from shipid.logs.importing import import_log, read_mapping
 from shipid.logs.joining import join_datasets
 from tests.drawn import seeds
-from tests.logs.conftest import turning
+from tests.logs.conftest import import_written, turning
 
 T = np.arange(0.0, 60.0, 0.5)
 SPEEDS = {
@@ -82,9 +81,7 @@ def recorded(place: tuple[float, float], u: float = 4.0, begin: float = 0.0) -> 
 
 
 def imported(log: pd.DataFrame, folder: Path, speeds: str = "body", wind: str = "true", more: str = "") -> Dataset:
-    log.to_csv(folder / "log.csv", index=False)
-    (folder / "m.toml").write_text(f"{MAPPING}beta_w = {WINDS[wind]}\n{SPEEDS[speeds]}{more}")
-    return import_log(read_mapping(folder / "m.toml"), folder / "log.csv")
+    return import_written(f"{MAPPING}beta_w = {WINDS[wind]}\n{SPEEDS[speeds]}{more}", log, folder)
 
 
 def origin(place: tuple[float, float]) -> str:

@@ -13,7 +13,7 @@ from shipid.data.dataset import Dataset, flag_bit, stretches_of_runs
 from shipid.errors import DataError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, turning
+from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, import_written, turning
 
 Write = Callable[..., Path]
 T = np.arange(0.0, 120.0, 0.5)
@@ -258,10 +258,7 @@ def parted(side: float = 1.0) -> pd.DataFrame:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_dates_and_angles_in_several_columns(side: float, tmp_path: Path) -> None:
-    (tmp_path / "mapping.toml").write_text(PARTED)
-    log = parted(side)
-    log.to_csv(tmp_path / "log.csv", index=False)
-    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+    dataset = import_written(PARTED, parted(side), tmp_path)
     np.testing.assert_allclose(dataset.frame["t"] - 1704067198.0, 0.5 * np.arange(10), atol=1e-5)  # date -u +%s
     assert dataset.metadata["origin"] == pytest.approx({"latitude": side * 33.3, "longitude": -0.125})
     metres = side * 111.0e3 * 1e-5 * np.arange(10)  # of latitude there: a degree has 110.9 km
@@ -272,18 +269,15 @@ def test_dates_and_angles_in_several_columns(side: float, tmp_path: Path) -> Non
 def test_positions_as_text(large: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(readers, "LARGE", 0 if large else readers.LARGE)
     mapping = PARTED.replace('["lat", "lat min", "lat s"]', '"place"').replace('["lon", "lon min"]', '"place"')
-    (tmp_path / "mapping.toml").write_text(mapping)
     log = parted()
     minutes = [f"{1.8e-2 + 6e-4 * row:.6f}" for row in range(10)]
     log["place"] = [f"33°{one}'S 000°07.5'W" for one in minutes]
-    log.to_csv(tmp_path / "log.csv", index=False)
-    dataset = import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+    dataset = import_written(mapping, log, tmp_path)
     assert dataset.metadata["origin"] == pytest.approx({"latitude": -33.0003, "longitude": -0.125})
     np.testing.assert_allclose(dataset.frame["north"], -110.9e3 * 1e-5 * np.arange(10), atol=0.02)
     log.loc[4, "place"] = "33°18.0'N"
-    log.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=r"row 5: .*33°18.0'N.* is no number and no position with E or W"):
-        import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+        import_written(mapping, log, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -300,10 +294,8 @@ def test_positions_as_text(large: bool, tmp_path: Path, monkeypatch: pytest.Monk
     ],
 )
 def test_parts_that_cannot_be_are_named(change: dict[str, float], row: int, said: str, tmp_path: Path) -> None:
-    (tmp_path / "mapping.toml").write_text(PARTED)
     log = parted()
     for name, value in change.items():
         log.loc[row - 1, name] = value
-    log.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(DataError, match=re.escape(said)):
-        import_log(read_mapping(tmp_path / "mapping.toml"), tmp_path / "log.csv")
+        import_written(PARTED, log, tmp_path)

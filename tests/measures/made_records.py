@@ -115,9 +115,6 @@ def stable_spiral() -> Record:
     return made_record(t, psi, r, helm, SPEED - DRAG * r**2, SWAY * r)
 
 
-RATES = [3, 2, 1, 0.5, 0, -0.5, -1, -2, -3]
-
-
 def stopped() -> Record:
     """Constant deceleration along a slowly veering heading."""
     t = clock(200.0)

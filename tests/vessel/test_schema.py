@@ -47,14 +47,6 @@ def test_every_argument_of_a_term_is_declared(key: str) -> None:
     assert known == set(term.function.__annotations__)
 
 
-def _properties(schema: dict[str, Any], node: dict[str, Any]) -> list[dict[str, Any]]:
-    """The alternatives that a node of a JSON schema allows, references followed."""
-    if "$ref" in node:
-        return _properties(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[-1]])
-    options = [*node.get("anyOf", []), *node.get("oneOf", [])]
-    return [node_ for option in options for node_ in _properties(schema, option)] if options else [node]
-
-
 @pytest.mark.parametrize("kind", list(ACTUATORS))
 def test_an_actuator_is_a_pair_of_pure_functions(kind: str) -> None:
     """`output(state)` and `advance(command, state, dt)`; a reached command stays reached."""

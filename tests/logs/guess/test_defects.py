@@ -14,7 +14,7 @@ from shipid.logs.guess import sniff
 from shipid.logs.guess.clues import LIKELY
 from shipid.logs.guess.columns import Guess
 from shipid.logs.guess.draft import draft_mapping, draft_text
-from shipid.logs.importing import import_log, read_mapping
+from tests.logs.conftest import import_written
 from tests.logs.simulated import as_bridge, globe, guess_of, import_draft, si_log
 
 CLEAN = as_bridge(si_log()).round(4)
@@ -174,13 +174,10 @@ def test_a_log_with_drawn_spikes_is_healed_by_its_draft(tmp_path: Path) -> None:
     for name, size in (("u", 45.0), ("r", 90.0), ("N", 900.0), ("E", -700.0)):
         rows = random.choice(np.arange(20, len(CLEAN) - 20, 11), 4, replace=False)
         spoilt.loc[rows, name] += size
-    (tmp_path / "spoilt").mkdir()
-    drafted = guess_of(tmp_path / "spoilt", spoilt)
+    drafted = guess_of(tmp_path, spoilt)
     assert {"spikes", "position spikes"} <= drafted.kinds
-    mapping = tmp_path / "draft.toml"
-    mapping.write_text(draft_text(drafted).replace("sha256", "# sha256"))
-    CLEAN.to_csv(tmp_path / "clean.csv", index=False)
-    healed, clean = (import_log(read_mapping(mapping), file).frame for file in (drafted.file, tmp_path / "clean.csv"))
+    mapping = draft_text(drafted).replace("sha256", "# sha256")
+    healed, clean = (import_written(mapping, log, tmp_path).frame for log in (spoilt, CLEAN))
     for name, most in (("u", 0.5), ("v", 0.5), ("r", 0.02), ("north", 6.0), ("east", 6.0)):
         assert (healed[name] - clean[name]).abs().max() < most, name
 

@@ -11,7 +11,8 @@ from shipid.files import write_new
 from shipid.logs.guess.columns import guess
 from shipid.logs.guess.draft import draft_mapping, draft_text, segment_log
 from shipid.logs.importing import import_log, read_mapping
-from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, si_log
+from tests.logs.conftest import import_written
+from tests.logs.simulated import KNOT, SCHEDULE, as_bridge, guess_of, si_log
 from tests.logs.test_nmea import bridge_log
 
 
@@ -36,11 +37,9 @@ def test_the_draft_mends_what_was_broken(tmp_path: Path) -> None:
     log = log.assign(
         u=log["u"] / KNOT, v=log["v"] / KNOT, rudder=-log["rudder"], N=log["N"] + 150.0 * (log["time"] > 700)
     )
-    log.rename(columns={"r": "p"}).to_csv(tmp_path / "log.csv", index=False)
-    proposal = guess(tmp_path / "log.csv")
+    proposal = guess_of(tmp_path, log.rename(columns={"r": "p"}))
     assert proposal.kinds == {"knots", "wrong sign of rudder", "position jumps", "yaw rate under another name"}
-    mapping = write_new(draft_mapping(proposal), tmp_path / "draft.toml")
-    dataset = import_log(read_mapping(mapping), tmp_path / "log.csv")
+    dataset = import_log(read_mapping(write_new(draft_mapping(proposal), tmp_path / "draft.toml")), proposal.file)
     assert check_dataset(dataset)["ok"].all()
     assert np.corrcoef(dataset.frame["rudder.delta"], dataset.frame["r"])[0, 1] > 0.8
 
@@ -49,18 +48,14 @@ def test_orders_that_are_written_where_they_change_are_held(tmp_path: Path) -> N
     """Before, the draft could not be imported: every row had a gap longer than max_gap."""
     log = as_bridge(si_log()).round({"rudder": 1, "rpm": 0})
     written = log.assign(**{name: log[name].where(log[name].diff() != 0) for name in ("rudder", "rpm")})
-    written.to_csv(tmp_path / "log.csv", index=False)
-    text = draft_text(guess(tmp_path / "log.csv"))
-    (tmp_path / "draft.toml").write_text(text)
-    frame = import_log(read_mapping(tmp_path / "draft.toml"), tmp_path / "log.csv").frame
+    text = draft_text(guess_of(tmp_path, written))
+    frame = import_written(text, written, tmp_path).frame
     assert len(frame) == len(log)
     np.testing.assert_allclose(np.degrees(frame["rudder.delta"]), log["rudder"], atol=1e-9)
     np.testing.assert_allclose(60 * frame["propeller.n"], log["rpm"], atol=1e-9)
-    written.assign(rpm=written["rpm"][:1]).to_csv(tmp_path / "log.csv", index=False)
     lines = [line for line in text.split("\n") if not line.startswith(("step", "sha256"))]
-    (tmp_path / "other.toml").write_text("\n".join(lines))
     with pytest.raises(DataError, match=r"rows of 'propeller\.n' for one: orders .* are held with \[clock\] step"):
-        import_log(read_mapping(tmp_path / "other.toml"), tmp_path / "log.csv")
+        import_written("\n".join(lines), written.assign(rpm=written["rpm"][:1]), tmp_path)
 
 
 def test_segments_are_the_schedule(tmp_path: Path) -> None:
