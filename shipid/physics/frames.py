@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 from shipid.physics import symbols as ca
 
-if TYPE_CHECKING:
-    from casadi import SX
+if TYPE_CHECKING:  # in signatures alone; ca.SX makes symbols
+    from casadi import SX as SX
+else:
+    from shipid.physics.symbols import SymbolStandIn as SX
 
 
 def column_vector(*entries: float | SX) -> SX:

@@ -10,12 +10,10 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from shipid.physics import symbols as ca
-
-if TYPE_CHECKING:
-    from casadi import SX
+from shipid.physics.frames import SX
 
 Names = TypeVar("Names", bound=Iterable[str])
 

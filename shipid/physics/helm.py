@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shipid.physics import symbols as ca
+from shipid.physics.frames import SX
 from shipid.physics.signals import is_steering, signal_units
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 DAMPING = 1.0  # of course keeping: critical
 INTEGRAL = 0.1  # of course keeping: integral gain over omega x proportional gain (Fossen 2021, sec. 15.3)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import column_vector, differs_from_default
+from shipid.physics.frames import SX, column_vector, differs_from_default
 from shipid.physics.grammar import (
     AXES,
     BIS_DERIVATIVES,
@@ -23,9 +23,6 @@ from shipid.physics.grammar import (
     reverses_astern,
     service_deviation,
 )
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 SPEED_FLOOR = 0.01  # m/s: keeps 1/U finite at rest
 TIGHTEST = 2.0  # r L / U: turns of ships under rudders are wider, with r L / U up to 1.2

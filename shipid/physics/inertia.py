@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import skew_matrix
+from shipid.physics.frames import SX, skew_matrix
 from shipid.physics.grammar import ADDED_MASS, AXES, MOTIONS, POSITIVE
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 Entries = dict[tuple[int, int], Any]
 """Row and column in a matrix [6 x 6] -> entry, a symbol, a number or an array (members,); what is not named is zero."""

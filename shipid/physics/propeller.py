@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import wraps
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import column_vector, differs_from_default, wrench_of_force
+from shipid.physics.frames import SX, column_vector, differs_from_default, wrench_of_force
 from shipid.physics.grammar import ADVANCE, POSITIVE
 from shipid.physics.hull import SPEED_FLOOR
 from shipid.physics.thruster import SHAFT_FLOOR, thrust_polynomial_value
 from shipid.physics.wind import interpolate_ramps
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 ROOT_FLOOR = 1e-4  # m/s: below it the root of a square is a line
 

@@ -8,14 +8,11 @@ mass at infinite frequency belongs in [added_mass]. Surge, sway and yaw have non
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import column_vector, heave_rate
+from shipid.physics.frames import SX, column_vector, heave_rate
 from shipid.physics.grammar import POSITIVE
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 
 def mode_rates(velocity: SX, state: SX, sigma: Sequence[SX], omega: Sequence[SX]) -> list[SX]:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from shipid.physics.frames import column_vector
+from shipid.physics.frames import SX, column_vector
 from shipid.physics.grammar import POSITIVE
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 
 def hydrostatic(

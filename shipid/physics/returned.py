@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shipid.errors import ShipidError
 from shipid.physics import symbols as ca
+from shipid.physics.frames import SX
 from shipid.units import join_names, plural_word
 from shipid.users import definition_location, is_user_code
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 
 def check_returned(

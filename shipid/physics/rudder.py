@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import wraps
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import column_vector, differs_from_default
+from shipid.physics.frames import SX, column_vector, differs_from_default
 from shipid.physics.grammar import (
     CROSS_FLOWS,
     POSITIVE,
@@ -18,9 +18,6 @@ from shipid.physics.grammar import (
 )
 from shipid.physics.hull import SPEED_FLOOR, TIGHTEST, about_service_speed, sum_monomials
 from shipid.physics.propeller import drift_angle, signed_root
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 
 def rudder_wrench(

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import wraps
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import differs_from_default, wrench_of_force
+from shipid.physics.frames import SX, differs_from_default, wrench_of_force
 from shipid.physics.grammar import POSITIVE, THRUST, thrust_monomial
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 SHAFT_FLOOR = 1e-3  # rev/s: J = u / (n D) stays finite at n = 0
 UNLIMITED = 1e9  # default limit of a command: beyond all of them

@@ -8,14 +8,11 @@ sway, roll and yaw odd, as for any ship with port/starboard symmetry.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import rotation_matrix
+from shipid.physics.frames import SX, rotation_matrix
 from shipid.physics.grammar import AXES
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 EVEN = (0, 2, 4)
 FORCES = tuple(f"{axis}_{part}" for axis in AXES for part in ("real", "imag"))

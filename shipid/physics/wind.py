@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from shipid.physics import symbols as ca
-from shipid.physics.frames import column_vector
+from shipid.physics.frames import SX, column_vector
 from shipid.physics.grammar import POSITIVE
-
-if TYPE_CHECKING:
-    from casadi import SX
 
 CALM = 1e-6  # m/s: below this relative wind the angle of attack is taken as that of a head wind
 
