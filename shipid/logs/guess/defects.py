@@ -225,16 +225,17 @@ def _turns_with_track(state: State) -> bool:
 
 
 def _slope_with_error(values: Array, by: Array) -> tuple[float, float]:
-    """Slope of values (N,) over others, and its standard error: the scatter between ten parts of the log."""
-    parts = np.array_split(np.arange(len(by)), 10)
+    """Slope of values (N,) over others, and its standard error."""
+    design = np.stack([by, np.ones(len(by))], axis=1)
+    slope = float(np.linalg.lstsq(design, values, rcond=None)[0][0])
+    return slope, _jackknife_error(design, values, np.arange(len(by)))
 
-    def of(rows: NDArray[np.intp]) -> float:
-        design = np.stack([by[rows], np.ones(len(rows))], axis=1)
-        return float(np.linalg.lstsq(design, values[rows], rcond=None)[0][0])
 
-    every = np.arange(len(by))
-    without = [of(np.setdiff1d(every, part)) for part in parts]
-    return of(every), float(np.std(without)) * np.sqrt(len(without) - 1)
+def _jackknife_error(design: Array, values: Array, rows: NDArray[np.intp]) -> float:
+    """Standard error of the first coefficient of a fit to some rows: the scatter without each of ten parts of them."""
+    others = [np.setdiff1d(rows, part) for part in np.array_split(rows, 10)]
+    without = [np.linalg.lstsq(design[kept], values[kept], rcond=None)[0][0] for kept in others]
+    return float(np.std(without) * np.sqrt(len(without) - 1))
 
 
 def _factor_of_rate(state: State) -> None:
@@ -242,8 +243,7 @@ def _factor_of_rate(state: State) -> None:
     assert state.r is not None
     source = next(one.source for one in state.suggestions if one.name == "r")
     seen, ran = state.chosen.change(state.psi), state.chosen.change(evidence.integrate_rate(state.t, state.r))
-    keep = evidence.windows_without_outliers(seen, ran)
-    fit = evidence.fit_scale(seen[keep], ran[keep])
+    fit = evidence.fit_without_outliers(seen, ran)
     off = abs(fit.scale - 1.0)
     clipped = any(one.kind == "clipped" and source in one.columns for one in state.findings)
     if clipped or fit.left > RATE_LEFT or not off > max(OFF_RATE, 5 * fit.error):
@@ -440,10 +440,7 @@ def _off_on_all_courses(state: State) -> tuple[float, float, complex]:
         found = np.linalg.lstsq(design[keep], ran.imag[keep], rcond=None)[0]
         miss = np.abs(ran.imag - design @ found)
         keep &= miss <= 6.0 * np.median(miss[keep]) + 1e-9
-    parts = np.array_split(np.flatnonzero(keep), 10)
-    others = [np.concatenate(parts[:i] + parts[i + 1 :]) for i in range(len(parts))]
-    without = [np.linalg.lstsq(design[rows], ran.imag[rows], rcond=None)[0][0] for rows in others]
-    error = float(np.std(without)) * np.sqrt(len(without) - 1)  # of the jackknife
+    error = _jackknife_error(design, ran.imag, np.flatnonzero(keep))
     off = float(np.arctan(found[0]))
     return off, error, complex(found[2], found[3]) * np.cos(off) * np.exp(1j * off)
 

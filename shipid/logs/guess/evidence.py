@@ -97,6 +97,12 @@ def windows_without_outliers(seen: Complex, integrated: Complex) -> NDArray[np.b
     return np.asarray(miss <= 6.0 * np.median(miss[moving]) + 1e-9)
 
 
+def fit_without_outliers(seen: Complex, integrated: Complex) -> Fit:
+    """Fit one real scale to the windows without outliers."""
+    keep = windows_without_outliers(seen, integrated)
+    return fit_scale(seen[keep], integrated[keep])
+
+
 def course_agreement(track: Complex, psi: Array) -> complex:
     """The mean of exp(i (course - psi)) over windows; windows with little distance weigh less."""
     turned = track * np.exp(-1j * psi)

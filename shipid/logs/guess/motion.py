@@ -100,9 +100,7 @@ def _velocity_hypotheses(state: State, seen: Complex) -> Iterator[Velocities]:
                 ("body", body[first] + 1j * body[second], min(ahead, abeam)),
                 ("mirrored", body[first] - 1j * body[second], 0.9 * min(ahead, abeam)),
             ):
-                change = state.chosen.change(path)
-                keep = evidence.windows_without_outliers(seen, change)
-                result = evidence.fit_scale(seen[keep], change[keep])
+                result = evidence.fit_without_outliers(seen, state.chosen.change(path))
                 known = _is_speed_unit(result.scale)
                 if result.scale > 0 and (score >= 0.45 or known):
                     yield Velocities(result, first, second, frame, score, path)
@@ -322,15 +320,12 @@ def _choose_speed_and_course(state: State, seen: Complex, bound: float) -> bool:
     best: tuple[float, str, str, str, Fit, Complex] | None = None
     for course in courses:
         for turn in ("deg", "rad"):
-            angle, _ = evidence.heal_angle(state.columns[course], 2 * np.pi / to_si(turn, "psi"), state.t)
-            way = np.exp(1j * to_si(turn, "psi") * angle)
+            way = np.exp(1j * state.angle(course, turn))
             for speed in speeds:
                 if speed == course:
                     continue
                 path = evidence.integrate_rate(state.t, state.columns[speed] * way)
-                change = state.chosen.change(path)
-                keep = evidence.windows_without_outliers(seen, change)
-                fit = evidence.fit_scale(seen[keep], change[keep])
+                fit = evidence.fit_without_outliers(seen, state.chosen.change(path))
                 score = 0.0 if state.numbered else meaning_scores(speed)["speed"] + meaning_scores(course)["course"]
                 cost = (
                     (fit.left + 0.003)
@@ -365,8 +360,7 @@ def _ask_heading_and_course(state: State, seen: Complex, speed: str, course: str
     """Ask whether heading and course are exchanged: the speed runs along the heading, not along the course."""
     assert state.body is not None
     change = state.chosen.change(evidence.integrate_rate(state.t, state.columns[speed] * np.exp(1j * state.psi)))
-    keep = evidence.windows_without_outliers(seen, change)
-    if evidence.fit_scale(seen[keep], change[keep]).left > EXCHANGED * fit.left:
+    if evidence.fit_without_outliers(seen, change).left > EXCHANGED * fit.left:
         return False
     r = np.gradient(state.psi, state.t)
     inward = np.corrcoef(_window_means(state, state.body.imag), _window_means(state, r))[0, 1]

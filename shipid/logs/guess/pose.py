@@ -218,21 +218,20 @@ def in_frame(best: Pose, frame: Frame, file: Path) -> Pose:
     return given
 
 
+def _logged_courses(state: State, best: Pose) -> list[str]:
+    """Columns of a course over ground beside the heading."""
+    named = [name for name in state.all_called("course") if name != best.heading and not is_order(name)]
+    return [name for name in named if meaning_scores(name).get("psi", 0.0) < meaning_scores(name)["course"]]
+
+
 def _by_course(state: State, best: Pose) -> Pose:
     track = state.chosen.change(local_plane(state, best.north, best.east, on_globe=False))
     size = float(np.sum(np.abs(track)))
     middle = (state.chosen.first + state.chosen.last) // 2
-    for name in state.all_called("course"):
-        if (
-            name == best.heading
-            or is_order(name)
-            or meaning_scores(name).get("psi", 0.0) >= meaning_scores(name)["course"]
-        ):
-            continue
+    for name in _logged_courses(state, best):
         unit = unit_in_name(name, "rad") or best.unit
         unit = unit if float(np.ptp(state.columns[name])) <= 1.01 * 2 * np.pi / to_si(unit, "psi") else "deg"
-        course, _ = evidence.heal_angle(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
-        turned = np.exp(1j * to_si(unit, "psi") * course[middle])
+        turned = np.exp(1j * state.angle(name, unit)[middle])
         spread = 1.0 - abs(complex(np.mean(turned)))
         same, mirrored = (complex(np.sum(track * way)) / size for way in (np.conj(turned), turned))
         if spread < STRAIGHT or abs(mirrored) < 1.0 - POOR or (1.0 - abs(mirrored)) * MIRROR > 1.0 - abs(same):
@@ -275,8 +274,7 @@ def _is_letter_axis(name: str) -> bool:
 
 def _unexplained_share(seen: Complex, integrated: Complex) -> float:
     """Unexplained share of a track, outliers apart; 1 where the scale is negative."""
-    keep = evidence.windows_without_outliers(seen, integrated)
-    fit = evidence.fit_scale(seen[keep], integrated[keep])
+    fit = evidence.fit_without_outliers(seen, integrated)
     return fit.left if fit.scale > 0 else 1.0
 
 
@@ -320,9 +318,7 @@ def _best_pose(
     angles = {}
     for heading in headings:
         for unit in ("deg",) if _is_in_deg(heading, state.columns[heading]) else ("deg", "rad"):
-            turn = 2 * np.pi / to_si(unit, "psi")
-            psi, _ = evidence.heal_angle(state.columns[heading], turn, state.t)
-            turned = np.exp(-1j * to_si(unit, "psi") * psi[middle][::thin])
+            turned = np.exp(-1j * state.angle(heading, unit)[middle][::thin])
             angles[heading, unit] = turned, 1.0 - abs(complex(np.mean(turned)))
     best: Pose | None = None
     for north, east, on_globe, score in pairs:
@@ -616,16 +612,9 @@ def _follows_course(state: State, best: Pose) -> bool:
     """Whether a logged course over ground agrees with the track, so that the signs of the positions are right."""
     track = state.chosen.change(local_plane(state, best.north, best.east, best.on_globe))
     middle = (state.chosen.first + state.chosen.last) // 2
-    for name in state.all_called("course"):
-        if (
-            name == best.heading
-            or is_order(name)
-            or meaning_scores(name).get("psi", 0.0) >= meaning_scores(name)["course"]
-        ):
-            continue
+    for name in _logged_courses(state, best):
         for unit in ("deg", "rad"):
-            course, _ = evidence.heal_angle(state.columns[name], 2 * np.pi / to_si(unit, "psi"), state.t)
-            same = evidence.course_agreement(track, to_si(unit, "psi") * course[middle])
+            same = evidence.course_agreement(track, state.angle(name, unit)[middle])
             if abs(same) > 1.0 - POOR and abs(np.angle(same)) < np.pi / 4:
                 return True
     return False
@@ -643,8 +632,7 @@ def _sign_by_compass(state: State, best: Pose) -> Pose:
     if mirrored:
         turned = (best.east,) if phase < np.pi / 4 else (best.north,) if phase > 3 * np.pi / 4 else ()
     elif phase > 3 * np.pi / 4:
-        psi, _ = evidence.heal_angle(state.columns[best.heading], 2 * np.pi / to_si(best.unit, "psi"), state.t)
-        turned = () if _astern_reason(state, best, psi * to_si(best.unit, "psi")) else (best.north, best.east)
+        turned = () if _astern_reason(state, best, state.angle(best.heading, best.unit)) else (best.north, best.east)
     unsigned = all(
         state.columns[name].min() >= 0 or name in state.negated or OTHER_WAY & {*name_parts(name)} for name in turned
     )
