@@ -5,12 +5,11 @@ from __future__ import annotations
 from typer.testing import CliRunner
 
 from shipid.cli import app
+from tests.cli.running import output_of
 
 
 def test_a_bundled_vessel_is_written(tmp_path):
-    result = CliRunner().invoke(app, ["export", "mariner", "--to", "c", "--out", str(tmp_path / "ship")])
-    assert result.exit_code == 0, result.output
-    assert "ship.c" in result.output.replace("\n", "")
+    assert "ship.c" in output_of("export", "mariner", "--to", "c", "--out", tmp_path / "ship").replace("\n", "")
     assert (tmp_path / "ship" / "ship.h").is_file()
 
 
@@ -18,8 +17,7 @@ def test_a_bundled_vessel_is_written_into_a_folder_of_its_name_again_and_again(t
     """Before, the folder of the first export was taken for the results of a study."""
     monkeypatch.chdir(tmp_path)
     for _ in range(2):
-        result = CliRunner().invoke(app, ["export", "mariner", "--to", "c", "--out", "mariner"])
-        assert result.exit_code == 0, result.exception
+        output_of("export", "mariner", "--to", "c", "--out", "mariner")
 
 
 def test_a_cell_that_is_not_there_is_one_line(tmp_path):

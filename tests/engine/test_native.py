@@ -174,12 +174,8 @@ def test_single_precision_follows_double(name: str, draw_inputs: Callable[..., A
     assert np.array_equal(near.diverged, exact.diverged)
 
 
-def test_the_engine_of_a_process_is_the_one_that_it_has_by_now(
-    libraries_kept: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_engine_of_a_process_is_the_one_that_it_has_by_now() -> None:
     """No compiler is looked for to say so; a model that could not be compiled ends the native engine."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(libraries_kept))
-    monkeypatch.setattr(native, "_refused", [])
     native.compiler_target.cache_clear()
     assert native.noted_engine() is None
     assert native.engine_description() == native.noted_engine()

@@ -12,20 +12,15 @@ from scipy import stats
 from shipid.errors import DataError, ShipidError
 from shipid.identification.bands import band_refusal, measure_bands, principal_axes, short_horizon
 from shipid.identification.outcome import run_identification
-from shipid.identification.settings import Identify
 from shipid.identification.solution import Solution
 from shipid.identification.solve import identify
 from shipid.identification.statistics import LinearFit, Statistics, fit_statistics
 from shipid.vessel.load import Vessel, load_vessel
-from tests.identification.test_outcome import FEW, NOISE
+from tests.identification.test_outcome import FEW, NOISE, settings
 from tests.identification.trials import noisy, trials
 
 SHIP = load_vessel("gunnerus-28.9")
 SLOPES = np.array([0.3, -1.2, 0.5])
-
-
-def settings(**more: object) -> Identify:
-    return Identify(**{"parameters": FEW, "start": "base", "horizon": 0, "weights": NOISE, **more})
 
 
 def linear(vessel: Vessel) -> Mapping[str, float]:

@@ -106,4 +106,3 @@ def _assert_says(error: DataError | DocumentError, file: str, place: str, remedy
     assert file in str(error.file)
     assert (error.path or "") == place
     assert remedy in error.message
-    assert "\n" not in str(error)

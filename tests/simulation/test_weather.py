@@ -220,6 +220,7 @@ def test_a_series_depends_on_its_key_alone(gusts: Gusts) -> None:
     [
         ({"kind": "kaimal"}, "npd"),
         ({"kind": "npd", "frequencies": (0.5, 0.1)}, "low, high"),
+        ({"kind": "npd", "frequencies": (0.1, 0.1)}, r"frequencies must be \[low, high\]"),
         ({"kind": "npd", "frequencies": (0.0, 0.1)}, "must be above 0"),
         ({"kind": "npd", "height": -1.0}, "must be above 0"),
         ({"kind": "npd", "gustiness": 1.0}, "unknown key"),
@@ -228,8 +229,3 @@ def test_a_series_depends_on_its_key_alone(gusts: Gusts) -> None:
 def test_wrong_blocks_are_refused(block: dict[str, Any], message: str) -> None:
     with pytest.raises(DocumentError, match=message):
         Gusts(**block)
-
-
-def test_gusts_of_one_frequency_are_refused() -> None:
-    with pytest.raises(DocumentError, match=r"frequencies must be \[low, high\]"):
-        Gusts(kind="npd", frequencies=(0.1, 0.1))

@@ -236,15 +236,13 @@ def test_clocks_that_begin_again_and_days_of_the_year(
     name: str, values: list[object], unit: str, tmp_path: Path
 ) -> None:
     """Rows are 0.5 s apart, over midnight or the end of the week, in the draft and in the import."""
-    file = tmp_path / "log.csv"
-    with_clock(name, values).to_csv(file, index=False)
-    sniffed = recognise_log(file)
+    sniffed = sniff(tmp_path, with_clock(name, values))
     assert sniffed.clock == {"from": name, "unit": unit}
     np.testing.assert_allclose(np.diff(sniffed.t), 0.5, atol=1e-4)
     if unit == "date":
         assert sniffed.t[0] == pytest.approx(START_OF_DAY[0].timestamp())
         return
-    read = clock_seconds(pd.read_csv(file)[name].to_numpy(float), unit)
+    read = clock_seconds(pd.read_csv(tmp_path / "log.csv")[name].to_numpy(float), unit)
     np.testing.assert_allclose(np.diff(read), 0.5, atol=1e-4)
 
 
@@ -260,11 +258,9 @@ def test_durations_as_text(write: Callable[[float], str] | str, tmp_path: Path) 
 @pytest.mark.parametrize(("name", "digits"), [("Decimal year", 12), ("time", 4)])
 def test_a_year_with_decimals_is_no_clock_in_seconds(name: str, digits: int, tmp_path: Path) -> None:
     """With four digits an hour has one number, which repeats."""
-    with_clock(name, [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]).to_csv(
-        tmp_path / "log.csv", index=False
-    )
+    years = [f"{2024.3655 + 0.5 * k / 366 / 86400:.{digits}f}" for k in range(600)]
     with pytest.raises(DataError, match=rf"'{name}' is a year with decimals, 2024.3655.*: write a date"):
-        recognise_log(tmp_path / "log.csv")
+        sniff(tmp_path, with_clock(name, years))
 
 
 @pytest.mark.parametrize(("size", "step"), [(2**16, 500), (2**32, 500_000)])
@@ -344,9 +340,7 @@ def in_columns(frame: pd.DataFrame, fields: dict[str, str], begin: str = "2024-0
 def test_a_date_in_columns_is_the_clock(
     fields: dict[str, str], clock: dict[str, object], zero: float, tmp_path: Path
 ) -> None:
-    file = tmp_path / "log.csv"
-    in_columns(TABLE, fields).to_csv(file, index=False)
-    sniffed = recognise_log(file)
+    sniffed = sniff(tmp_path, in_columns(TABLE, fields))
     np.testing.assert_allclose(sniffed.t, zero + T, atol=1e-5)
     assert sniffed.clock.items() >= clock.items()
     assert list(sniffed.columns) == ["N", "psi"]
