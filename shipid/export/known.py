@@ -169,10 +169,11 @@ class PredictorInputs:
             way += column_of_entries(self.seen, ("current_north", "current_east")) @ ages.T
         path = turn_vectors(way, -self.now["psi"])
         places, last = [MX(np.zeros(2))], self.physics.step * column_of_entries(self.now, "uv")
-        before, sound = places[0], MX(1)
+        before, sound, limit = places[0], MX(1), self.physics.fastest * self.physics.step
+        last *= ca.fmin(limit / ca.norm_2(last), 1)
         for place in ca.horzsplit(path):
             step = place - before
-            sound = ca.logic_and(sound, step.T @ step <= (SPEED_LIMIT * self.physics.step) ** 2)
+            sound = ca.logic_and(sound, step.T @ step <= limit**2)
             last, before = ca.if_else(sound, step, last), place
             places.append(ca.if_else(sound, place, places[-1] + last))
         return ca.if_else(self._slow(self.records), path, ca.horzcat(*places[1:]))

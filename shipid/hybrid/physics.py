@@ -16,7 +16,7 @@ from shipid.arguments import (
     check_positive,
     check_whole_number,
 )
-from shipid.data.windows import Instants, PathSource, from_frame, to_frame
+from shipid.data.windows import Instants, PathSource, Windows, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance_loss
 from shipid.engine.integrate import Method as Integrator
@@ -45,6 +45,7 @@ class Physics:
     observer : with one, the physics starts from the filtered state in moving water, under the slow force as it fades;
         instants must then hold its `estimates`.
     path : where true positions come from, see `cut_windows`. ShipidError for a wrong argument.
+    fastest : speed [m/s] that no path exceeds from where its rollout diverges, see `hold_velocity`.
     """
 
     vessel: Vessel | None
@@ -53,6 +54,7 @@ class Physics:
     integrator: Integrator = "euler"
     observer: Observer | None = None
     path: PathSource = "position"
+    fastest: float = SPEED_LIMIT
 
     def __post_init__(self) -> None:
         if self.vessel is not None:
@@ -93,10 +95,8 @@ class Physics:
         result, (north, east), lost = self._rollout(instants, ("north", "east"), parameters, device)
         paths = np.stack(_positions_in_frame(instants, north, east), axis=-1)
         begun = self.step * np.stack([instants.columns.get(name, 0 * lost) for name in ("u", "v")], axis=-1)
-        bad = result.diverged
-        paths[:, bad] = hold_velocity(
-            paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad], SPEED_LIMIT * self.step
-        )
+        bad, limit = result.diverged, self.fastest * self.step
+        paths[:, bad] = hold_velocity(paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad], limit)
         return paths + lost[:, None], bad
 
     def states(self, instants: Instants, *, engine: str = AUTO) -> dict[str, Array]:
@@ -253,15 +253,22 @@ class Physics:
 def hold_velocity(paths: Array, begun: Array, limit: float) -> Array:
     """Paths (T, ..., 2) [m] from the origin that repeat their last sound step from where a step is none.
 
-    begun : (..., 2) [m], the step that is repeated where the first is none. limit : [m], no sound step is longer.
+    begun : (..., 2) [m], the step that is repeated where the first is none. limit : [m], no sound step is longer, nor
+        one that is repeated.
     """
     places = np.concatenate([np.zeros_like(paths[:1]), paths])
-    with np.errstate(all="ignore"):  # a step from infinity to infinity
+    with np.errstate(all="ignore"):  # a step from infinity to infinity, or none of 0 m
+        begun = begun * np.fmin(limit / vector_lengths(begun), 1.0)[..., None]
         steps = np.concatenate([begun[None], np.diff(places, axis=0)])
     sound = np.logical_and.accumulate(vector_lengths(steps[1:]) <= limit)[..., None]
     last = sound.sum(axis=0, keepdims=True)
     place, step = (np.take_along_axis(each, last, axis=0) for each in (places, steps))
     return np.where(sound, paths, place + np.cumsum(~sound, axis=0) * step)
+
+
+def greatest_speed(windows: Windows) -> float:
+    """Greatest speed [m/s] at the instants of windows."""
+    return float(np.hypot(windows.columns["u"], windows.columns["v"]).max())
 
 
 def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:
