@@ -26,7 +26,6 @@ from shipid.arguments import (
 from shipid.data.windows import Commands, Instants, PathSource, Windows, fold_masks, locked_view, run_folds
 from shipid.document import plain_values
 from shipid.engine.integrate import Method as Integrator
-from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ResultError, ShipidError, suggest_name
 from shipid.files import read_arrays, write_arrays
 from shipid.hybrid.bands import FEWEST, Bands, Region
@@ -36,7 +35,7 @@ from shipid.hybrid.deployed import DeployedMethod, reason_of_no_band
 from shipid.hybrid.method import Case, Index, Method, Task, fit_all, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.novelty import NoveltyAlarm, alarm_inputs, calibrate_alarm
-from shipid.hybrid.physics import Physics, check_columns, check_instants, greatest_speed
+from shipid.hybrid.physics import Physics, check_columns, check_instants
 from shipid.hybrid.stored import StoredData
 from shipid.metrics import vector_lengths
 from shipid.observer import AGE_COLUMN, Observer
@@ -242,7 +241,7 @@ class Predictor(DeployedMethod):
         return np.asarray(raised | self._is_unsettled(known, raised.shape))
 
     def diverges(self, instants: Instants) -> Array:
-        """Return whether the physics diverges from each instant (S,): its path keeps its last velocity."""
+        """Return whether the physics diverges from each instant (S,): its path is no faster than the ship."""
         return np.asarray(self.physics_with_force.variant_paths(self._known(instants))[1][0])
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
@@ -287,7 +286,6 @@ class Predictor(DeployedMethod):
             "commands": self.commands,
             "causal": list(self.causal),
             "path": self.physics.path,
-            "fastest": self.physics.fastest,
             "observer": None if self.physics.observer is None else self.physics.observer.model_dump(mode="json"),
             "limits": {name: list(pair) for name, pair in self.limits.items()},
             "run_up": self.run_up,
@@ -390,7 +388,6 @@ class Predictor(DeployedMethod):
                     known.integrator,
                     None if header["observer"] is None else Observer(**header["observer"]),
                     known.path,
-                    known.fastest,
                 ),
                 method=kind,
                 corrector=METHODS[kind].corrector.from_arrays(header["corrector"], arrays),
@@ -437,7 +434,6 @@ class _Header(BaseModel):
     commands: Commands
     causal: list[str]
     path: PathSource
-    fastest: Annotated[float, Field(ge=0)] = SPEED_LIMIT
     limits: dict[str, tuple[float, float]]
     provenance: dict[str, Any]
     run_up: Annotated[float, Field(ge=0, le=1e9)] = 0.0
@@ -499,7 +495,6 @@ def fit(
     check_mapping("kinds", kinds, "the name of a run to a kind of manoeuvre", DataError)
     seed, refits = check_whole_number("seed", seed, 0, DataError), check_whole_number("refits", refits, 0, DataError)
     _check_fit(method, kind, physics, windows)
-    physics = replace(physics, fastest=greatest_speed(windows))
     name = "physics" if physics.vessel is not None else "none"
     paths, diverged = physics.variant_paths(windows.instants(known=commands == "known"))
     if diverged.any():

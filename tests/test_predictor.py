@@ -52,7 +52,7 @@ def test_round_trip(tmp_path: Path, tiny_run: Path, cell: str) -> None:
 
 def test_every_field_survives_a_file(tmp_path: Path) -> None:
     """Each field has a value that is not its default, so that none can be left out of the file."""
-    physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity", 5.0)
+    physics = Physics(load_vessel("gunnerus-28.9"), 7, 0.5, "rk4", Observer(current=0.0), "velocity")
     bands = made(0)[1]
     alarm = calibrate_alarm(Inputs(()), 0, {"u": np.arange(6.0), "v": np.ones(6)}, np.array([*"aabbcc"]))
     first = Predictor(

@@ -144,11 +144,11 @@ def limits_in_words(predictor: Predictor, dataset: Dataset, diverged: pd.Series[
     """Why errors along a log may mislead: its runs trained the predictor, or the physics diverges from instants."""
     trained = set(predictor.provenance.get("runs", ())).intersection(dataset.runs)
     many = f"{len(trained)} of {len(dataset.runs)} {plural_word(len(dataset.runs), 'run')}"
-    share, fastest = percent_text(diverged.mean(), 1), f"{predictor.physics.fastest:.3g} m/s"
+    share = percent_text(diverged.mean(), 1)
     return [
         *([f"{many} trained this predictor, by their names: errors there are no evidence"] if trained else []),
         *(
-            [f"physics diverges on {share} of the instants: paths there keep their last velocity, {fastest} at most"]
+            [f"physics diverges on {share} of the instants: paths there are no faster than the ship is then"]
             if diverged.any()
             else []
         ),

@@ -80,7 +80,7 @@ def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
     mine = {name: work.known[name] for name in way.foundations}
     cases = {
-        name: Case(physics_of(prepared.study, one.foundation.vessel, one.foundation.observer, prepared.pool), one.paths)
+        name: Case(physics_of(prepared.study, one.foundation.vessel, one.foundation.observer), one.paths)
         for name, one in mine.items()
     }
     hidden = {
@@ -250,17 +250,19 @@ def _test_errors(
         outcome["width"] = float(region.radius.mean())
     if lost.any():
         share = f"physics diverges on {percent_text(lost.mean(), 1)} of the test windows"
-        sentence = "; ".join(filter(None, [sentence, f"{share}: paths there keep their last velocity"]))
+        sentence = "; ".join(
+            filter(None, [sentence, f"{share}: paths there are no faster than the ship is at the instant"])
+        )
     return {**outcome, "status": "ok", "sentence": sentence}, paths
 
 
 def _predictor(
     work: Work, foundation: Foundation, way: StudyMethod, corrector: Corrector, origin: Mapping[str, str]
 ) -> Predictor:
-    windows, study, pool = work.windows, work.prepared.study, work.prepared.pool
+    windows, study = work.windows, work.prepared.study
     named = {"cell": work.batch.cell(foundation.name, way.name), "foundation": foundation.name, "method": way.name}
     return Predictor(
-        physics=physics_of(study, foundation.vessel, foundation.observer, pool),
+        physics=physics_of(study, foundation.vessel, foundation.observer),
         method=way.kind,
         corrector=corrector,
         limits=limits_of(windows, work.prepared.commands),

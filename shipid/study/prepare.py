@@ -41,9 +41,8 @@ from shipid.data.windows import (
     windows_over_spans,
 )
 from shipid.engine.casadi import memory_along
-from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
-from shipid.hybrid.physics import Physics, check_columns, greatest_speed, missing_columns
+from shipid.hybrid.physics import Physics, check_columns, missing_columns
 from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
@@ -342,7 +341,7 @@ def _roll_out(
                 continue
             finished[foundation.name] = (foundation, paths)
             if lost:
-                notes.append(f"{words}: its path keeps its last velocity there, below the greatest of training")
+                notes.append(f"{words}: its path there is no faster than the ship is at the instant")
         waiting = again
     pool, test = (np.zeros_like(part.future) for part in parts)
     zeros = PathsOfParts(pool, test, (np.zeros(len(parts[0]), bool), np.zeros(len(parts[1]), bool)))
@@ -359,16 +358,10 @@ def _roll_out(
     return foundations, {one.name: finished[one.name][1] for one in foundations}
 
 
-def physics_of(
-    study: Study, vessel: Vessel | None, observer: Observer | None = None, pool: Windows | None = None
-) -> Physics:
-    """The physics of a study: a vessel, rolled out over the horizon of the study.
-
-    pool : where it diverges, no path is faster than the ship was there.
-    """
-    prediction, fastest = study.prediction, SPEED_LIMIT if pool is None else greatest_speed(pool)
-    rule = prediction.horizon, prediction.step, prediction.integrator
-    return Physics(vessel, *rule, observer, path_source(study), fastest)
+def physics_of(study: Study, vessel: Vessel | None, observer: Observer | None = None) -> Physics:
+    """The physics of a study: a vessel, rolled out over the horizon of the study."""
+    prediction = study.prediction
+    return Physics(vessel, prediction.horizon, prediction.step, prediction.integrator, observer, path_source(study))
 
 
 def known_by_then(study: Study, dataset: Dataset) -> Dataset:
@@ -427,7 +420,7 @@ def chosen_observer(study: Study, foundation: Foundation, dataset: Dataset, wind
 
     def paths(observer: Observer, columns: Mapping[str, Array]) -> Array:
         instants = windows.instants(known=study.prediction.known, hidden=hidden, estimates=columns)
-        return physics_of(study, vessel, observer, windows).paths(instants)
+        return physics_of(study, vessel, observer).paths(instants)
 
     return tune_observer(vessel, known_by_then(study, dataset), windows, paths, foundation.observer)[0]
 
@@ -472,7 +465,7 @@ def _one_round(
         if key not in known:
             known[key] = [instants_of(study, vessel, dataset, windows) for windows in parts]
         parameters = np.array([one.variant.parameters for one, _ in group if one.variant is not None])
-        physics = physics_of(study, vessel, pool=parts[0])
+        physics = physics_of(study, vessel)
         pool, test = (physics.variant_paths(instants, parameters, device) for instants in known[key])
         for place, (foundation, _) in enumerate(group):
             yield foundation, PathsOfParts(pool[0][:, place], test[0][:, place], (pool[1][place], test[1][place]))
@@ -488,7 +481,7 @@ def paths_of(
 ) -> PathsOfParts:
     """Paths of one foundation."""
     vessel = foundation.vessel
-    physics = physics_of(study, vessel, foundation.observer, parts[0])
+    physics = physics_of(study, vessel, foundation.observer)
     pool, test = (
         physics.variant_paths(instants_of(study, vessel, dataset, windows, estimates), None, device)
         for windows in parts
