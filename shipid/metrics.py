@@ -60,17 +60,6 @@ def position_error(predicted: Array, true: Array) -> Array:
     return vector_lengths(np.subtract(predicted, true, order="C"))
 
 
-def cap_paths(paths: Array, true: Array, diverged: NDArray[Any]) -> Array:
-    """Return paths (T, S, 2) [m], those of the windows `diverged` (S,) no farther from the true than the ship has run.
-
-    Each such point is drawn towards the true one; both are in the frame (11), in which true paths begin at the origin.
-    """
-    run = np.cumsum(vector_lengths(np.diff(true, axis=0, prepend=0.0)), axis=0)
-    error = position_error(paths, true)
-    factor = np.divide(run, error, out=np.ones_like(run), where=error > run)
-    return np.where(diverged[:, None], true + factor[..., None] * (paths - true), paths)
-
-
 def coverage_by_run(held: NDArray[Any], run: NDArray[Any]) -> Array:
     """Share of the windows (S,) of each run that lie in their bands, runs by name."""
     _, place = np.unique(run, return_inverse=True)

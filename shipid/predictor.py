@@ -234,12 +234,15 @@ class Predictor(DeployedMethod):
         `predict`.
         """
         instants = self._known(instants)
-        known = {**instants.columns, **instants.estimates}
-        lost = self.physics_with_force.variant_paths(instants)[1][0]
+        known, lost = {**instants.columns, **instants.estimates}, self.diverges(instants)
         if self.alarm is None:
             return np.asarray(lost | self.outside(known))
         raised = lost | self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
         return np.asarray(raised | self._is_unsettled(known, raised.shape))
+
+    def diverges(self, instants: Instants) -> Array:
+        """Return whether the physics diverges from each instant (S,): its path is no faster than the ship."""
+        return np.asarray(self.physics_with_force.variant_paths(self._known(instants))[1][0])
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
         """Return whether each instant (S,) is outside what training has seen, in any column; all are without limits.

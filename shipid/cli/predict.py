@@ -38,6 +38,7 @@ def predict_command(
     typer.echo(f"{frame.groupby(['run', 't']).ngroups} instants, {len(frame)} points -> {file}")
     notes = [
         frame.attrs["errors"],
+        *frame.attrs["limits"],
         frame.attrs["coarse"],
         frame.attrs["gaps"] and f"{frame.attrs['gaps']}: a past over one of them is interpolated",
         outside

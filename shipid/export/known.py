@@ -14,7 +14,7 @@ from casadi import MX
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.export.equations import Equations, rollout_records, split_by_name, symbols_of
 from shipid.hybrid.features import MOTIONS, PLAN_PARTS, Inputs, count_steps
-from shipid.hybrid.physics import Physics
+from shipid.hybrid.physics import ROUNDING, Physics
 from shipid.observer import ESTIMATE_COLUMNS, filter_bank, moves_start
 from shipid.physics.signals import direct_inputs
 
@@ -169,10 +169,10 @@ class PredictorInputs:
             way += column_of_entries(self.seen, ("current_north", "current_east")) @ ages.T
         path = turn_vectors(way, -self.now["psi"])
         places, last = [MX(np.zeros(2))], self.physics.step * column_of_entries(self.now, "uv")
-        before, sound = places[0], MX(1)
+        before, sound, limit = places[0], MX(1), last.T @ last * (1 + ROUNDING) ** 2
         for place in ca.horzsplit(path):
             step = place - before
-            sound = ca.logic_and(sound, step.T @ step <= (SPEED_LIMIT * self.physics.step) ** 2)
+            sound = ca.logic_and(sound, step.T @ step <= limit)
             last, before = ca.if_else(sound, step, last), place
             places.append(ca.if_else(sound, place, places[-1] + last))
         return ca.if_else(self._slow(self.records), path, ca.horzcat(*places[1:]))

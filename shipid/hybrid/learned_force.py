@@ -24,7 +24,6 @@ from shipid.hybrid.search import LearningProblem, Point, Scale, SearchedAlone, T
 from shipid.hybrid.stepping import true_steps
 from shipid.hybrid.stored import StoredData
 from shipid.hybrid.units import solve_ridges
-from shipid.metrics import cap_paths
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel
 
@@ -230,9 +229,9 @@ class _ForceLoss:
         return np.asarray(optimum.x), int(optimum.nit)
 
     def error(self, weights: Array, instants: Instants, future: Array) -> float:
-        """Mean squared position error [m^2] on other windows, see `cap_paths`."""
-        paths, lost = self.physics.variant_paths(instants, self.with_weights(weights)[None])
-        return float(np.square(cap_paths(paths[:, 0], future, lost[0]) - future).sum(axis=-1).mean())
+        """Mean squared position error [m^2] on other windows."""
+        paths = self.physics.variant_paths(instants, self.with_weights(weights)[None])[0][:, 0]
+        return float(np.square(paths - future).sum(axis=-1).mean())
 
     def block(self, weights: Array) -> dict[str, Array]:
         """The block with these weights."""

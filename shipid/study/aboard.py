@@ -24,6 +24,7 @@ from shipid.study.apply import (
     Forecast,
     instants_along,
     is_kind_new,
+    limits_in_words,
     predict_instants,
     read_or_import,
     tables_along,
@@ -42,11 +43,11 @@ ORDERS_UNKNOWN = "later orders were known in calibration and are not here: nothi
 class Replay:
     """What would have been seen at sea.
 
-    instants : a row for each prediction: run, t, outside (the alarm), latency [s], error at the end of the horizon [m];
-        with a band factor, by which it was wider than calibrated, and reach, the greatest error of the whole path over
-        the band as calibrated (not a number where the log ends before).
+    instants : a row for each prediction: run, t, outside (the alarm), diverged (the physics), latency [s], error at the
+        end of the horizon [m]; with a band factor, by which it was wider than calibrated, and reach, the greatest error
+        of the whole path over the band as calibrated (not a number where the log ends before).
     points : a row for each point of each path: run, t, ahead, north, east, physics_north, physics_east, error [m];
-        with a band band_along, band_across [m], band_course [rad, clockwise from north].
+        with a band band_along, band_across [m], band_course [rad, clockwise from north], no numbers with a plan.
     track : run, t [s], north, east [m] as measured. skipped : instants that were due before there was a past.
     plan : whether orders were taken as held where the predictor knows a plan. limits : of the comparison, in words.
     """
@@ -95,12 +96,13 @@ def play_aboard(
         skipped += early
         if len(rows):
             forecast, latency = _forecast_row_by_row(predictor, dataset, piece, rows, band)
-            path, seen = tables_along(predictor, run, piece, forecast, band)
+            path, one = tables_along(predictor, run, piece, forecast, band)
             points.append(path)
-            instants.append(seen.assign(latency=latency))
+            instants.append(one.assign(latency=latency))
     if not instants:
         past = f"the past of {predictor.past * step:g} s that the predictor needs"
         raise DataError(f"no instant has {past}: runs are shorter, or --every is longer", file=log)
+    seen = pd.concat(instants, ignore_index=True)
     assumed = () if vessel is None else missing_columns(vessel, names)
     gaps, plan = gaps_in_words(dataset, step), predictor.commands == "known"
     limits = (
@@ -108,9 +110,10 @@ def play_aboard(
         coarse_in_words(dataset, step),
         f"{gaps}: no errors there, and a past over one of them is interpolated" if gaps else "",
         "the plan was: orders stay as they are, since at sea later orders are not known" if plan else "",
+        *limits_in_words(predictor, dataset, seen["diverged"]),
     )
     return Replay(
-        pd.concat(instants, ignore_index=True),
+        seen,
         pd.concat(points, ignore_index=True),
         dataset.frame[TRACK_COLUMNS],
         skipped,
@@ -144,11 +147,14 @@ def _forecast_row_by_row(
     regions = [one.region for one in forecasts if one.region is not None]
     names = ("ahead", "along", "across")
     parts = [np.concatenate([getattr(region, name) for region in regions], axis=1) for name in names] if regions else []
+    if predictor.commands == "known":  # they were not: nothing is promised
+        parts = [np.full_like(part, np.nan) for part in parts]
     return Forecast(
         np.concatenate([one.predicted for one in forecasts], axis=1),
         np.concatenate([one.alone for one in forecasts], axis=1),
         Region(*parts) if regions else None,
         np.concatenate([one.outside for one in forecasts]),
+        np.concatenate([one.diverged for one in forecasts]),
         {name: np.concatenate([one.columns[name] for one in forecasts]) for name in forecasts[0].columns},
     ), latency
 
@@ -156,7 +162,9 @@ def _forecast_row_by_row(
 def write_replay_points(played: Replay, file: Path) -> None:
     """Write every point with the alarm and the latency of its instant."""
     check_table(file)
-    kept = played.instants.drop(columns=["error", "reach"], errors="ignore").rename(columns={"factor": "band_factor"})
+    kept = played.instants.drop(columns=["error", "reach", "diverged"], errors="ignore").rename(
+        columns={"factor": "band_factor"}
+    )
     write_table(file, played.points.merge(kept, on=["run", "t"], how="left"))
 
 
@@ -209,6 +217,8 @@ def _errors_ahead(played: Replay) -> list[str]:
 def _band_in_words(played: Replay, band: BandSettings) -> str:
     """How often the band held the whole paths that can be judged, and why if that is fewer than was promised."""
     judged = played.instants[played.instants["reach"].notna()]
+    if played.plan:
+        return f"no band of {level_text(band.level)}: {ORDERS_UNKNOWN}"
     if judged.empty:
         return f"band of {level_text(band.level)}: no whole path can be judged, the log ends before"
     held, promised = (judged["reach"] <= judged["factor"]).to_numpy(), ~judged["outside"].to_numpy(dtype=bool)
@@ -216,8 +226,6 @@ def _band_in_words(played: Replay, band: BandSettings) -> str:
     adapts = "" if band.rate is None else f", adapting at {band.rate:g} up to {judged['factor'].max():.2f} times"
     share = f"it held {percent_text(held.mean())} of the {len(held)} whole paths that can be judged"
     line = f"band of {level_text(band.level)}{of}{adapts}: {share}"
-    if played.plan:
-        return f"{line}; {ORDERS_UNKNOWN}"
     if not promised.any():
         return f"{line}, all in alarm, where nothing is promised"
     line += f", {percent_text(held[promised].mean())} of the {promised.sum()} without alarm, where it is promised"

@@ -9,7 +9,15 @@ import numpy as np
 import pandas as pd
 
 from shipid.data.causal import causal_columns
-from shipid.data.dataset import Dataset, clock_slack, mean_commands, read_dataset, sample_columns, stretches_of_runs
+from shipid.data.dataset import (
+    Dataset,
+    clock_slack,
+    cumulative_integral,
+    mean_commands,
+    read_dataset,
+    sample_columns,
+    stretches_of_runs,
+)
 from shipid.data.windows import (
     Instants,
     coarse_in_words,
@@ -30,7 +38,7 @@ from shipid.observer import run_observer
 from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
-from shipid.units import length_text, plural_word
+from shipid.units import length_text, percent_text, plural_word
 
 Array = np.ndarray
 COOPERATIVE_COLUMNS = ("cooperative_north", "cooperative_east")
@@ -50,13 +58,15 @@ class Forecast:
     """Predictions from S instants of one stretch, in the frame (11).
 
     predicted, alone : paths (T, S, 2) [m], compensated and of the physics alone, NaN without physics.
-    region : of the band, where one was asked for. outside : the alarm (S,). columns : of the log at the instants.
+    region : of the band, where one was asked for. outside, diverged : the alarm, and where the physics diverges, (S,).
+    columns : of the log at the instants.
     """
 
     predicted: Array
     alone: Array
     region: Region | None
     outside: Array
+    diverged: Array
     columns: dict[str, Array]
 
 
@@ -86,7 +96,8 @@ def predict_log(
     the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
     training's limits. Cells without physics have NaN for physics. `attrs["gaps"]` of the frame says how many times
     without rows the log has, and the longest; `attrs["coarse"]` that its rows are farther apart than the step;
-    `attrs["errors"]` how far off the paths are that end before the log does.
+    `attrs["errors"]` how far off the paths are that end before the log does; `attrs["limits"]` lists why these errors
+    may mislead.
     """
     check_table(out)
     predictor = read_predictor(_find_cell_file(folder, cell))
@@ -104,17 +115,18 @@ def predict_log(
         raise DataError(f"no run has {needed} for the past and, where commands are known, the horizon", file=log)
     frame = pd.concat(parts, ignore_index=True)
     errors = frame.pop("error").to_numpy().reshape(-1, predictor.physics.horizon).T
+    limits = limits_in_words(predictor, dataset, frame.pop("diverged"))
     write_table(out, frame)
     step = predictor.physics.step
     frame.attrs["errors"] = _errors_in_words(errors[:, np.isfinite(errors).all(axis=0)], step)
-    frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step)}
+    frame.attrs |= {"gaps": gaps_in_words(dataset, step), "coarse": coarse_in_words(dataset, step), "limits": limits}
     return frame, float(frame["outside"].mean())
 
 
 def table_of_stretch(
     predictor: Predictor, dataset: Dataset, run: str, rows: pd.DataFrame, band: BandSettings | None = None
 ) -> pd.DataFrame:
-    """The table of `predict_log` for one stretch, and `error` [m]; empty where no row has the past and plan needed."""
+    """The table of `predict_log` for a stretch, `error` [m] and `diverged`; empty without the past and plan needed."""
     some = _usable_rows(predictor, rows["t"].to_numpy())
     if some.start >= some.stop:
         return pd.DataFrame()
@@ -124,7 +136,23 @@ def table_of_stretch(
     points = points.rename(columns=dict(zip(("north", "east"), COOPERATIVE_COLUMNS, strict=True)))
     if band is not None and band.rate is not None:
         points["band_factor"] = np.repeat(instants["factor"].to_numpy(), predictor.physics.horizon)
-    return points.assign(outside=np.repeat(forecast.outside, predictor.physics.horizon))
+    by_instant = {"outside": forecast.outside, "diverged": forecast.diverged}
+    return points.assign(**{name: np.repeat(values, predictor.physics.horizon) for name, values in by_instant.items()})
+
+
+def limits_in_words(predictor: Predictor, dataset: Dataset, diverged: pd.Series[bool]) -> list[str]:
+    """Why errors along a log may mislead: its runs trained the predictor, or the physics diverges from instants."""
+    trained = set(predictor.provenance.get("runs", ())).intersection(dataset.runs)
+    many = f"{len(trained)} of {len(dataset.runs)} {plural_word(len(dataset.runs), 'run')}"
+    share = percent_text(diverged.mean(), 1)
+    return [
+        *([f"{many} trained this predictor, by their names: errors there are no evidence"] if trained else []),
+        *(
+            [f"physics diverges on {share} of the instants: paths there are no faster than the ship is then"]
+            if diverged.any()
+            else []
+        ),
+    ]
 
 
 def _errors_in_words(error: Array, step: float) -> str:
@@ -140,10 +168,18 @@ def _errors_in_words(error: Array, step: float) -> str:
 
 
 def read_or_import(log: Path, mapping: str | None) -> Dataset:
-    """A dataset, or a raw log with its mapping; DataError for what is neither."""
+    """A dataset, or a raw log with its mapping; DataError for what is neither, and for a heading in degrees."""
     if mapping is None:
-        return read_dataset(log, remedy=", or give the log itself with --mapping")
-    return import_log(read_mapping(mapping), log)
+        dataset = read_dataset(log, remedy=", or give the log itself with --mapping")
+    else:
+        dataset = import_log(read_mapping(mapping), log)
+    for run, rows in stretches_of_runs(dataset):
+        t, psi, r = (rows[name].to_numpy() for name in ("t", "psi", "r"))
+        changed, turned = np.ptp(psi), cumulative_integral(t, np.abs(r))[-1]
+        if changed > 4 * np.pi + 2 * turned:
+            words = f"changes by {changed:.0f} rad in run {run!r}, where r turns it by {turned:.2g}"
+            raise DataError(f"{words}: give the heading in radians; are these degrees?", file=log, path="psi")
+    return dataset
 
 
 def _find_cell_file(folder: Path, cell: str) -> Path:
@@ -202,9 +238,10 @@ def predict_instants(predictor: Predictor, instants: Instants, band: BandSetting
     alone = predictor.alone(instants)
     predicted = predictor.predict(instants, alone)
     region = None if band is None else predictor.band(predicted, instants, band.level, kind=band.kind)
-    outside = predictor.raise_alarm(instants) | new
+    outside, diverged = predictor.raise_alarm(instants) | new, predictor.diverges(instants)
     columns = {name: instants.columns[name] for name in ("t", "north", "east", "psi")}
-    return Forecast(predicted, alone if predictor.vessel else np.full_like(alone, np.nan), region, outside, columns)
+    alone = alone if predictor.vessel else np.full_like(alone, np.nan)
+    return Forecast(predicted, alone, region, outside, diverged, columns)
 
 
 def tables_along(
@@ -213,8 +250,9 @@ def tables_along(
     """Points and instants of a forecast along one unbroken stretch, all of whose rows are `rows`.
 
     Points have run, t, ahead, physics_north, physics_east, north, east, error [m] where the log goes on; with a band
-    band_along, band_across, band_course. Instants have run, t, outside, and the error at the end of the horizon; with
-    a band reach, the greatest error of the whole path over the band as calibrated, and factor, by which it adapted.
+    band_along, band_across, band_course. Instants have run, t, outside, diverged, and the error at the end of the
+    horizon; with a band reach, the greatest error of the whole path over the band as calibrated, and factor, by which
+    it adapted.
     """
     physics, columns = predictor.physics, forecast.columns
     steps, count = physics.horizon, len(columns["t"])
@@ -228,7 +266,8 @@ def tables_along(
     for prefix, path in (("physics_", forecast.alone), ("", forecast.predicted)):
         places = from_frame(path[..., 0], path[..., 1], columns["north"], columns["east"], columns["psi"])
         points |= {f"{prefix}{name}": place.T.ravel() for name, place in zip(("north", "east"), places, strict=True)}
-    instants = {"run": run, "t": columns["t"], "outside": forecast.outside, "error": error[-1]}
+    instants = {"run": run, "t": columns["t"], "outside": forecast.outside, "diverged": forecast.diverged}
+    instants["error"] = error[-1]
     if band is not None and forecast.region is not None:
         region, reach, factors = forecast.region, forecast.region.reach(missed).max(axis=0), np.ones(count)
         if band.rate is not None:

@@ -16,7 +16,6 @@ from shipid.errors import DataError, ShipidError, shorten_line
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
 from shipid.metrics import (
     PREDICTION_ERRORS,
-    cap_paths,
     coverage_share,
     position_error,
     summarise_errors,
@@ -181,14 +180,13 @@ def evaluate_cell(
     one, way, result = work.known[name], work.ways[method], fitted[method][name]
     foundation, prepared, batch = one.foundation, work.prepared, work.batch
     errors, seconds = left_out.get(pair, (None, 0.0))
-    alone = cap_paths(one.test_paths, prepared.test.future, one.diverged)
     row: dict[str, Any] = {
         "cell": batch.cell(name, method),
         "foundation": name,
         "family": foundation.family,
         "member": foundation.member,
         "method": method,
-        **(accuracy_of(alone, prepared.test) if foundation.base is not None else NO_ACCURACY),
+        **(accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY),
         "N_D": batch.N_D,
         "seed": batch.seed,
         "runs": len(prepared.runs(batch)),
@@ -227,7 +225,7 @@ def _failed_columns(status: str, sentence: str) -> dict[str, Any]:
 def _test_errors(
     prepared: PreparedStudy, one: FoundationPrediction, predictor: Predictor, way: StudyMethod
 ) -> tuple[dict[str, Any], Array | None]:
-    """Errors [m] of a predictor on the test windows, and its paths, see `cap_paths`, if a ship can reach them."""
+    """Errors [m] of a predictor on the test windows, and its paths, if a ship can reach them."""
     test, study, sentence = prepared.test, prepared.study, one.sentence
     if not np.isfinite(one.test_paths).all():
         return _failed_columns("diverged", sentence), None
@@ -235,7 +233,7 @@ def _test_errors(
     predictor.check_restored(instants, one.test_paths, way.method.corrector)
     moved = predictor.physics_with_force
     lost = one.diverged if moved is predictor.physics else moved.variant_paths(instants)[1][0]
-    paths = cap_paths(predictor.predict(instants, one.test_paths), test.future, lost)
+    paths = predictor.predict(instants, one.test_paths)
     failed = ~(vector_lengths(paths) <= SPEED_LIMIT * test.step * len(paths)).all(axis=0)
     if failed.any():
         where = f"{percent_text(failed.mean(), 1)} of the test windows"
@@ -252,7 +250,9 @@ def _test_errors(
         outcome["width"] = float(region.radius.mean())
     if lost.any():
         share = f"physics diverges on {percent_text(lost.mean(), 1)} of the test windows"
-        sentence = "; ".join(filter(None, [sentence, f"{share}: errors there are at most the distance run"]))
+        sentence = "; ".join(
+            filter(None, [sentence, f"{share}: paths there are no faster than the ship is at the instant"])
+        )
     return {**outcome, "status": "ok", "sentence": sentence}, paths
 
 

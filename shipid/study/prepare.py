@@ -48,7 +48,7 @@ from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
 from shipid.logs.mapping import read_mapping
 from shipid.logs.segments import run_kind
-from shipid.metrics import cap_paths, position_error
+from shipid.metrics import position_error
 from shipid.observer import Estimates, Observer, estimates_at_windows, run_observer, tune_observer
 from shipid.simulation.manoeuvre import kind_name
 from shipid.simulation.truth import draw_manoeuvres, simulate_truth
@@ -73,8 +73,7 @@ class PreparedStudy:
     data : the runs themselves.
     pool, test : windows for training and validation, and windows of the untouched test runs.
     foundations : after redraws, where a family asks for them.
-    pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics. Those of the pool are
-        capped where they diverge, see `cap_paths`.
+    pool_paths, test_paths : foundation -> (T, S, 2) [m] in the frame (11); zeros without physics.
     diverged : foundation -> windows of pool and test on which it diverges, (S,) each.
     estimates : foundation -> what its observer knows at every row of the runs, where it has one and its numbers do not
         depend on the batch.
@@ -244,8 +243,8 @@ def all_windows(plan: Plan, dataset: Dataset) -> Windows:
 def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
     """Cut windows, set the test runs aside, and roll every model out on all of them.
 
-    A member that diverges on windows of the pool stays, see `cap_paths`, or is redrawn with the next counter where its
-    family says so; the test set is never looked at.
+    A member that diverges on windows of the pool stays, see `hold_velocity`, or is redrawn with the next counter where
+    its family says so; the test set is never looked at.
     """
     dataset = _in_order(plan, dataset)
     rest, test, notes = partition(plan, dataset)
@@ -311,7 +310,7 @@ Alike = tuple[str, ...]  # structure of a vessel and the numbers of its actuator
 
 
 class PathsOfParts(NamedTuple):
-    """Paths (T, S, 2) [m] of a foundation, those of training capped, see `cap_paths`; windows on which they diverge."""
+    """Paths (T, S, 2) [m] of a foundation, and the windows on which they diverge."""
 
     pool: Array
     test: Array
@@ -342,7 +341,7 @@ def _roll_out(
                 continue
             finished[foundation.name] = (foundation, paths)
             if lost:
-                notes.append(f"{words}: its path keeps its last velocity there, its error is at most the distance run")
+                notes.append(f"{words}: its path there is no faster than the ship is at the instant")
         waiting = again
     pool, test = (np.zeros_like(part.future) for part in parts)
     zeros = PathsOfParts(pool, test, (np.zeros(len(parts[0]), bool), np.zeros(len(parts[1]), bool)))
@@ -466,14 +465,10 @@ def _one_round(
         if key not in known:
             known[key] = [instants_of(study, vessel, dataset, windows) for windows in parts]
         parameters = np.array([one.variant.parameters for one, _ in group if one.variant is not None])
-        rolled = [physics_of(study, vessel).variant_paths(instants, parameters, device) for instants in known[key]]
-        for position, (foundation, _) in enumerate(group):
-            yield foundation, _paths_of_parts(parts, *((paths[:, position], bad[position]) for paths, bad in rolled))
-
-
-def _paths_of_parts(parts: Sequence[Windows], pool: Pair, test: Pair) -> PathsOfParts:
-    """Paths and where they diverge, of pool and test."""
-    return PathsOfParts(cap_paths(pool[0], parts[0].future, pool[1]), test[0], (pool[1], test[1]))
+        physics = physics_of(study, vessel)
+        pool, test = (physics.variant_paths(instants, parameters, device) for instants in known[key])
+        for place, (foundation, _) in enumerate(group):
+            yield foundation, PathsOfParts(pool[0][:, place], test[0][:, place], (pool[1][place], test[1][place]))
 
 
 def paths_of(
@@ -487,11 +482,11 @@ def paths_of(
     """Paths of one foundation."""
     vessel = foundation.vessel
     physics = physics_of(study, vessel, foundation.observer)
-    rolled = (
+    pool, test = (
         physics.variant_paths(instants_of(study, vessel, dataset, windows, estimates), None, device)
         for windows in parts
     )
-    return _paths_of_parts(parts, *((paths[:, 0], bad[0]) for paths, bad in rolled))
+    return PathsOfParts(pool[0][:, 0], test[0][:, 0], (pool[1][0], test[1][0]))
 
 
 def _redraw(foundation: Foundation, family: Family, words: str, file: str, notes: list[str]) -> Foundation:

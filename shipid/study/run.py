@@ -31,7 +31,6 @@ from shipid.files import make_folder, write_json
 from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
-from shipid.metrics import cap_paths
 from shipid.study import seals, store
 from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
 from shipid.study.cluster import Line, SentJournal, on_dask
@@ -190,10 +189,8 @@ def _prepare_folder(
 
 
 def _paths_alone(prepared: PreparedStudy) -> dict[str, np.ndarray]:
-    """Paths (T, S, 2) [m] on the test windows by foundation that is not fitted, see `cap_paths`."""
-    future, lost = prepared.test.future, prepared.diverged
-    fixed = [one.name for one in prepared.foundations if not one.fitted]
-    return {name: cap_paths(prepared.test_paths[name], future, lost[name][1]) for name in fixed}
+    """Paths (T, S, 2) [m] on the test windows by foundation that is not fitted."""
+    return {one.name: prepared.test_paths[one.name] for one in prepared.foundations if not one.fitted}
 
 
 def _check_common(folder: Path, prepared: PreparedStudy) -> None:
