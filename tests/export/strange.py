@@ -72,6 +72,8 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     memory = Memory(
         history=tuple(physics.step * k for k in rng.choice(steps, 2, replace=False) + 1),
         turned=(physics.step * 2,),
+        positions=(physics.step, physics.step * 3),
+        states=("phi",),
         error=tuple(physics.step * k for k in rng.choice(steps, int(rng.integers(1, 3)), replace=False) + 1),
         observer=observer is not None,
     )
@@ -144,7 +146,7 @@ def _instants(rng, physics, commands, count, steps, slow, known):
 
     model = None if physics.vessel is None else vessel_dynamics(physics.vessel)
     states = () if model is None else model.state
-    names = tuple(dict.fromkeys(("psi", *MOTIONS, *states, *commands, "V_w", "beta_w", "V_c", "beta_c")))
+    names = tuple(dict.fromkeys(("psi", *MOTIONS, *states, *commands, "V_w", "beta_w", "V_c", "beta_c", "phi")))
     names = tuple(name for name in names if name not in ("north", "east"))
     columns = {name: one(name, count) for name in names}
     past = {name: columns[name] + 0.1 * (one(name, steps, count) - columns[name]) for name in names}
