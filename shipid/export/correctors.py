@@ -25,6 +25,7 @@ from shipid.hybrid.compensator import Compensator, Layers, Normaliser
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector
+from shipid.hybrid.kernel import KernelCompensator
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.modules import ModulesCorrector, physics_without_modules
 from shipid.hybrid.one_step import OneStepCorrector
@@ -82,6 +83,22 @@ def compensated_path(known: PredictorInputs, corrector: Compensator) -> MX:
             for one in corrector.networks
         ]
     )
+
+
+def kernel_path(known: PredictorInputs, corrector: KernelCompensator) -> MX:
+    """Path of the physics plus the mean of kernel ridge regressions."""
+    point, terms = normalised_inputs(known.table(corrector.inputs), corrector.normaliser), corrector.basis.shape[1]
+    images, paths = [(point, np.ones(2 * terms))], []
+    if corrector.reflection is not None:
+        images.append((ca.mtimes(ca.sparsify(ca.DM(corrector.reflection.T)), point), np.repeat([1.0, -1.0], terms)))
+    for one in corrector.members:
+        weight, outputs = 1 / one.scales**2, MX(np.zeros(2 * terms))
+        for image, sign in images:
+            product = ca.mtimes(ca.DM(corrector.centres), weight * image)
+            apart = ca.DM(corrector.centres**2 @ weight) + ca.dot(weight * image, image) - 2 * product
+            outputs += sign * ca.mtimes(ca.DM(one.weights.T), ca.exp(-apart / 2) + one.linear * (1 + product))
+        paths.append(path_of_shapes(outputs, corrector.basis))
+    return known.path + mean_of(paths)
 
 
 def physics_path(known: PredictorInputs, corrector: UnchangedPath) -> MX:  # noqa: ARG001
@@ -344,6 +361,7 @@ CORRECTORS: dict[type[Any], Callable[[PredictorInputs, Any], MX]] = {
     Compensator: compensated_path,
     TrajectoryCompensator: compensated_path,
     ForestCorrector: forest_path,
+    KernelCompensator: kernel_path,
     RecurrentCorrector: recurrent_path,
     OneStepCorrector: one_step_path,
     ModulesCorrector: modules_path,

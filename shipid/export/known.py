@@ -210,7 +210,11 @@ class PredictorInputs:
 
         moments : steps of the horizon at which the physics is seen (calibrator).
         """
-        table = feature_expressions(self.now, inputs.commands) | self._plans(inputs) | self._history(inputs)
+        table = (
+            feature_expressions(self.now, (*inputs.commands, *inputs.memory.states))
+            | self._plans(inputs)
+            | self._history(inputs)
+        )
         if self.physics.vessel is None:
             return table
         if inputs.memory.observer and self.physics.observer is not None:
@@ -243,12 +247,15 @@ class PredictorInputs:
         columns, now, step = {}, self.now, self.physics.step
         for seconds in inputs.memory.history:
             row = self.past[self.names.before(count_steps(seconds, step))]
-            for name in (*MOTIONS, *inputs.commands):
+            for name in (*MOTIONS, *inputs.commands, *inputs.memory.states):
                 component, dot, signal = name.rpartition(".")
                 columns[f"{component}{dot}past-{seconds:g}.{signal}"] = row[name] - now[name]
         for seconds in inputs.memory.turned:
             row = self.past[self.names.before(count_steps(seconds, step))]
             columns[f"turned-{seconds:g}.psi"] = now["psi"] - row["psi"]
+        for seconds in inputs.memory.positions:
+            row = self.past[self.names.before(count_steps(seconds, step))]
+            columns |= {f"past-{seconds:g}.{axis}": row[axis] for axis in "xy"}
         return columns
 
     def _estimates(self) -> dict[str, MX]:

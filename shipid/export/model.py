@@ -123,7 +123,8 @@ def build_model(predictor: DeployedMethod) -> ExportModel:
     wind = ("V_w", "beta_w") if "V_w" in limited else ()
     commands = tuple(dict.fromkeys((*orders, *(name for name in predictor.limits if "." in name))))
     motion = (*POSITION_ENTRIES, "psi", *MOTIONS)
-    now = tuple(dict.fromkeys((*motion, *states, *commands, *weather, *wind, *limited)))
+    measured = predictor.inputs.memory.states
+    now = tuple(dict.fromkeys((*motion, *states, *commands, *weather, *wind, *limited, *measured)))
     past = (*now[len(POSITION_ENTRIES) :], "x", "y") if predictor.past else ()
     estimates = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS) if physics.observer is not None else ()
     planned = commands if predictor.commands == "known" else ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from shipid.checked import CheckedModel
 from shipid.data.windows import Instants, to_frame
 from shipid.errors import DataError
 from shipid.hybrid.physics import Physics
-from shipid.physics.signals import direct_inputs, measurable_signals
+from shipid.physics.signals import direct_inputs, measurable_signals, rows_of_role
 
 Array = NDArray[np.float64]
 MOTIONS = ("u", "v", "r")
@@ -74,6 +74,8 @@ class Memory(CheckedModel, BaseModel):
     ----------
     history : u, v, r and the commands so long ago, less their present values.
     turned : change of heading over so long.
+    positions : position so long ago in the frame (11) of the instant.
+    states : further measured columns as inputs, with their history: of z, phi, theta, w, p, q.
     observer : the estimates of the observer of the physics: slow forces as accelerations, current, and the filtered
         velocities less the measured ones.
     error : what the physics, started so long ago with the commands then given, gets wrong by now: along and across the
@@ -83,10 +85,12 @@ class Memory(CheckedModel, BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     history: tuple[PositiveFloat, ...] = ()
     turned: tuple[PositiveFloat, ...] = ()
+    positions: tuple[PositiveFloat, ...] = ()
+    states: tuple[Literal["z", "phi", "theta", "w", "p", "q"], ...] = ()
     error: tuple[PositiveFloat, ...] = ()
     observer: bool = False
 
-    @field_validator("history", "turned", "error", mode="before", json_schema_input_type=OneOrMore)
+    @field_validator("history", "turned", "positions", "error", mode="before", json_schema_input_type=OneOrMore)
     @classmethod
     def _several(cls, value: Any) -> Any:
         """Take one number as a list of one; 0 as none."""
@@ -95,12 +99,16 @@ class Memory(CheckedModel, BaseModel):
     @property
     def past(self) -> float:
         """Length of the past that is needed [s]."""
-        return max((*self.history, *self.turned, *self.error), default=0.0)
+        return max((*self.history, *self.turned, *self.positions, *self.error), default=0.0)
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of inputs that it gives, as `input_group` calls them."""
-        held = {"history": self.history or self.turned, "error": self.error, "observer": self.observer}
+        held = {
+            "history": self.history or self.turned or self.positions,
+            "error": self.error,
+            "observer": self.observer,
+        }
         return tuple(kind for kind, one in held.items() if one)
 
 
@@ -111,8 +119,8 @@ NO_MEMORY = Memory()
 class Inputs:
     """Which inputs a method takes: names of commands, and the memory.
 
-    A difference to the past is called `past-4.u` or `port.past-4.alpha`, a change of heading `turned-10.psi`, the error
-    of the physics `error-8.x`: the last part is the signal.
+    A difference to the past is called `past-4.u` or `port.past-4.alpha`, a position `past-4.x`, a change of heading
+    `turned-10.psi`, the error of the physics `error-8.x`: the last part is the signal.
     """
 
     commands: tuple[str, ...]
@@ -126,15 +134,17 @@ class Inputs:
         """Return the inputs (S,) that do not depend on the physics."""
         planned = {name: instants.planned[name] for name in self.commands} if instants.planned is not None else {}
         means = planned_means(instants.columns, planned)
-        table = feature_table({**instants.columns, **means}, (*self.commands, *means))
+        table = feature_table({**instants.columns, **means}, (*self.commands, *means, *self.memory.states))
         for seconds in self.memory.history:
-            for name in (*MOTIONS, *self.commands):
+            for name in (*MOTIONS, *self.commands, *self.memory.states):
                 component, dot, signal = name.rpartition(".")
                 label = f"{component}{dot}past-{seconds:g}.{signal}"
                 table[label] = value_before(instants, name, seconds, step) - instants.columns[name]
         for seconds in self.memory.turned:
             before = value_before(instants, "psi", seconds, step)
             table[f"turned-{seconds:g}.psi"] = instants.columns["psi"] - before
+        for seconds in self.memory.positions:
+            table |= {f"past-{seconds:g}.{axis}": value_before(instants, axis, seconds, step) for axis in "xy"}
         return table
 
     def of_physics(self, physics: Physics, instants: Instants) -> dict[str, Array]:
@@ -161,7 +171,7 @@ def input_group(name: str) -> str:
 
     A plan is a command; `physics` is a trajectory, `wind` also other environment.
     """
-    if name in MOTIONS:
+    if name in rows_of_role("motion"):
         return "motion"
     if name.endswith("_rw") or measurable_signals([name]):
         return "wind"

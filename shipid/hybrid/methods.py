@@ -12,6 +12,7 @@ from shipid.hybrid.calibrator import Calibrator
 from shipid.hybrid.contract import fault_of_method
 from shipid.hybrid.forest import Forest
 from shipid.hybrid.hankel_dmd import HankelDMD
+from shipid.hybrid.kernel import Kernel
 from shipid.hybrid.learned_force import LearnedForce
 from shipid.hybrid.method import Method
 from shipid.hybrid.modules import Modules
@@ -25,6 +26,7 @@ METHODS: dict[str, type[Method]] = {
     "calibrator": Calibrator,
     "forest": Forest,
     "hankel-dmd": HankelDMD,
+    "kernel": Kernel,
     "learned-force": LearnedForce,
     "modules": Modules,
     "one-step": OneStep,

@@ -299,7 +299,12 @@ def mean_squared_error(paths: Array, future: Array) -> float:
 
 
 class SearchProblem(ABC):
-    """A foundation of a task as a method sees it: what its trials share, and how one is judged."""
+    """A foundation of a task as a method sees it: what its trials share, and how one is judged.
+
+    left_out : as in `FitResult`, known once there is a corrector.
+    """
+
+    left_out: Array | None = None
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
         self.method, self.task, self.name = method, task, name
@@ -375,15 +380,19 @@ class SearchedAlone(SearchMethod):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Search for every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
+        return self.fit_by(self.problem, task)
+
+    def fit_by(self, kind: type[SearchProblem], task: Task) -> dict[str, FitResult]:
+        """As `fit`, with a kind of problem."""
         every, fitted = windows_of_folds(task), {}
         for name, case in task.cases.items():
             finite = np.isfinite(case.paths[:, every]).all()
-            fitted[name] = self._fit(task, name) if finite else diverged_result(self, self.points())
+            fitted[name] = self._fit(kind, task, name) if finite else diverged_result(self, self.points())
         return fitted
 
-    def _fit(self, task: Task, name: str) -> FitResult:
+    def _fit(self, kind: type[SearchProblem], task: Task, name: str) -> FitResult:
         """Search for one foundation; the best trials make its corrector."""
-        search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
+        search, problem = Search(task, [name], self, again=self.CHAINED), kind(self, task, name)
         points = self.points() if self.suggest is None else suggested_points(self, search, name, task.seed)
         for number, point in search.left(points):
             start = time.process_time()
@@ -391,4 +400,5 @@ class SearchedAlone(SearchMethod):
             search.record({name: trial_row(number, params, value, start, epochs)})
         rows = search.rows[name]
         best = best_trials(rows)[: self.num_chosen()]
-        return FitResult(problem.corrector(best) if best else None, rows, search.seconds)
+        corrector = problem.corrector(best) if best else None
+        return FitResult(corrector, rows, search.seconds, problem.left_out)

@@ -14,6 +14,7 @@ from shipid.hybrid.compensator import Compensator, Network, Normaliser
 from shipid.hybrid.features import MOTIONS, Inputs, Memory, feature_table
 from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector, LinearLaw
+from shipid.hybrid.kernel import KernelCompensator, KernelMember
 from shipid.hybrid.learned_force import HIDDEN, OUTPUT, ForceCorrector
 from shipid.hybrid.modules import Alarm, ModulesCorrector, modules_of
 from shipid.hybrid.novelty import alarm_inputs, calibrate_alarm
@@ -30,7 +31,7 @@ from tests.conftest import ENVELOPE, SPEEDS, pace, variety
 
 KINDS = (
     *("alone", "calibrator", "forest", "hankel-dmd", "learned-force", "modules"),
-    *("one-step", "path-drawn", "path-trained", "recurrent"),
+    *("one-step", "path-drawn", "path-trained", "recurrent", "kernel"),
 )
 STEPPED = ("hankel-dmd", "modules", "one-step")  # corrected by step: they refuse an observer
 NEEDS_PHYSICS = ("alone", "calibrator", "learned-force", "modules")
@@ -72,6 +73,8 @@ def drawn(kind: str, seed: int, count: int = 20, vessel: str | None = None) -> S
     memory = Memory(
         history=tuple(physics.step * k for k in rng.choice(steps, 2, replace=False) + 1),
         turned=(physics.step * 2,),
+        positions=(physics.step, physics.step * 3),
+        states=("phi",),
         error=tuple(physics.step * k for k in rng.choice(steps, int(rng.integers(1, 3)), replace=False) + 1),
         observer=observer is not None,
     )
@@ -144,7 +147,7 @@ def _instants(rng, physics, commands, count, steps, slow, known):
 
     model = None if physics.vessel is None else vessel_dynamics(physics.vessel)
     states = () if model is None else model.state
-    names = tuple(dict.fromkeys(("psi", *MOTIONS, *states, *commands, "V_w", "beta_w", "V_c", "beta_c")))
+    names = tuple(dict.fromkeys(("psi", *MOTIONS, *states, *commands, "V_w", "beta_w", "V_c", "beta_c", "phi")))
     names = tuple(name for name in names if name not in ("north", "east"))
     columns = {name: one(name, count) for name in names}
     past = {name: columns[name] + 0.1 * (one(name, steps, count) - columns[name]) for name in names}
@@ -266,6 +269,17 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
             fewer = [name for name in taken if rng.random() < 0.8] or taken
             networks.append(network_of(rng, fewer, table, horizon, terms, rng.random() < 0.5))
         return (TrajectoryCompensator if kind == "calibrator" else Compensator)(inputs, tuple(networks), {})
+    if kind == "kernel":
+        normaliser, count = _normaliser(taken, table), int(rng.integers(1, 40))
+        centres = normaliser.apply(table)[rng.integers(size, size=count)]
+        members = tuple(
+            KernelMember(
+                rng.uniform(0.5, 9, len(taken)), float(rng.uniform(0, 2)), rng.normal(0, 2, (count, 2 * terms))
+            )
+            for _ in range(int(rng.integers(1, 4)))
+        )
+        reflection = _signs(rng, len(taken)) if rng.random() < 0.6 else None
+        return KernelCompensator(inputs, normaliser, reflection, smooth_basis(horizon, terms), centres, members, {})
     if kind == "forest":
         values = np.stack([table[name] for name in taken], axis=1)
         trees = _trees(rng, values, terms)

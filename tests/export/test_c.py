@@ -198,7 +198,7 @@ def test_a_recorder_knows_what_python_takes_from_a_log(velocity, longest, tmp_pa
     past = past_of_instants(rows, t[late], 4, 1.0, physics.path)
     seen = {name: values[late] for name, values in estimates.columns.items()}
     instants = Instants(sample_columns(rows, t[late]), past, None, hidden, seen)
-    memory = Memory(history=(2.0, 3.0), turned=(4.0,), error=(3.0,), observer=True)
+    memory = Memory(history=(2.0, 3.0), turned=(4.0,), positions=(1.0, 4.0), error=(3.0,), observer=True)
     bands = bands_of(np.random.default_rng(1), physics, instants, ("u",), 1.0)
     predictor = remembering(physics, memory, instants, limits={"u": (0.0, 9.0)}, bands=bands, run_up=9.0)
     recorder, predicted, alarms = Recorder(predictor, tmp_path), [], []

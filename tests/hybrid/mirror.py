@@ -5,7 +5,17 @@ from __future__ import annotations
 from shipid.data.dataset import Dataset
 
 SIDES = {"port": "starboard", "starboard": "port"}
-ODD = ("east", "psi", "v", "r", "beta_w", "alpha", "delta")  # change sign; written apart from the table of signals
+ODD = (
+    "east",
+    "psi",
+    "phi",
+    "v",
+    "r",
+    "p",
+    "beta_w",
+    "alpha",
+    "delta",
+)  # change sign; written apart from the table of signals
 
 
 def mirrored(dataset: Dataset) -> Dataset:

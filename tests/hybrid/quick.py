@@ -15,6 +15,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "calibrator": {"trials": 3, "units": 24, "averaged": 2},
     "forest": {"trials": 2, "trees": 6},
     "hankel-dmd": {"delays": (2.0, 4.0)},
+    "kernel": {"trials": 2, "steps": 4, "search_windows": 40, "centres": 60},
     "learned-force": {"trials": 2, "units": 4, "iterations": 4},
     "modules": {"trials": 2, "units": 4, "centres": 16, "ridge": 1e-3},
     "one-step": {"trials": 2, "units": 16, "averaged": 2},

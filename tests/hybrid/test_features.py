@@ -5,19 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipid.data.windows import Instants, cut_windows
+from shipid.data.windows import Instants, cut_windows, to_frame
 from shipid.errors import DataError
 from shipid.hybrid.features import (
     Inputs,
     Memory,
     choose_features,
     feature_table,
+    input_group,
     observer_inputs,
     past_error,
     planned_means,
 )
 from shipid.hybrid.physics import Physics
 from shipid.observer import Observer
+from shipid.physics.signals import mirror_sign
 from shipid.vessel.load import load_vessel
 from tests.hybrid.tasks import azimuth_columns
 from tests.study.test_commands import weaving
@@ -75,6 +77,36 @@ def test_history_and_turned_by_hand(past):
         np.testing.assert_array_equal(table[label], past.past[name][-4] - past.columns[name])
     np.testing.assert_array_equal(table["turned-8.psi"], past.columns["psi"] - past.past["psi"][0])
     assert memory.past == 8.0
+
+
+def test_positions_are_those_of_earlier_instants_in_the_present_frame(past):
+    """A ship that heads east and came from the south-west was astern and to starboard."""
+    table = Inputs(COMMANDS, Memory(positions=(4.0,))).table(Physics(None, 5, 1.0), past.instants())
+    rows = [
+        np.flatnonzero((past.run == run) & np.isclose(past.t, t - 4)) for run, t in zip(past.run, past.t, strict=True)
+    ]
+    later = np.array([place for place, found in enumerate(rows) if len(found)])
+    before = np.concatenate([rows[place] for place in later])
+    north, east, psi = (past.columns[name] for name in ("north", "east", "psi"))
+    place = to_frame(north[before], east[before], north[later], east[later], psi[later])
+    np.testing.assert_allclose([table["past-4.x"][later], table["past-4.y"][later]], place, atol=1e-9)
+    assert len(later) > 10
+    assert to_frame(-3.0, -8.0, 0.0, 0.0, np.pi / 2) == pytest.approx((-8.0, 3.0))
+    assert [mirror_sign(f"past-4.{axis}") for axis in "xy"] == [1, -1]
+    assert {input_group(f"past-4.{axis}") for axis in "xy"} == {"history"}
+
+
+def test_further_states_are_inputs_with_their_history(past):
+    """Roll as measured and as a difference; a log without it is one line, and a mirror turns it round."""
+    columns = past.columns | {"phi": 0.1 * past.columns["r"]}
+    given = Instants(columns, past.past | {"phi": 0.1 * past.past["r"]})
+    inputs = Inputs(COMMANDS, Memory(states=("phi",), history=(2.0,)))
+    table = inputs.table(Physics(None, 5, 1.0), given)
+    np.testing.assert_array_equal(table["phi"], columns["phi"])
+    np.testing.assert_array_equal(table["past-2.phi"], given.past["phi"][-2] - columns["phi"])
+    assert (input_group("phi"), mirror_sign("phi"), mirror_sign("past-2.phi")) == ("motion", -1, -1)
+    with pytest.raises(DataError, match="phi"):
+        inputs.table(Physics(None, 5, 1.0), past.instants())
 
 
 def test_a_past_that_is_too_short_is_said_in_seconds(past):

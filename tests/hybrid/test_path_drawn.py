@@ -22,7 +22,7 @@ from tests.study.test_whole import windy
 
 Array = np.ndarray
 SHIP = load_vessel("gunnerus-28.9")
-EVERYTHING = Memory(history=(2.0, 4.0), turned=6.0, error=(3.0, 6.0), observer=True)  # type: ignore[arg-type]
+EVERYTHING = Memory(history=(2.0, 4.0), turned=6.0, positions=(1.0, 5.0), error=(3.0, 6.0), observer=True)  # type: ignore[arg-type]
 SMALL: dict[str, Any] = {"trials": 6, "units": 24, "terms": 3, "memory": EVERYTHING}
 
 

@@ -45,7 +45,7 @@ def test_the_trained_path_is_what_the_method_pins():
         "epochs": 3000,
         "batch": 0,  # full
         "patience": 200,
-        "memory": {"history": (), "turned": (), "error": (), "observer": False},
+        "memory": {"history": (), "turned": (), "positions": (), "states": (), "error": (), "observer": False},
         "mirror": False,
         "groups": None,
         "at_once": 1,

@@ -1,0 +1,129 @@
+"""Kernel ridge regression on the errors of the path.
+
+f(z) = B sum_c w_c k(z, c) over some windows c of training, k(z, c) = exp(-|z - c|^2 / 2) + l (1 + z c) with inputs
+divided by the length scale of their group, B polynomials of time, and w = (K + ridge)^-1 targets. Scales, l and ridge
+are found by descent on the error of every run left out (`shipid.hybrid.kernel_ridge`).
+
+Where port and starboard are mirror images, k(z, c) + k(z', c) makes x and k(z, c) - k(z', c) makes y, z' the image of
+z: mirrored inputs then give the mirrored path exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import repeat
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import PositiveFloat, PositiveInt
+
+from shipid.hybrid.compensator import Normaliser, PathCorrector, unflatten_paths
+from shipid.hybrid.features import Memory, input_group
+from shipid.hybrid.method import Array, FitResult, Task
+from shipid.hybrid.search import Point, Scale, SearchedAlone, trial_points
+from shipid.hybrid.stored import StoredData
+
+GROUPS = ("motion", "command", "wind", "history", "turned", "position", "error", "observer")
+"""Groups of inputs, with a length scale each."""
+
+
+def kernel_group(name: str) -> str:
+    """Group of an input by its name: as `input_group`, with changes of heading and positions apart from history."""
+    group = input_group(name)
+    if group != "history":
+        return group
+    return "position" if name[-2:] in (".x", ".y") else "turned" if name.startswith("turned") else group
+
+
+def kernel_values(points: Any, centres: Any, linear: Any, maths: Any = np) -> Any:
+    """exp(-|z - c|^2 / 2) + l (1 + z c), (S, C), of points (S, d) and centres (C, d) divided by their scales."""
+    product = points @ centres.T
+    apart = (points**2).sum(-1)[:, None] + (centres**2).sum(-1) - 2 * product
+    return maths.exp(-apart / 2) + linear * (1 + product)
+
+
+@dataclass(frozen=True)
+class KernelMember(StoredData):
+    """One solution: scales (d,) of the inputs, weight of the linear kernel, weights (C, 2 r) of the centres."""
+
+    scales: Array
+    linear: float
+    weights: Array
+
+
+@dataclass(frozen=True)
+class KernelCompensator(PathCorrector):
+    """The mean of some solutions on the same centres (C, d), which are normalised inputs.
+
+    reflection : (d, d), or None: see `VaryingInputs`. basis : (T, r) shapes over the horizon [m] that outputs weigh.
+    """
+
+    normaliser: Normaliser
+    reflection: Array | None
+    basis: Array
+    centres: Array
+    members: tuple[KernelMember, ...]
+    hyperparameters: Mapping[str, float]
+
+    def compensation(self, table: Mapping[str, Array]) -> Array:
+        """Return the compensation (T, S, 2) [m] in the frame (11), from inputs (S,) by name."""
+        z, terms = self.normaliser.apply(table), self.basis.shape[1]
+        total: Array = np.zeros((len(z), 2 * terms))
+        for one in self.members:
+            centres = self.centres / one.scales
+            total += kernel_values(z / one.scales, centres, one.linear) @ one.weights
+            if self.reflection is not None:
+                image = kernel_values(z @ self.reflection / one.scales, centres, one.linear) @ one.weights
+                total += np.repeat([1.0, -1.0], terms) * image
+        return np.asarray(np.tensordot(self.basis, unflatten_paths(total / len(self.members)), 1))
+
+
+class Kernel(SearchedAlone):
+    """Kernel ridge regression on the errors of the path.
+
+    Parameters
+    ----------
+    trials : descents, each on its own part of the runs; their solutions are averaged.
+    steps : of a descent, at most.
+    scale : range of the length scales, in standard deviations of the inputs.
+    linear : range of the weight of the linear kernel. ridge : range of the variance of noise, that of the kernel is 1.
+    terms : the compensation is a polynomial of time with so many terms.
+    mirror : whether port and starboard are mirror images, where the inputs allow it.
+    search_windows, centres : windows that a descent sees and that a solution has, evenly taken from each run.
+    memory : what the inputs hold of the past.
+    """
+
+    SEARCHED: ClassVar[tuple[str, ...]] = ("linear", "ridge")
+    validation: ClassVar[str] = "runs"
+    corrector: ClassVar[type[Any]] = KernelCompensator
+
+    trials: PositiveInt = 2
+    steps: PositiveInt = 20
+    scale: tuple[PositiveFloat, PositiveFloat] = (0.5, 50.0)
+    linear: Scale = (0.02, 20.0)
+    ridge: Scale = (1e-3, 1.0)
+    terms: PositiveInt = 8
+    mirror: bool = True
+    search_windows: PositiveInt = 300
+    centres: PositiveInt = 1200
+    memory: Memory = Memory()
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Return what a descent chooses: name -> (low, high)."""
+        return {f"{group}_scale": self.scale for group in GROUPS} | super().ranges()
+
+    def num_chosen(self) -> int:
+        """Return how many trials make the compensator: all."""
+        return self.trials
+
+    def points(self) -> Iterable[Point]:
+        """Return where the descents begin: in the middle of all ranges."""
+        middle = next(iter(trial_points(self, frozenset())))
+        return repeat(middle) if self.budget else repeat(middle, self.trials)
+
+    def fit(self, task: Task) -> dict[str, FitResult]:
+        """Fit every foundation; the corrector is the mean of the solutions of all trials."""
+        from shipid.hybrid.kernel_ridge import KernelProblem  # a study is read without PyTorch
+
+        return self.fit_by(KernelProblem, task)

@@ -1,0 +1,90 @@
+"""What the closed form says of runs left out is what refits without them say, and no run chooses for itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from shipid.hybrid.kernel import Kernel
+from shipid.hybrid.kernel_ridge import FoldBlocks, KernelProblem
+from shipid.hybrid.method import Task
+from tests.hybrid.tasks import task_of
+from tests.hybrid.test_ridge import ALL, FOLDS, RUNS, TWINS, drawn, missed
+
+NAMES = np.repeat([f"run-{place}" for place in range(len(RUNS))], [len(run) for run in RUNS])
+SMALL = Kernel(trials=2, steps=4, terms=4)
+
+
+def given(folds: list = FOLDS, targets: np.ndarray | None = None) -> Task:
+    """A task of six runs."""
+    columns = drawn()
+    task = task_of(columns, TWINS, {"one": missed(columns) if targets is None else targets}, folds, 3)
+    return replace(task, windows=replace(task.windows, run=NAMES))
+
+
+@pytest.mark.parametrize("kind", ["runs", "more left out than judged", "one pair"])
+def test_errors_without_a_block_are_those_of_a_fit_without_it(kind: str) -> None:
+    rng, folds = np.random.default_rng(0), FOLDS
+    if kind == "more left out than judged":  # neighbours that share a moment are in neither part
+        folds = [(np.setdiff1d(ALL, np.arange(run[0] - 4, run[-1] + 3)), run[: len(run) // 2]) for run in RUNS]
+    elif kind == "one pair":
+        folds = [(np.arange(30, 120), np.arange(30))]
+    features = rng.normal(size=(len(ALL), 200))
+    kernel, outputs = features @ features.T / 200 + 0.3 * np.eye(len(ALL)), rng.normal(size=(len(ALL), 3))
+    made, _ = FoldBlocks(folds, ALL, "cpu").errors_and_slope(torch.tensor(kernel), torch.tensor(outputs))
+    for (training, judged), errors in zip(folds, made.numpy(), strict=True):
+        weights = np.linalg.solve(kernel[np.ix_(training, training)], outputs[training])
+        expected = outputs[judged] - kernel[np.ix_(judged, training)] @ weights
+        np.testing.assert_allclose(errors[np.abs(errors).sum(axis=1) > 0], expected, atol=1e-10)
+
+
+def test_the_slope_is_the_difference() -> None:
+    rng, blocks = np.random.default_rng(1), FoldBlocks(FOLDS, ALL, "cpu")
+    features, outputs = rng.normal(size=(len(ALL), 200)), torch.tensor(rng.normal(size=(len(ALL), 3)))
+    kernel, way = (torch.tensor(one @ one.T / 200) for one in (features, rng.normal(size=(len(ALL), 9))))
+    kernel += 0.3 * torch.eye(len(ALL))
+    up, down = ((blocks.errors_and_slope(kernel + h * way, outputs)[0] ** 2).sum() for h in (1e-5, -1e-5))
+    slope = (blocks.errors_and_slope(kernel, outputs)[1] * way).sum()
+    assert float((up - down) / 2e-5) == pytest.approx(float(slope), rel=1e-6)
+
+
+@pytest.mark.parametrize("centres", [1000, 60])  # all windows, and a part of them
+def test_errors_of_runs_left_out_are_those_of_refits(centres: int) -> None:
+    """Refits with the settings of the trial that has not seen the run, on the centres of the other runs."""
+    method, task = SMALL.model_copy(update={"centres": centres}), given()
+    fit = method.fit(task)["one"]
+    problem = KernelProblem(method, task, "one")
+    assert len(problem.part) == min(centres, len(ALL))
+    for number, row in enumerate(fit.trials):
+        for training, judged in FOLDS[number::2]:
+            rest = np.intersect1d(problem.part, training)
+            made = []
+            for kernel, around, outputs in zip(
+                problem.kernels(rest, rest, row["params"]),
+                problem.kernels(judged, rest, row["params"]),
+                problem.outputs[:, rest],
+                strict=True,
+            ):
+                gram = kernel.numpy() + row["params"]["ridge"] * np.eye(len(rest))
+                made.append(around.numpy() @ np.linalg.solve(gram, outputs.numpy()))
+            paths = np.einsum("tk,cnk->tnc", problem.basis, np.stack(made))
+            np.testing.assert_allclose(fit.left_out[:, judged], problem.targets[:, judged] - paths, atol=1e-8)
+
+
+def test_no_run_has_a_part_in_the_settings_that_predict_it() -> None:
+    """Other errors in the runs that a trial does not see: its settings stay; those of the other trial do not."""
+    spoilt = missed(drawn())
+    spoilt[:, np.concatenate(RUNS[0::2])] *= -3.0
+    first, second = (SMALL.fit(given(targets=targets))["one"].trials for targets in (None, spoilt))
+    assert first[0]["params"] == second[0]["params"]
+    assert first[1]["params"] != second[1]["params"]
+
+
+def test_few_folds_are_seen_by_every_trial() -> None:
+    """A third of three runs would choose by one: all trials are then the same."""
+    fit = SMALL.model_copy(update={"trials": 3}).fit(given(FOLDS[:3]))["one"]
+    assert [row["params"] for row in fit.trials[1:]] == [fit.trials[0]["params"]] * 2
+    assert np.isfinite(fit.left_out[:, np.concatenate(RUNS[:3])]).all()
