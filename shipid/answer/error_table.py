@@ -269,6 +269,7 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     harder = table.compare([[(1 / len(models), model, PHYSICS_ONLY) for model in models]])  # all A rise together
     wide = np.hypot(np.log([found.value / found.low, found.high / found.value]), (harder.high - harder.low) / 2)
     low, high = np.clip(found.value * np.exp(wide * [-1, 1]), *found.limits)
+    low, high = found.low if found.low >= A[-1] else low, found.high if found.high <= A[0] else high
     return replace(found, low=min([low, *A[lead.low <= 0]]), high=max([high, *A[lead.high >= 0]]))
 
 

@@ -118,12 +118,14 @@ def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> Path:
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = methods.method_table(pd.concat(cells, ignore_index=True), verdict_method(plan))
+    every = pd.concat(cells, ignore_index=True)
+    frame = methods.method_table(every, verdict_method(plan))
     write_table(folder / METHODS, frame)
     content = MethodsContent(
         title=plan.study.question,
         name=plan.name,
         frames={"methods": frame},
+        worlds=methods.sentences_on_worlds(plan, every),
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
         study_document=plan_text(plan),
         command=run_command(plan),
