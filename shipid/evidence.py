@@ -99,11 +99,9 @@ def fall_beyond(curve: Sequence[Array], amounts: Sequence[int], pool: float, pla
     if place < 2:
         return 1.0
     ends = slice(place - 2, place + 1)
-    noise = np.array([draw_variance(curve, amounts, pool, k)[0] for k in range(len(amounts))]).reshape(-1)[ends]
-    falls, steps = np.abs(np.diff([draws.mean() for draws in curve])), np.diff(np.log(amounts))
-    before, last = (falls[place - 2 : place] + [-DOUBT, DOUBT] * np.sqrt(noise[1:] + noise[:-1])) / steps[
-        place - 2 : place
-    ]
+    noise = np.array([np.sum(draw_variance(curve, amounts, pool, k)[0]) for k in range(len(amounts))])[ends]
+    falls = np.abs(np.diff([draws.mean() for draws in curve[ends]])) + [-DOUBT, DOUBT] * np.sqrt(noise[1:] + noise[:-1])
+    before, last = falls / np.diff(np.log(amounts[ends]))
     return float(min(1.0, last / max(before, 1e-9)) ** 2)
 
 

@@ -137,11 +137,8 @@ class ErrorTable:
             else factor * value(self.draws(model, place))
             for factor, model, at in terms
         ]
-        return np.asarray(sum(of, np.zeros((1 if place == PHYSICS_ONLY else self._drawn(place), self.runs))))
-
-    def _drawn(self, place: int) -> int:
-        """Draws of an amount of data."""
-        return max(len(errors[place]) for errors in self.H.values())
+        drawn = 1 if place == PHYSICS_ONLY else max(len(errors[place]) for errors in self.H.values())
+        return np.asarray(sum(of, np.zeros((drawn, self.runs))))
 
     def _weighted(self, errors: Array) -> Array:
         """Errors (..., R) times what makes their mean that over windows."""
@@ -186,15 +183,10 @@ def _upper_errors(results: Results, path: Array) -> Array:
     return np.array([np.quantile(error[:, run == name], 0.9) for name in np.unique(run)])
 
 
-def _errors_at_horizon(results: Results, path: Array) -> Array:
-    """(R,) mean error [m] of a path (T, S, 2) [m] at the end of the horizon in each test manoeuvre."""
-    return results.by_run(error_at_horizon(position_error(path, results.test.future)))
-
-
 ERRORS_BY_RUN: dict[Metric, Callable[[Results, Array], Array]] = {
     "H": Results.path_errors,
     "H_90": _upper_errors,
-    "H_end": _errors_at_horizon,
+    "H_end": lambda results, path: results.by_run(error_at_horizon(position_error(path, results.test.future))),
 }
 
 
@@ -269,8 +261,8 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     harder = table.compare([[(1 / len(models), model, PHYSICS_ONLY) for model in models]])  # all A rise together
     wide = np.hypot(np.log([found.value / found.low, found.high / found.value]), (harder.high - harder.low) / 2)
     low, high = np.clip(found.value * np.exp(wide * [-1, 1]), *found.limits)
-    low, high = found.low if found.low >= A[-1] else low, found.high if found.high <= A[0] else high
-    return replace(found, low=min([low, *A[lead.low <= 0]]), high=max([high, *A[lead.high >= 0]]))
+    known = (found.low if found.low >= A[-1] else low, found.high if found.high <= A[0] else high)
+    return replace(found, low=min([known[0], *A[lead.low <= 0]]), high=max([known[1], *A[lead.high >= 0]]))
 
 
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
