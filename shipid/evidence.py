@@ -23,6 +23,7 @@ FEWEST_WORLDS = 3  # below which no interval over worlds is given
 SMALLEST_ERROR = 1e-9  # m: errors below count as this one, which has a logarithm and can be divided by
 ROUNDING = 1e-9  # of the mean: a smaller spread between manoeuvres is none
 FEWEST_MODELS = 5  # whose order by A says anything: that of fewer comes by chance too often
+DOUBT = 0.5  # of the standard error of a slope: widths on worlds of `quick` (record worlds)
 TRAINING = 0.03  # relative sd of H between trainings, assumed where no amount of data was drawn twice
 
 
@@ -63,19 +64,18 @@ def paired_difference(differences: Array, noise: Array | float = 0.0, freedom: f
 
 
 def draw_variance(
-    by_draw: Sequence[Array], amounts: Sequence[int], pool: float, place: int
+    by_draw: Sequence[Array], amounts: Sequence[int], pool: float, place: int, fall: float = 1.0
 ) -> tuple[Array | float, float]:
     """Variance that other training runs give a mean over the draws of one amount of data, and its degrees of freedom.
 
     Up to the largest amount that was drawn several times it falls as 1 / N_D, estimated from all of them; 0 degrees of
-    freedom where none was. Beyond, as 1 / N_D squared: of an error near its floor, what is left is a square itself.
-    Draws of one pool share runs, and scatter less by 1 - N_D / pool than those of other pools (Cochran 1977, section
-    2.6): so there is an estimate where all runs are used.
+    freedom where none was. Draws of one pool share runs, and scatter less by 1 - N_D / pool than those of other pools
+    (Cochran 1977, section 2.6): so there is an estimate where all runs are used.
 
     Parameters
     ----------
     by_draw : for each amount the means (S, J) of its draws. pool : runs from which all are drawn.
-    place : of the amount.
+    place : of the amount. fall : factor beyond the largest amount that was drawn several times, as of `fall_beyond`.
     """
     squares, freedom, known, amount = 0.0, 0.0, 0, amounts[place]
     for drawn, values in zip(amounts, by_draw, strict=True):
@@ -83,8 +83,26 @@ def draw_variance(
             squares = squares + drawn * np.square(values - values.mean(axis=0)).sum(axis=0) / (1 - drawn / pool)
             freedom, known = freedom + len(values) - 1, max(known, drawn)
     share = min(amount / max(pool, 1), 1.0)
-    alike = ((1 - share) / len(by_draw[place]) + share) / amount * min(1.0, known / amount)
+    alike = ((1 - share) / len(by_draw[place]) + share) / amount * (fall if amount > known else 1.0)
     return squares * alike / max(freedom, 1.0), freedom
+
+
+def fall_beyond(curve: Sequence[Array], amounts: Sequence[int], pool: float, place: int) -> float:
+    """Factor, 1 at most, by which a variance between draws falls faster than 1 / N_D from one amount to the next.
+
+    To first order other runs move the logarithm of an error as more or fewer runs would: by the slope of the learning
+    curve. The variance falls as its square, which becomes small near a floor. Each slope is taken `DOUBT` of its
+    standard error to the side of a larger factor. 1 where there are fewer than three amounts.
+
+    curve : logarithms (S, 1) of errors at each amount, a row a draw.
+    """
+    if place < 2:
+        return 1.0
+    ends = slice(place - 2, place + 1)
+    noise = np.array([np.sum(draw_variance(curve, amounts, pool, k)[0]) for k in range(len(amounts))])[ends]
+    falls = np.abs(np.diff([draws.mean() for draws in curve[ends]])) + [-DOUBT, DOUBT] * np.sqrt(noise[1:] + noise[:-1])
+    before, last = falls / np.diff(np.log(amounts[ends]))
+    return float(min(1.0, last / max(before, 1e-9)) ** 2)
 
 
 def share_interval(held: NDArray[Any], run: NDArray[Any]) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from shipid.evidence import (
     any_significant,
     compare_cells,
     draw_variance,
+    fall_beyond,
     holm_correction,
     order_chance,
     paired_difference,
@@ -77,12 +78,44 @@ def test_intervals_hold_what_other_worlds_give(draws: dict[int, int], place: int
 
 
 def test_where_all_runs_train_the_draws_of_fewer_say_what_others_would_give() -> None:
-    """By hand: 1 / N_D up to 10, then 1 / N_D squared; one draw of all runs has the variance of a draw of a world."""
+    """By hand: one draw of all runs has the variance of a draw of a world, 1 / N_D times what the curve says."""
     draws = [np.array([[1.0], [3.0]]), np.array([[5.0], [5.0]]), np.array([[9.0]])]
-    noise, freedom = draw_variance(draws, [5, 10, 40], 40, 2)
     scale = (5 * 2.0 / (1 - 5 / 40) + 0.0) / 2
-    assert (float(np.sum(noise)), freedom) == (pytest.approx(scale / 40 * 10 / 40), 2)
+    for fall in (1.0, 0.3):
+        noise, freedom = draw_variance(draws, [5, 10, 40], 40, 2, fall)
+        assert (float(np.sum(noise)), freedom) == (pytest.approx(scale / 40 * fall), 2)
+    assert draw_variance(draws, [5, 10, 40], 40, 1, 0.3) == draw_variance(draws, [5, 10, 40], 40, 1)
     assert draw_variance([draws[2], draws[0]], [10, 40], 40, 1)[1] == 0, "all draws of all runs are the same one"
+
+
+@pytest.mark.parametrize(("error", "fall"), [([2, 1, 0.5], 1), ([9, 3, 2.5], 0.0275), ([3, 2.9, 1], 1)])
+def test_a_variance_falls_as_the_square_of_the_slope_of_the_learning_curve(error: list[float], fall: float) -> None:
+    """By hand: a power law has one slope, near a floor it is small, and no variance falls slower than 1 / N_D."""
+    amounts, curve = [4, 8, 16], [np.array([[np.log(value)]]) for value in error]
+    known = fall_beyond(curve, amounts, 16, 2)
+    assert known == pytest.approx(fall, rel=0.01)
+    assert fall_beyond([of + 1.2 for of in curve], amounts, 16, 2) == pytest.approx(known), "whatever the unit"
+    assert fall_beyond(curve, amounts, 16, 1) == 1.0
+    doubtful = [np.concatenate([of - 0.3, of + 0.3]) for of in curve[:2]] + curve[2:]
+    assert known <= fall_beyond(doubtful, amounts, 16, 2) <= 1, "slopes that may be alike count as alike"
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.1])
+def test_intervals_hold_where_all_runs_train_with_a_floor_and_without(floor: float) -> None:
+    """Of 400 worlds: runs teach more or less, and an error of N_D runs is floor + 1 / sqrt(what they teach)."""
+    rng, amounts, pool, found = np.random.default_rng(7), {10: 3, 30: 2, 100: 1}, 100, []
+    for _ in range(400):
+        teaches = rng.lognormal(0.0, 1.2, pool)
+        error = [[floor + rng.permutation(teaches)[:N].sum() ** -0.5 for _ in range(S)] for N, S in amounts.items()]
+        by_draw = [np.log(draws)[:, None] for draws in error]
+        fall = fall_beyond(by_draw, list(amounts), pool, 2)
+        noise, freedom = draw_variance(by_draw, list(amounts), pool, 2, fall)
+        one = paired_difference((rng.normal(0.0, 0.2, 20) + by_draw[2][0])[None], noise, freedom)
+        found.append((one.mean[0], one.low[0], one.high[0]))
+    mean, low, high = np.array(found).T
+    held = ((low <= mean.mean()) & (mean.mean() <= high)).sum()
+    assert held >= stats.binom.ppf(0.001, 400, 0.92)
+    assert np.median(high - low) <= 1.5 * 2 * 1.96 * mean.std()
 
 
 def test_what_changes_nothing() -> None:

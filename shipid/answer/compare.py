@@ -256,7 +256,11 @@ def document_differences(plans: Sequence[Plan], called: Sequence[Mapping[str, st
         }
         for plan, names in zip(plans, called or [{}] * len(plans), strict=True)
     ]
-    rows = [[path, *map(_value_in_words, values)] for path, values in _differing_values(whole, "")]
+    words = {
+        path: [ABSENT if one is None else one if isinstance(one, str) else json.dumps(one) for one in values]
+        for path, values in _differing_values(whole, "")
+    }
+    rows = [[path, *values] for path, values in words.items()]
     return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
 
 
@@ -269,10 +273,6 @@ def _differing_values(values: Sequence[Any], path: str) -> Iterator[tuple[str, S
             yield from _differing_values([value.get(key) for value in values], f"{path}.{key}".removeprefix("."))
     elif any(value != values[0] for value in values):
         yield path, values
-
-
-def _value_in_words(value: Any) -> str:
-    return ABSENT if value is None else value if isinstance(value, str) else json.dumps(value)
 
 
 def are_worlds(folders: Sequence[Path]) -> bool:

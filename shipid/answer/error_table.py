@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import isotonic_regression
 
-from shipid.evidence import SMALLEST_ERROR, TRAINING, Differences, draw_variance, log_error, paired_difference
+from shipid.evidence import (
+    SMALLEST_ERROR,
+    TRAINING,
+    Differences,
+    draw_variance,
+    fall_beyond,
+    log_error,
+    paired_difference,
+)
 from shipid.metrics import error_at_horizon, position_error
 from shipid.report.wording import metres_text
 from shipid.study.declared import NO_MODEL
@@ -20,7 +30,7 @@ Array = NDArray[np.float64]
 Metric = Literal["H", "H_90", "H_end"]
 PHYSICS_ONLY = -1  # place of the physics alone in a term
 ErrorTerm = tuple[float, str, int]  # factor, model, place of its N_D in `amounts` or PHYSICS_ONLY
-FEWEST_FOR_LINE = 4  # for a line of H over A
+FEWEST_FOR_CURVE = 4  # models, for the lead over A
 STEPS = 200  # of A, or of runs, from the least to the greatest, in an interval
 
 
@@ -67,9 +77,8 @@ class ErrorTable:
     def interval(self, model: str, place: int) -> tuple[float, float]:
         """95 % interval [m] of the error of a model at an amount: that of its logarithm (delta method)."""
         mean, errors = self.mean(model, place), self.draws(model, place).mean(axis=0)
-        by_draw = [np.log(self.draws(model, k) @ self.weights)[:, None] for k in range(len(self.amounts))]
-        noise, freedom = draw_variance(by_draw, self.amounts, self.pool, place)
-        known = (noise, freedom) if freedom else (TRAINING**2 / len(by_draw[place]), np.inf)
+        noise, freedom = self._draw_variance(self._curve([model]), place)
+        known = (noise, freedom) if freedom else (TRAINING**2 / len(self.H[model][place]), np.inf)
         one = paired_difference((self.runs * self.weights * errors / mean - 1)[None], *known)
         return mean * float(np.exp(one.low[0])), mean * float(np.exp(one.high[0]))
 
@@ -103,12 +112,22 @@ class ErrorTable:
                 np.stack([self._sum(terms, k, value).mean(axis=1) for terms in mine], axis=1) @ weights.T
                 for k in range(len(self.amounts))
             ]
-            variance, freedom = draw_variance(by_draw, self.amounts, self.pool, place)
+            variance, freedom = self._draw_variance(by_draw, place)
             noise += variance
             sizes = [[f * (1.0 if logs else self.mean(model, place)) for f, model, _ in terms] for terms in mine]
             each = np.array([np.square(size).sum() for size in sizes])
             assumed += TRAINING**2 * np.square(weights) @ each / len(by_draw[place])
         return (noise, freedom) if freedom else (assumed, np.inf)
+
+    def _curve(self, models: Sequence[str]) -> list[Array]:
+        """For each amount the logarithm (draws, 1) of the error, mean over models."""
+        each = [[np.log(self.draws(model, k) @ self.weights) for model in models] for k in range(len(self.amounts))]
+        return [np.mean(values, axis=0)[:, None] for values in each]
+
+    def _draw_variance(self, by_draw: Sequence[Array], place: int) -> tuple[Array | float, float]:
+        """As of `draw_variance`; beyond what was drawn several times it falls as all models let one expect."""
+        fall = fall_beyond(self._curve([*self.H]), self.amounts, self.pool, place)
+        return draw_variance(by_draw, self.amounts, self.pool, place, fall)
 
     def _sum(self, terms: Sequence[ErrorTerm], place: int, value: Callable[[Array], Array]) -> Array:
         """A sum of errors: (draws, R) of its models at an amount; (1, R) at their own, mean over draws, for none."""
@@ -118,11 +137,8 @@ class ErrorTable:
             else factor * value(self.draws(model, place))
             for factor, model, at in terms
         ]
-        return np.asarray(sum(of, np.zeros((1 if place == PHYSICS_ONLY else self._drawn(place), self.runs))))
-
-    def _drawn(self, place: int) -> int:
-        """Draws of an amount of data."""
-        return max(len(errors[place]) for errors in self.H.values())
+        drawn = 1 if place == PHYSICS_ONLY else max(len(errors[place]) for errors in self.H.values())
+        return np.asarray(sum(of, np.zeros((drawn, self.runs))))
 
     def _weighted(self, errors: Array) -> Array:
         """Errors (..., R) times what makes their mean that over windows."""
@@ -167,15 +183,10 @@ def _upper_errors(results: Results, path: Array) -> Array:
     return np.array([np.quantile(error[:, run == name], 0.9) for name in np.unique(run)])
 
 
-def _errors_at_horizon(results: Results, path: Array) -> Array:
-    """(R,) mean error [m] of a path (T, S, 2) [m] at the end of the horizon in each test manoeuvre."""
-    return results.by_run(error_at_horizon(position_error(path, results.test.future)))
-
-
 ERRORS_BY_RUN: dict[Metric, Callable[[Results, Array], Array]] = {
     "H": Results.path_errors,
     "H_90": _upper_errors,
-    "H_end": _errors_at_horizon,
+    "H_end": lambda results, path: results.by_run(error_at_horizon(position_error(path, results.test.future))),
 }
 
 
@@ -215,31 +226,43 @@ def _undecided_range(values: Array, differences: Differences) -> tuple[float, fl
     return float(low), float(high)
 
 
+def _level_at(table: ErrorTable, sums: Sequence[Sequence[ErrorTerm]], mix: Array, marks: Array) -> Estimate:
+    """Where a falling difference is 0: mixed of sums of errors at some marks (J,), by (J, sums), and between along ln.
+
+    Where it rises for once, the least so far counts.
+    """
+    tried = np.geomspace(marks[0], marks[-1], STEPS)
+    between = np.stack([np.interp(np.log(tried), np.log(marks), one) for one in mix.T], axis=1)
+    ahead = table.compare(sums, 0.0, between)
+    curve = np.minimum.accumulate(ahead.mean)
+    value = float(np.exp(np.interp(0.0, curve[::-1], np.log(tried[::-1]))))
+    limits = float(marks[0]), float(marks[-1])
+    value = next((end for end in limits if np.isclose(end, value)), value)
+    low, high = _undecided_range(tried, ahead)
+    return Estimate(value, min(low, value), max(high, value), limits)
+
+
 def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate | None:
     """Accuracy A [m] at which compensated physics is as good as none, at the amount of this place.
 
-    A line ln H over ln A, by least squares, crosses H of `none`; values beyond the models tried are bounds. The
-    interval holds every A at which the test cannot tell the line from `none`, and A of every model that `lead` does not
-    show to be better, or worse, as the line has it. None with fewer than four models, or where all have the same A.
+    The lead over `none`, made to fall with A (isotonic regression) and interpolated along ln A, is 0 there; values
+    beyond the models tried are bounds. The interval holds every A at which the test cannot tell it from 0, A of every
+    model that `lead` does not show to be better, or worse, as the order has it, and what other manoeuvres make of A
+    (Zou and Donner 2008). None with fewer than four models, or where all have the same A.
     """
+    models = sorted(models, key=lambda model: table.mean(model, PHYSICS_ONLY))
     A = np.array([table.mean(model, PHYSICS_ONLY) for model in models])
-    if len(models) < FEWEST_FOR_LINE or np.isclose(A.min(), A.max()):
+    if len(models) < FEWEST_FOR_CURVE or np.isclose(A[0], A[-1]):
         return None
-    limits, middle = (float(A.min()), float(A.max())), float(np.log(A).mean())
-    tilt = (np.log(A) - middle) / np.square(np.log(A) - middle).sum()
-    margins = [(1.0, NO_MODEL, place), *((-1 / len(models), model, place) for model in models)]
-    slopes = [(float(share), model, place) for share, model in zip(tilt, models, strict=True)]
-    harder = [(1 / len(models), model, PHYSICS_ONLY) for model in models]  # all A rise where manoeuvres are harder
-    margin, slope, alone = table.compare([margins, slopes, harder]).mean
-    tried = np.geomspace(*limits, STEPS)
-    mix = np.stack([np.ones(STEPS), middle - np.log(tried), np.full(STEPS, slope)], axis=1)
-    low, high = _undecided_range(tried, table.compare([margins, slopes, harder], -slope * alone, mix))
-    at = middle + margin / slope if slope > 1e-9 else np.copysign(np.inf, margin)  # flat: all pay, or none does
-    value = float(np.exp(np.clip(at, *np.log(limits))))
-    value = next((end for end in limits if np.isclose(end, value)), value)
-    lead = table.lead(NO_MODEL, models, place)
-    low, high = min([low, *A[lead.low <= 0]]), max([high, *A[lead.high >= 0]])
-    return Estimate(value, min(low, value), max(high, value), limits)
+    lead, pooled = table.lead(NO_MODEL, models, place), np.zeros((len(models), len(models)))
+    for first, end in pairwise(isotonic_regression(lead.mean, increasing=False).blocks):
+        pooled[first:end, first:end] = 1 / (end - first)
+    found = _level_at(table, [[(1.0, NO_MODEL, place), (-1.0, model, place)] for model in models], pooled, A)
+    harder = table.compare([[(1 / len(models), model, PHYSICS_ONLY) for model in models]])  # all A rise together
+    wide = np.hypot(np.log([found.value / found.low, found.high / found.value]), (harder.high - harder.low) / 2)
+    low, high = np.clip(found.value * np.exp(wide * [-1, 1]), *found.limits)
+    known = (found.low if found.low >= A[-1] else low, found.high if found.high <= A[0] else high)
+    return replace(found, low=min([known[0], *A[lead.low <= 0]]), high=max([known[1], *A[lead.high >= 0]]))
 
 
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
@@ -248,13 +271,7 @@ def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:
     Interpolated along ln H over ln N_D; where more data made it worse, the best so far counts. The interval holds every
     number of runs at which the test cannot tell the two.
     """
-    amounts = np.array(table.amounts, dtype=float)
-    ends, limits = np.log(amounts), (float(amounts[0]), float(amounts[-1]))
-    tried = np.geomspace(*limits, STEPS)
-    shares = np.stack([np.interp(np.log(tried), ends, one) for one in np.eye(len(amounts))], axis=1)
-    sums = [[(1.0, NO_MODEL, k)] for k in range(len(amounts))]
-    ahead = table.compare([*sums, [(-1.0, model, place)]], 0.0, np.column_stack([shares, np.ones(STEPS)]))
-    curve = np.minimum.accumulate(ahead.mean)  # falling
-    value = float(np.interp(0.0, curve[::-1], tried[::-1]))
-    low, high = _undecided_range(tried, ahead)
-    return Estimate(value, min(low, value), max(high, value), limits)
+    sums = [[(1.0, NO_MODEL, k)] for k in range(len(table.amounts))]
+    mix = np.eye(len(sums), len(sums) + 1)
+    mix[:, -1] = 1.0
+    return _level_at(table, [*sums, [(-1.0, model, place)]], mix, np.array(table.amounts, dtype=float))

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
 
 from shipid.answer.error_table import PHYSICS_ONLY, ErrorTable, ErrorTerm, error_table
 from shipid.answer.verdict import (
@@ -221,8 +220,8 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         evidence += f"; {lacks} {orders} {plural_word(orders, 'seed')}"
     elif worst:
         of_worst, calm = (_fluctuation(table, group) for group in (worst, grid.moderate))
-        more = _chance_of_mean(of_worst - calm)
-        moves = verdict_of(more <= SIGNIFICANT, 1 - more <= SIGNIFICANT)
+        more = paired_difference((of_worst - calm)[None])
+        moves = verdict_of(any_significant(more.above), any_significant(more.below))
         evidence += (
             f"; over {orders} nested orders H of these varies by {percent_text(of_worst.mean())}, of moderate models "
             f"by {percent_text(calm.mean())}"
@@ -230,12 +229,6 @@ def _judge_harm(grid: ErrorGrid) -> Judgement:
         numbers |= {"variation of the worst": of_worst.mean(), "variation of moderate models": calm.mean()}
     one_sided = all_significant(lead.above) or all_significant(lead.below)
     return weakest_verdict((verdict_of(bool(better.any() and worse.any()), one_sided), moves)), evidence, numbers
-
-
-def _chance_of_mean(values: Array) -> float:
-    """Chance of a mean as far above 0 if there were none (Student's t, one-sided)."""
-    spread = values.std(ddof=1) / len(values) ** 0.5
-    return float(stdtr(len(values) - 1, -values.mean() / max(spread, 1e-300)))
 
 
 def _fluctuation(table: ErrorTable, models: Sequence[str]) -> Array:

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from shipid.answer.verdict import length_with_interval
 from shipid.arguments import as_path, check_class
 from shipid.errors import DataError
-from shipid.evidence import CellErrors, compare_cells, percent_above, world_interval
+from shipid.evidence import FEWEST_WORLDS, CellErrors, compare_cells, percent_above, world_interval
 from shipid.metrics import PREDICTION_ERRORS, error_of_windows, position_error, summarise_errors
+from shipid.report.wording import counted_text, difference_text
 from shipid.study.declared import NO_MODEL
-from shipid.study.plan import learns_from_runs, verdict_method
+from shipid.study.plan import Plan, learns_from_runs, uncounted_families, verdict_method
 from shipid.study.results import Results, read_results
 from shipid.study.score import RivalPrediction, keep_predictions, kept_predictions, read_predictions
 
@@ -151,6 +153,35 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
                 }
             )
     return pd.DataFrame(rows, columns=METHOD_COLUMNS)
+
+
+def sentences_on_worlds(plan: Plan, cells: pd.DataFrame) -> list[str]:
+    """Error at the horizon of each family at the least and the largest N_D, over three worlds or more.
+
+    Geometric means of those in each world, with Student's interval: it holds other test runs, training runs, members
+    and worlds. cells : as of `method_cells`, of all parts. None where a study repeats other things than its world.
+    """
+    if set(plan.study.repeat) != {"seed"}:
+        return []
+    mine = cells[cells["method"].eq(verdict_method(plan)) & ~cells["family"].isin(uncounted_families(plan))]
+    mine = mine[mine["status"].eq("ok") & mine["N_D"].isin([cells["N_D"].min(), cells["N_D"].max()])]
+    by_world = np.log(mine.astype({"H_end": float}).groupby(["condition", "N_D", "family", "world"])["H_end"].mean())
+    sentences = []
+    for (condition, N_D, family), logs in by_world.groupby(level=[0, 1, 2]):
+        pure, count = (
+            by_world[by_world.index.isin([(condition, N_D, NO_MODEL, world) for *_, world in logs.index])],
+            len(logs),
+        )
+        error = length_with_interval(*np.exp([logs.mean(), *world_interval(logs.to_numpy())]))
+        text = f"With {counted_text(N_D, 'run')}, in the mean of {count} worlds, "
+        text += f"{'no physics' if family == NO_MODEL else f'physics of {family!r}'} errs by {error} at the horizon"
+        if family != NO_MODEL and len(pure) == count:
+            apart = logs.to_numpy() - pure.to_numpy()
+            more, low, high = (percent_above(one) for one in (apart.mean(), *world_interval(apart)))
+            text += f". Its difference to no physics is {difference_text(more, low, high, '%')}"
+        if count >= FEWEST_WORLDS:
+            sentences.append(f"{text} ({condition})." if condition else f"{text}.")
+    return sentences
 
 
 def _errors_by_cell(cells: pd.DataFrame) -> ErrorsByCell:

@@ -43,7 +43,9 @@ def report_content(results: Results) -> ReportContent:
         *sentences.answer_sentences(results, sentences_on_methods(tables["methods"])),
         *bands.answer_on_bands(results, tables["coverage"]),
     )
-    best = sentences.best_model(results)
+    best, models = sentences.best_model(results), results.models
+    if (NO_MODEL, verdict_method(plan)) not in {(name, way.name) for name, way in plan.pairs}:
+        models = models[models["model"].ne(NO_MODEL)]  # nothing of it can be drawn
     naive: Mapping[str, Any] = summarise_errors(results.naive)
     return ReportContent(
         title=plan.study.question,
@@ -52,7 +54,7 @@ def report_content(results: Results) -> ReportContent:
         findings=judge_findings(results),
         cells=results.cells,
         naive={name: naive[name] for name in ("end", "end_90", "mean", "p90", "rms")},
-        models=_drawable_models(results),
+        models=models,
         factors=frames.factors_frame(results),
         trials=frames.trials_frame(results),
         horizon=frames.horizon_frame(results),
@@ -69,12 +71,6 @@ def report_content(results: Results) -> ReportContent:
         alone=frames.alone_models(results),
         frames=tables,
     )
-
-
-def _drawable_models(results: Results) -> pd.DataFrame:
-    """The models; without `none` where no method that the study judges by meets it: nothing of it can be drawn."""
-    judged = (NO_MODEL, verdict_method(results.plan)) in {(name, way.name) for name, way in results.plan.pairs}
-    return results.models if judged else results.models[results.models["model"].ne(NO_MODEL)]
 
 
 def write_pages(folder: str | os.PathLike[str], say: Say | None = None) -> Path:
@@ -118,12 +114,14 @@ def _write_pages_of_parts(plan: Plan, folder: Path, say: Say | None) -> Path:
         notes[name] = f"{len(results.cells)} of {part.plan.cells} cells"
     if not cells:
         raise ResultError("no cell is finished yet: continue with `shipid study resume`", file=folder)
-    frame = methods.method_table(pd.concat(cells, ignore_index=True), verdict_method(plan))
+    every = pd.concat(cells, ignore_index=True)
+    frame = methods.method_table(every, verdict_method(plan))
     write_table(folder / METHODS, frame)
     content = MethodsContent(
         title=plan.study.question,
         name=plan.name,
         frames={"methods": frame},
+        worlds=methods.sentences_on_worlds(plan, every),
         provenance={"study": f"{plan.name}, digest {plan.digest}", **notes},
         study_document=plan_text(plan),
         command=run_command(plan),

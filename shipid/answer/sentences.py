@@ -98,6 +98,14 @@ class AnswerCase:
         known = model in table.H
         return length_with_interval(error, *(table.interval(model, self.ends[amount]) if known else (np.nan, np.nan)))
 
+    def without_physics(self, best: str, amount: int, metric: Literal["H", "H_end"] = "H") -> str:
+        """The same error without physics, and whether the test shows that it differs from that of the best model."""
+        error, table = self.error(NO_MODEL, amount, metric), self.table if metric == "H" else self.at_horizon
+        if not {NO_MODEL, best} <= set(table.H) or too_few_manoeuvres(table.runs):
+            return f"{error}, untested"
+        more, less, _ = self.sides([best], table.lead(NO_MODEL, [best], self.ends[amount]))
+        return f"{error}, {'shown to be larger' if more else 'shown to be less' if less else 'not shown to differ'}"
+
     def sides(self, models: Sequence[str], differences: Differences) -> list[list[str]]:
         """Models shown to be better (above 0), to be worse, and the others, each by its own test.
 
@@ -168,6 +176,11 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
             f"{model_list(lost['model'])} {verb} on {training:.0f} training and {test:.0f} test windows: a path then "
             "is no faster than the ship is at the instant."
         )
+    if floor := sorted(results.aside - results.saw_test):
+        yield (
+            f"{model_list(floor)} is set aside ([claims] nominal): the base as it is, the floor for models made worse; "
+            "it is shown, but counted in no other sentence."
+        )
     saw = families_set_from(results.plan, results.test.spans)
     if saw:
         yield f"The numbers of {model_list(saw)} were set from runs that test: shown, but counted in no other sentence."
@@ -193,7 +206,7 @@ def _physics_that_pays(case: AnswerCase) -> Iterator[str]:
         models = [str(name) for name in case.with_physics(amount)["model"] if name in case.table.H]
         lead = case.table.lead(NO_MODEL, models, place)
         counts[amount] = _count_of_better(models, lead, case.sides(models, lead))
-        if limit := _limit_of_accuracy(case, place):
+        if limit := _limit_of_accuracy(case, place, models, lead):
             limits[amount] = limit
     for words in (limits, counts):
         alike = len(words) == len(case.ends) == 2 and len(set(words.values())) == 1
@@ -220,12 +233,22 @@ def _count_of_better(models: Sequence[str], lead: Differences, sides: Sequence[l
     return "; ".join(words)
 
 
-def _limit_of_accuracy(case: AnswerCase, place: int) -> str:
-    """Up to which error A physics pays; empty where no A is shown to pay, or not to."""
+def _limit_of_accuracy(case: AnswerCase, place: int, models: Sequence[str], lead: Differences) -> str:
+    """Up to which error A physics pays; empty where no A is shown to pay, or not to.
+
+    models, lead : those that the next sentence counts: which of them do not go by this limit is said at once.
+    """
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or (limit.low <= limit.limits[0] and limit.high >= limit.limits[1]):
         return ""
     bounds, A = _bounds(limit, _two_digits), "its own mean error over the horizon, A,"
+    known = {name: case.table.mean(name, PHYSICS_ONLY) for name in models if name in case.table.A}
+    better, worse, _ = case.sides(models, lead)
+    odd = {"better": [name for name in better if known.get(name, 0) > limit.value]}
+    odd["worse"] = [name for name in worse if known.get(name, np.inf) < limit.value]
+    for how, names in odd.items():
+        named = join_few_names([f"{name} (A {metres_text(known[name])})" for name in names])
+        bounds += f"; yet {named} {plural_word(len(names), 'does', 'do')} {how}" if names else ""
     if limit.above:
         return f"physics pays even if {A} is {metres_text(limit.limits[1])}, the worst tried{bounds}"
     if limit.below:
@@ -271,7 +294,7 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     if best is None:
         yield f"With {runs}, no model is {BEST}. {_mean_errors(case.results, rows['H_end'])}"
         return
-    without = f" Without physics: {case.error(NO_MODEL, largest, 'H_end')}." if NO_MODEL in rows.index else ""
+    without = f" Without physics: {case.without_physics(best, largest, 'H_end')}." if NO_MODEL in rows.index else ""
     yield (
         f"{case.ahead} ahead, {best} ({BEST}) with {runs} errs by {case.error(best, largest, 'H_end')} on average, "
         f"nine in ten below {metres_text(float(rows['H_end_90'][best]))}.{without}"
@@ -286,7 +309,7 @@ def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
         yield (
             f"H is the mean error over all {case.ahead}, not only at their end: {case.error(best, largest)} for {best} "
             f"with {counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
-            + (f" Without physics H is {case.error(NO_MODEL, largest)}." if NO_MODEL in rows.index else "")
+            + (f" Without physics H is {case.without_physics(best, largest)}." if NO_MODEL in rows.index else "")
         )
 
 

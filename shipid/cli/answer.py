@@ -57,12 +57,21 @@ class Answer:
         heads : key -> heading of the columns to print; default: all, headed by their keys. formats : key -> how its
         values are written; default: floats with four digits. shown : rows to print instead.
         """
-        records = _as_dicts(rows if shown is None or self.as_json else shown)
+        given: Any = rows if shown is None or self.as_json else shown
+        records: list[dict[str, Any]] = (
+            given.to_dict("records") if hasattr(given, "to_dict") else [dict(row) for row in given]
+        )
         if self.as_json:
             self.contents[name] = records
         elif records:
             heads, formats = heads or {key: str(key) for key in records[0]}, formats or {}
-            cells = [[formats.get(key, _format_cell)(record[key]) for key in heads] for record in records]
+            cells = [
+                [
+                    formats.get(key, lambda one: four_digits(one) if isinstance(one, float) else str(one))(record[key])
+                    for key in heads
+                ]
+                for record in records
+            ]
             print_table(list(heads.values()), cells)
 
     def save(self, what: str, file: Path | None, rows: DataFrame) -> None:
@@ -77,14 +86,6 @@ class Answer:
         """Say how large a dataset is that was written."""
         runs, rows = len(dataset.runs), len(dataset.frame)
         self.say(f"{rows} rows in {runs} {plural_word(runs, 'run')} -> {file}", file=file, rows=rows, runs=runs)
-
-
-def _as_dicts(rows: Any) -> list[dict[str, Any]]:
-    return rows.to_dict("records") if hasattr(rows, "to_dict") else [dict(row) for row in rows]
-
-
-def _format_cell(value: Any) -> str:
-    return four_digits(value) if isinstance(value, float) else str(value)
 
 
 @contextmanager

@@ -93,8 +93,10 @@ def family_rollout(
     frame, lost = drawn.motion_table(done), drawn.divergence_times(done)
     spread = frame.groupby("member").last().drop(columns="t").quantile([0.05, 0.5, 0.95]).T
     with open_answer(as_json) as answer:
-        count = f"{len(drawn.members)} members after {frame['t'].max():g} s, {len(lost) or 'none'} diverged"
-        answer.say(f"{drawn.base.name}: {count}, SI units")
+        answer.say(
+            f"{drawn.base.name}: {len(drawn.members)} members after {frame['t'].max():g} s, {len(lost) or 'none'} "
+            f"diverged; spread of {len(drawn.members) - len(lost)}, SI units"
+        )
         answer.records("spread", spread.set_axis(["5 %", "median", "95 %"], axis=1).reset_index(names="channel"))
         answer.records("diverge", [{"member": name, "diverges at [s]": time} for name, time in lost.items()])
         answer.save("motions", csv, frame)

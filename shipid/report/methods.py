@@ -60,14 +60,20 @@ METHOD_COLUMNS = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MethodsContent(PageContent):
-    """The page of a study of several parts; `frames` has `methods`, as in the page of a study."""
+    """The page of a study of several parts; `frames` has `methods`, as in the page of a study.
+
+    worlds : sentences on errors over worlds, if the parts are worlds.
+    """
 
     frames: Mapping[str, pd.DataFrame]
+    worlds: Sequence[str] = ()
 
     @property
     def answer(self) -> list[AnswerSentence]:
-        """A sentence for each condition: the method with the lowest H at the least and the largest amount of data."""
-        return [AnswerSentence(words, "methods") for words in sentences_on_methods(self.frames["methods"])]
+        """Over worlds; then for each condition the method with the lowest H at the least and the largest N_D."""
+        return [
+            AnswerSentence(words, "methods") for words in (*self.worlds, *sentences_on_methods(self.frames["methods"]))
+        ]
 
 
 def sentences_on_methods(frame: pd.DataFrame) -> list[str]:

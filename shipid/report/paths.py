@@ -98,7 +98,10 @@ def browser_figure(content: ReportContent) -> PageFigure | None:
         alternative="True path and predicted paths of one window, with the outline of the ship at start and end. "
         "The line of text beside it gives the end errors.",
         height=520,
-        draw=lambda run, size: [_draw_size(content, runs[run][len(runs[run]) // 2], size)],
+        draw=lambda run, size: [  # as page.js does
+            draw_window(content, one, [key for key in one.paths if _is_drawn(content, key, [size])])
+            for one in [runs[run][len(runs[run]) // 2]]
+        ],
         controls=[Control("Test run", list(runs)), Control("Manoeuvres, N_D", counts, len(counts) - 1)],
         chips=_window_chips(content),
         browser=True,
@@ -152,11 +155,6 @@ def _is_drawn(content: ReportContent, key: PathKey, counts: Sequence[int]) -> bo
     """Whether windows show a path: constant u, v, r, or a model of the close-up, at one of some N_D."""
     model, source, size = key
     return source == "naive" or (model in close_up_models(content) and (source != "cooperative" or size in counts))
-
-
-def _draw_size(content: ReportContent, window: WindowSnapshot, size: int) -> Panel:
-    """Draw one window of a test run as page.js does, with the compensated paths of one N_D."""
-    return draw_window(content, window, [key for key in window.paths if _is_drawn(content, key, [size])])
 
 
 def draw_window(content: ReportContent, window: WindowSnapshot, keys: Sequence[PathKey]) -> Panel:

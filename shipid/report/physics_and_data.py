@@ -84,6 +84,7 @@ def map_figure(content: ReportContent) -> PageFigure | None:
     if shown is None or nothing_learns(content):
         return None
     rows, cells = shown
+    twins = list(overview_models(content).loc[same_physics, "model"])
     hatched = f" Hatched: H is not below that of {_model_without_physics(rows)} at the same N_D."
     return PageFigure(
         id="map",
@@ -95,7 +96,7 @@ def map_figure(content: ReportContent) -> PageFigure | None:
         + family_words(content, rows.family)
         + (hatched if cells.worse.any() else "")
         + words_on_left_out(content)
-        + _not_on_map(content)
+        + (f" Not on the map, where another method has their place: {join_few_names(twins, 6)}." if twins else "")
         + cells_without_result(content),
         alternative=f"Cells of the position error H for {counted_text(len(rows), 'model')} by A and N_D. "
         "The numbers are in the table of cells.",
@@ -228,12 +229,6 @@ def _ticks_of_map(rows: pd.DataFrame, low: float) -> dict[str, list[Any]]:
     ticks = [digit * 10.0**decade for decade in decades for digit in ROUND_DIGITS]
     values = [tick for tick in ticks if max(low, 0.0) ** 2 <= tick <= largest and tick >= largest / 40]
     return {"tickvals": list(np.sqrt(values)), "ticktext": [f"{value:g}" for value in values]}
-
-
-def _not_on_map(content: ReportContent) -> str:
-    """Sentence on the methods whose place on the map another has; empty if there are none."""
-    names = list(overview_models(content).loc[same_physics, "model"])
-    return f" Not on the map, where another method has their place: {join_few_names(names, 6)}." if names else ""
 
 
 def _model_without_physics(rows: pd.DataFrame) -> str:

@@ -121,11 +121,6 @@ def _measure_cell(row: Mapping[Any, Any]) -> TableCell:
     return TableCell(fixed_text(value, places) + ends, value)
 
 
-def structure_sides(content: StructuresContent) -> PageTable:
-    """Errors of the structure chosen by side, helm and speed."""
-    return group_errors(content.groups, f"{content.chosen}, on runs that the fit has not seen.")
-
-
 def group_errors(frame: pd.DataFrame, takeaway: str) -> PageTable:
     """Errors by side, helm and speed, the frame of `shipid.identification.sides.by_group`."""
     shown = frame.assign(r=DEGREES * frame["r"], turning=100 * frame["turning"], error=100 * frame["error"])
@@ -140,6 +135,14 @@ STRUCTURES_PAGE = {
     "manoeuvres": Section(
         "What each says of standard manoeuvres", {"manoeuvres": (structure_manoeuvres, "manoeuvres")}
     ),
-    "sides": Section("Where it is wrong", {"sides": (structure_sides, "groups")}),
+    "sides": Section(
+        "Where it is wrong",
+        {
+            "sides": (
+                lambda one: group_errors(one.groups, f"{one.chosen}, on runs that the fit has not seen."),
+                "groups",
+            )
+        },
+    ),
 }
 write_structures = partial(write_page, "structures", STRUCTURES_PAGE)

@@ -121,7 +121,7 @@ def _check_angles(name: str, angles: Sequence[float], most: int) -> None:
         raise ShipidError(f"{name} takes {most or 'no'} {plural_word(most, 'angle')}", path="ANGLES")
     for angle, greatest in zip(angles, (MOST_HELM, MOST_HEADING), strict=False):
         if not 0 < angle <= greatest:
-            remedy = f"angles are above 0 and at most {greatest:g} deg; --side gives the direction of the first turn"
+            remedy = f"angles are above 0 and at most {greatest:g} deg: no sign gives the side of the first turn"
             raise ShipidError(f"{angle:g} deg: {remedy}", path="ANGLES")
 
 

@@ -56,14 +56,20 @@ def read_predictions(file: Path, results: Results) -> list[RivalPrediction]:
     Raises DataError for a file that is no table, a missing column, a value that is no number, and for steps that are
     missing, doubled or none of a test window.
     """
+    if not file.is_file() or not file.stat().st_size:
+        raise DataError("is an empty file" if file.is_file() else "no such file", file=file)
     try:
         frame = pd.read_parquet(file)
-        frame = frame.astype({name: float for name in (*KEYS[1:], *PLACES) if name in frame})
-    except (OSError, ValueError) as error:
-        raise DataError(f"is no table that `DataFrame.to_parquet` wrote ({error})", file=file) from None
+    except (OSError, ValueError):
+        raise DataError("is no Parquet file: write one by `DataFrame.to_parquet`", file=file) from None
     for name in (*KEYS, *PLACES):
         if name not in frame:
             raise DataError(f"lacks this column; it has {', '.join(map(str, frame))}", file=file, path=name)
+    for name in (*KEYS[1:], *PLACES):
+        given, frame[name] = frame[name], pd.to_numeric(frame[name], errors="coerce").astype(float)
+        if (bad := np.flatnonzero(~np.isfinite(frame[name]))).size:
+            fault = f"{given.iloc[bad[0]]} in row {bad[0]} is no number; {len(bad)} of {len(frame)} rows have none"
+            raise DataError(fault, file=file, path=name)
     rivals: list[RivalPrediction] = []
     blind = is_blind(file, frame, results.folder)
     groups = pd.DataFrame({"model": file.stem, "N_D": -1, "seed": -1} | {name: frame[name] for name in frame})
@@ -111,8 +117,6 @@ def _ordered_places(frame: pd.DataFrame, test: Windows, file: Path) -> Array:
             where = f"run {run!r}, instant {instant:g} s, ahead {ahead:g} s"
             raise DataError(f"{len(rows)} of {len(wanted)} steps {fault}; the first: {where}", file=file)
     places = given.reindex(wanted)[PLACES].to_numpy(dtype=float)
-    if not np.isfinite(places).all():
-        raise DataError("a place is no number: give one in every row", file=file, path="north or east")
     return places.reshape(len(test), test.horizon, 2).swapaxes(0, 1)
 
 
@@ -173,6 +177,9 @@ HYPOTHESES: dict[str, Undoing] = {
         places, test, np.degrees(test.columns["psi"]) - test.columns["psi"]
     ),
     "in degrees, north and east": _undo_degrees,
+    "in mm, north and east": lambda places, test: path_of_places(places / 1000, test),
+    "in km, north and east": lambda places, test: path_of_places(places * 1000, test),
+    "in ft, north and east": lambda places, test: path_of_places(places * 0.3048, test),
 }
 
 

@@ -5,7 +5,7 @@ Members run in blocks, and their errors are summed and tallied on the way.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from typing import Any
 
@@ -20,7 +20,7 @@ from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, suggest_name
 from shipid.evidence import SIGNIFICANT, holm_correction
 from shipid.hybrid.physics import check_columns
-from shipid.metrics import BINS, rank_correlation, tally_quantile
+from shipid.metrics import BINS, cap_paths, position_error, rank_correlation, summarise_errors, tally_quantile
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
@@ -66,8 +66,8 @@ def screen(
     """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
 
     A row has family, member, accuracy A (method, eq. 14) and A_90 [m] over all windows (exact to 0.2 %), the share of
-    windows on which the member diverged (A is NaN then), and the factor on the base of each drawn parameter. Members
-    are those that the study itself draws, none redrawn.
+    windows on which the member diverged (their errors count as in a study, see `cap_paths`), and the factor on the base
+    of each drawn parameter. Members are those that the study itself draws, none redrawn.
 
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
     cut : the windows of the study as of `partition`, where they are cut already.
@@ -117,12 +117,19 @@ def _rows_of_block(
         mean[same] = sum(one.total.sum(axis=1) for one in measured) / (num_windows * parts[0].horizon)
         p90[same] = tally_quantile(reduce(np.add, (one.tally for one in measured)), 0.9)
         diverged[same] = sum(one.diverged.sum(axis=1) for one in measured) / num_windows
-    whole = diverged == 0
+        for k in same[diverged[same] > 0]:
+            errors = []
+            for windows in parts:
+                instants = instants_of(plan.study, vessel, dataset, windows)
+                paths, lost = physics_of(plan.study, vessel).variant_paths(instants, values[[k]], device)
+                errors.append(position_error(cap_paths(paths[:, 0], windows.future, lost[0]), windows.future))
+            known: Mapping[str, Any] = summarise_errors(np.concatenate(errors, axis=1))
+            mean[k], p90[k] = known["mean"], known["p90"]
     rows: dict[str, Any] = {
         "family": [variant.family for variant in variants],
         "member": [variant.name for variant in variants],
-        "A": np.where(whole, mean, np.nan),
-        "A_90": np.where(whole, p90, np.nan),
+        "A": mean,
+        "A_90": p90,
         "diverged": diverged,
     }
     factors = {path: [variant.factors[path] for variant in variants] for path in variants[0].factors}  # all draw alike
@@ -144,9 +151,9 @@ def join_blocks(blocks: Sequence[pd.DataFrame]) -> pd.DataFrame:
 
 
 def accuracy_quantiles(frame: pd.DataFrame) -> pd.DataFrame:
-    """A row per family: members, how many diverged, and quantiles of A [m] over the others."""
+    """A row per family: members, how many diverged on some window, and quantiles of A [m]."""
     A = frame.groupby("family", sort=False)["A"]
-    counts = {"members": A.size(), "diverged": A.size() - A.count()}
+    counts = {"members": A.size(), "diverged": frame["diverged"].gt(0).groupby(frame["family"], sort=False).sum()}
     return pd.DataFrame(counts | {share: A.quantile(share) for share in QUANTILES_OF_A}).reset_index()
 
 
@@ -157,7 +164,7 @@ def drivers_of_accuracy(frame: pd.DataFrame) -> pd.DataFrame:
     Chance is judged by Kendall's rank correlation, exact for few members, corrected for the pairs of a family.
     """
     rows: list[tuple[Any, ...]] = []
-    for name, part in frame[frame["A"].notna()].groupby("family", sort=False):
+    for name, part in frame.groupby("family", sort=False):
         A, alike, driving = part["A"].to_numpy(), dict[bytes, list[str]](), list[tuple[Any, ...]]()
         for path in frame.columns.difference(list(ROW_COLUMNS), sort=False):
             if part[path].nunique() > 1:

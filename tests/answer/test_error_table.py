@@ -135,6 +135,19 @@ def test_break_even_never_disagrees_with_what_is_shown_of_a_model(seed: int) -> 
         assert errors.mean(m, PHYSICS_ONLY) <= worth.high or lead.below[k] <= SIGNIFICANT
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_one_bad_model_does_not_bend_the_limit(seed: int) -> None:
+    """Where leads fall with A, the limit lies between the last model that is ahead and the first that is not."""
+    rng = np.random.default_rng(seed)
+    H = np.sort(rng.lognormal(0.0, 0.4, len(A)))
+    H[-1] *= 1e3  # it diverges
+    none = float(rng.uniform(H[0], H[-2]))
+    worth = break_even(table(A, {m: [h] for m, h in zip(A, H, strict=True)} | {"none": [none]}, (10,)), list(A), 0)
+    last = max(2.0**k for k, h in enumerate(H) if h < none)
+    assert worth is not None
+    assert last <= worth.value <= 2 * last
+
+
 @pytest.mark.parametrize(("none", "where"), [(100.0, "above"), (0.01, "below")])
 def test_break_even_beyond_the_models_tried_is_a_bound(none: float, where: str) -> None:
     worth = break_even(table(A, {m: [a / 2] for m, a in A.items()} | {"none": [none]}, (10,)), list(A), 0)

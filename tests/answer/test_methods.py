@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
-from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS, method_table
+from shipid.answer.methods import METHOD_COLUMNS, WITH_PHYSICS, method_table, sentences_on_worlds
 from shipid.evidence import CellErrors
+from shipid.report.wording import difference_text
 
 
 def cells(
@@ -102,3 +105,28 @@ def test_a_failed_cell_is_counted_and_not_averaged() -> None:
     assert lost.pairs == 0
     assert np.isnan(lost.H)
     assert np.isnan(lost.difference)
+
+
+@pytest.mark.parametrize(("worlds", "conditions"), [(4, 1), (4, 2), (2, 1)])
+def test_a_study_of_several_worlds_has_an_interval_over_them(worlds: int, conditions: int) -> None:
+    """Physics errs by half of what none does in every world, and worlds differ: the ratio is sharp, errors are not."""
+    rows, names = [], [f"c{k}" for k in range(conditions)] if conditions > 1 else [""]
+    for condition in names:
+        for world in range(worlds):
+            for family, share in (("moderate", 0.5), ("none", 1.0)):
+                row = {"condition": condition, "world": f"{condition}-{world}", "family": family, "method": "drawn"}
+                rows += [{**row, "N_D": N, "status": "ok", "H_end": share * 2.0**world / N} for N in (1, 2, 3)]
+    study = SimpleNamespace(repeat={"seed": [*range(worlds)]}, claims=SimpleNamespace(method="drawn", not_judged=set()))
+    plan: Any = SimpleNamespace(study=study, methods=[])
+    told = sentences_on_worlds(plan, pd.DataFrame(rows))
+    assert len(told) == (0 if worlds < 3 else 4 * conditions), "of the least and the largest N_D"
+    study.repeat = {"split.test": [["a"], ["b"], ["c"]]}
+    assert not sentences_on_worlds(plan, pd.DataFrame(rows)), "tests in turn are no worlds"
+    wide = stats.t.ppf(0.975, worlds - 1) * (np.log(2) * np.arange(worlds)).std(ddof=1) / worlds**0.5
+    mean = 0.5 * 2**1.5
+    for text in told[:1]:
+        assert (
+            f"physics of 'moderate' errs by {difference_text(mean, mean / np.exp(wide), mean * np.exp(wide))} at"
+            in text
+        )
+        assert "Its difference to no physics is −50.0 % [−50.0, −50.0]" in text

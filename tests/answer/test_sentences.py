@@ -36,10 +36,10 @@ def test_best_model_and_its_worth_in_runs(made: Any) -> None:
     advice = text(made(grid(H, (10, 30, 60))))
     assert advice.startswith(
         "8 s ahead, good (best in validation) with 60 runs errs by 0.50 m on average, nine in ten below 0.75 m. "
-        "Without physics: 1.25 m.\n"
+        "Without physics: 1.25 m, untested.\n"
     )
     assert "H is the mean error over all 8 s, not only at their end: 0.50 m for good with 60 runs." in advice
-    assert "Its physics alone has A = 2.00 m. Without physics H is 1.25 m." in advice
+    assert "Its physics alone has A = 2.00 m. Without physics H is 1.25 m, untested." in advice
     runs = 30 * 2 ** (np.log(4.0 / 1.5) / np.log(4.0 / 1.25))
     assert "How many runs? With 10 runs, H of good (best in validation) is 1.50 m. " in advice
     assert f"Without physics the same error takes about {runs:.0f} runs, interpolated between amounts." in advice
@@ -181,6 +181,25 @@ def test_how_good_physics_must_be(made: Any) -> None:
         "With 10 or 30 runs, physics does not pay even if its own mean error over the horizon, A, is 1.00 m, "
         "the best tried" in advice
     )
+
+
+def test_models_that_do_not_go_by_the_limit_are_named_beside_it(made: Any) -> None:
+    """The worst physics but one does as well as the best: no limit of A holds, and the same breath says so."""
+    alone = {f"m{k}": 2.0**k for k in range(6)}
+    errors = [0.5, 0.6, 9.0, 9.0, 0.7, 9.0]
+    H = {name: (error, 1.0) for name, error in zip(alone, errors, strict=True)} | {"none": (3.0, 1.0)}
+    (sentence,) = [
+        line for line in text(made(grid(H), alone=alone, claims=None, runs=8)).splitlines() if "; yet" in line
+    ]
+    assert re.search(r"A, is below about \d\.\d m \[[^]]*\]; yet m4 \(A 16\.0 m\) does better\.$", sentence), sentence
+
+
+def test_two_errors_beside_each_other_are_tested(made: Any) -> None:
+    for none, words in ((4.0, "shown to be larger"), (0.2, "shown to be less"), (1.0, "not shown to differ")):
+        advice = text(made(grid({"good": (1.5, 1.0), "bad": (3.0, 2.0), "none": (9.0, none)}), runs=8))
+        first, *rest = advice.splitlines()
+        assert first.endswith(f", {words}."), first
+        assert [line for line in rest if "Without physics H is" in line and line.endswith(f", {words}.")], rest
 
 
 def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:

@@ -70,6 +70,9 @@ FAULTS: dict[str, Callable[[Array, Windows], Array]] = {
     "mirrored, ahead": lambda p, w: turned(-p, w, w.columns["psi"]),
     "in degrees, the heading": lambda p, w: turned(p, w, np.degrees(w.columns["psi"])),
     "in degrees, north": lambda p, w: [63.0, 10.0] + turned(p, w, w.columns["psi"]) / [111120.0, 50448.0],
+    "in mm, north and east": lambda p, w: 1000 * turned(p, w, w.columns["psi"]),
+    "in km, north and east": lambda p, w: turned(p, w, w.columns["psi"]) / 1000,
+    "in ft, north and east": lambda p, w: turned(p, w, w.columns["psi"]) / 0.3048,
     "late by 1 step": lambda p, w: turned(np.concatenate([0 * p[:1], p[:-1]]), w, w.columns["psi"]),
     "saw the future, early by 1 step": lambda p, w: turned(
         np.concatenate([p[1:], 2 * p[-1:] - p[-2:-1]]), w, w.columns["psi"]
@@ -103,8 +106,9 @@ def test_each_fault_is_named(tmp_path: Path, results: Results, fault: str) -> No
         (lambda t: pd.concat([t, t[3:5]]), "2 of .* steps are there twice"),
         (lambda t: t.assign(run="other"), "are none of the test"),
         (lambda t: t.assign(ahead=t["ahead"] - 1.0), "ahead 0 s"),
-        (lambda t: t.assign(east="x"), "could not convert string to float"),
-        (lambda t: t.assign(east=np.nan), "north or east: a place is no number"),
+        (lambda t: t.assign(east="x"), "east: x in row 0 is no number"),
+        (lambda t: t.assign(east=np.nan), "east: nan in row 0 is no number; 640 of 640 rows have none"),
+        (lambda t: t.assign(instant=t["instant"].where(t.index != 4)), "instant: nan in row 4 is no number; 1 of"),
         (lambda t: t.assign(N_D=999), "N_D: 999 is not of the study: give one of 4, or -1 for any"),
         (lambda t: t.assign(N_D="all"), "N_D: all is not of the study"),
         (lambda t: t.assign(seed=np.nan), "seed: nan is not of the study"),
@@ -117,6 +121,20 @@ def test_faults_of_rows_are_one_line(tmp_path: Path, results: Results, change: A
     change(prediction_table(results.test, path)).to_parquet(tmp_path / "p.parquet")
     with pytest.raises(DataError, match=words):
         read_predictions(tmp_path / "p.parquet", results)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"), [(None, "no such file"), (b"", "is an empty file"), (b"run,north\n", "is no Parquet file")]
+)
+def test_a_file_that_is_no_table_is_told_in_one_line(
+    tmp_path: Path, results: Results, content: bytes | None, words: str
+) -> None:
+    file = tmp_path / "p.parquet"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(DataError, match=words) as error:
+        read_predictions(file, results)
+    assert "\n" not in str(error.value)
 
 
 def test_a_score_has_intervals_and_rows_in_the_page_and_says_whether_it_was_blind(

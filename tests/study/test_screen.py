@@ -13,7 +13,7 @@ from scipy import stats
 from shipid.engine import engines, native
 from shipid.errors import DocumentError, ShipidError
 from shipid.hybrid.physics import Physics
-from shipid.metrics import position_error, summarise_errors
+from shipid.metrics import cap_paths, position_error, summarise_errors
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain_runs, partition, window_memory
@@ -46,8 +46,8 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
         vessel, errors = base.with_values(variant.values), []
         for windows in partition(plan, dataset)[:2]:
             hidden = window_memory(vessel, dataset, windows)
-            paths = Physics(vessel, windows.horizon, 1.0).paths(windows.instants(hidden=hidden))
-            errors.append(position_error(paths, windows.future))
+            paths, lost = Physics(vessel, windows.horizon, 1.0).variant_paths(windows.instants(hidden=hidden))
+            errors.append(position_error(cap_paths(paths[:, 0], windows.future, lost[0]), windows.future))
         whole = summarise_errors(np.concatenate(errors, axis=1))
         rows.append({"member": variant.name, "factors": variant.factors, **whole})
     return rows
@@ -75,7 +75,7 @@ def test_the_size_of_a_block_changes_no_bit(plan: Plan, monkeypatch: pytest.Monk
     assert [len(block) for block in screen(plan, obtain_runs(plan), drawn_families(plan, "wrong"), 3)] == [1, 1, 1]
 
 
-def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
+def test_a_member_that_diverges_errs_as_in_a_study_and_is_counted(tmp_path: Path) -> None:
     wild = [
         {
             "parameters": ["hull.derivatives.N_r|r|", "hull.derivatives.N_rrr"],
@@ -85,11 +85,13 @@ def test_a_member_that_diverges_is_reported(tmp_path: Path) -> None:
     ]
     family = [{"name": "wrong", "base": "gunnerus-28.9", "members": 2, "perturb": wild}]
     meant = {"unusual": ["family.0.perturb.0.factor*"]}
-    frame = screened(tiny_plan(tmp_path, {"family": family, **meant}), 6)
+    plan = tiny_plan(tmp_path, {"family": family, **meant})
+    frame = screened(plan, 6)
     bad = frame["diverged"] > 0
     assert bad.any()
-    assert frame["A"].isna().equals(bad)
-    assert frame["A_90"].isna().equals(bad)
+    expected = by_paths(plan, 6)
+    np.testing.assert_allclose(frame["A"], [row["mean"] for row in expected], rtol=1e-9)
+    np.testing.assert_allclose(frame["A_90"], [row["p90"] for row in expected], rtol=2e-3)
     assert (frame["diverged"] <= 1).all()
     assert accuracy_quantiles(frame)["diverged"].item() == bad.sum()
 
