@@ -22,8 +22,9 @@ from shipid.evidence import (
     paired_difference,
 )
 from shipid.metrics import error_at_horizon, position_error
-from shipid.report.wording import metres_text
+from shipid.report.wording import REGRESSION, metres_text
 from shipid.study.declared import NO_MODEL
+from shipid.study.plan import Batch
 from shipid.study.results import Results
 
 Array = NDArray[np.float64]
@@ -152,7 +153,9 @@ class ErrorTable:
 def error_table(
     results: Results, models: Sequence[str], metric: Metric = "H", amounts: Sequence[int] | None = None
 ) -> ErrorTable:
-    """Errors of models and `none` that have a result in every cell, over the horizon (H, H_90) or at its end (H_end).
+    """Errors of models and `none` that have a result in every cell, and of the regression.
+
+    Over the horizon (H, H_90) or at its end (H_end).
 
     amounts : values of N_D that count, rising; all by default.
     """
@@ -164,7 +167,9 @@ def error_table(
     seeds = {N: sorted(set(cells["seed"][cells["N_D"] == N])) for N in amounts}
     keys = zip(cells["foundation"], cells["N_D"], cells["seed"], strict=True)
     known = dict(zip(keys, cells["cell"], strict=True))
-    H = {}
+    H, regressed = {}, [[results.regression.get(Batch(N, seed).key) for seed in seeds[N]] for N in amounts]
+    if all(path is not None for row in regressed for path in row):
+        H[REGRESSION] = [np.array([of_path(path) for path in row if path is not None]) for row in regressed]
     for name in (*models, NO_MODEL):
         mine = [[known.get((name, N, seed)) for seed in seeds[N]] for N in amounts]
         if all(cell in errors for row in mine for cell in row):

@@ -11,7 +11,14 @@ import pandas as pd
 
 from shipid.files import read_json
 from shipid.hybrid.bands import Region
-from shipid.metrics import course_over_horizon, error_at_horizon, error_of_windows, position_error
+from shipid.metrics import (
+    PREDICTION_ERRORS,
+    course_over_horizon,
+    error_at_horizon,
+    error_of_windows,
+    position_error,
+    summarise_errors,
+)
 from shipid.physics.signals import SIGNALS, read_unit, signal_of
 from shipid.report import WindowSnapshot
 from shipid.report.content import TRIAL_COLUMNS, PathKey, model_text
@@ -98,6 +105,7 @@ def kinds_frame(results: Results) -> pd.DataFrame:
     """
     test, kinds = results.test, np.array([results.kinds.get(str(run), "") for run in results.test.run])
     errors = {("naive", "naive", 0): [results.naive]}
+    errors |= {("naive", "regression", N): each for N, each in list(regression_errors(results).items())[-1:]}
     for model, path in _finite_physics(results).items():
         errors[model, "physics", 0] = [position_error(path, test.future)]
     for row in results.rows:
@@ -114,6 +122,26 @@ def kinds_frame(results: Results) -> pd.DataFrame:
             ends = np.mean([error_at_horizon(part).mean() for part in parts])
             rows.append((kind, runs, *keys, np.mean([part.mean() for part in parts]), ends))
     return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
+
+
+def regression_errors(results: Results) -> dict[int, list[np.ndarray]]:
+    """Errors (T, S) [m] of the regressions by amount of data, the least first."""
+    batches = [(batch.N_D, results.regression.get(batch.key)) for batch in reversed(results.plan.batches)]
+    errors: dict[int, list[np.ndarray]] = {}
+    for amount, path in batches:
+        if path is not None:
+            errors.setdefault(amount, []).append(position_error(path, results.test.future))
+    return errors
+
+
+def regression_frame(results: Results) -> pd.DataFrame:
+    """Errors [m] of the regressions, mean over draws: N_D, H_end, H_end_90, H, H_90, rms."""
+    names = {**PREDICTION_ERRORS, "rms": "rms"}
+    known = [
+        (amount, summarise_errors(one)) for amount, several in regression_errors(results).items() for one in several
+    ]
+    rows = [{"N_D": amount, **{name: dict(one)[key] for name, key in names.items()}} for amount, one in known]
+    return pd.DataFrame(rows, columns=["N_D", *names]).groupby("N_D", as_index=False).mean()
 
 
 def count_from_start(results: Results, frame: pd.DataFrame) -> pd.DataFrame:

@@ -29,6 +29,7 @@ REPAIR_COLUMNS = ["kind", "column", "count", "note"]
 ANSWER, SUMMARY, REPORT, METHODS = "answer.txt", "summary.md", "report.html", "methods.csv"
 REPORT_FRAMES: dict[str, Callable[[Results], pd.DataFrame]] = {
     "kinds": frames.kinds_frame,
+    "regression": frames.regression_frame,
     "coverage": bands.coverage_frame,
     "no_band": bands.refused_frame,
     "methods": methods.compare_methods,

@@ -22,7 +22,7 @@ from shipid.answer.verdict import (
 )
 from shipid.evidence import SIGNIFICANT, Differences, log_error, paired_difference
 from shipid.metrics import error_of_windows
-from shipid.report.wording import counted_text, join_few_names, metres_text
+from shipid.report.wording import REGRESSION, counted_text, join_few_names, metres_text
 from shipid.study.declared import NO_MODEL
 from shipid.study.plan import families_set_from, fitted_families, learning_methods, orders_may_react, verdict_method
 from shipid.study.results import Results
@@ -337,6 +337,21 @@ def _reservations(case: AnswerCase) -> Iterator[str]:
         yield from _sentences_on_sides(sides, f"C{constant[1:]} beat", f"It is not shown that {constant} are beaten by")
         if len(sides[0]) == len(models):
             yield f"With {counted_text(largest, 'run')}, every compared model beats {constant}."
+    if models and REGRESSION in table.H:
+        yield from _no_better_than_regression(case, models)
+
+
+def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Iterator[str]:
+    """Which models, and which physics alone, do not beat a regression on the same runs."""
+    table, fixed = case.table, case.fixed_physics()
+    for amount, place in case.ends.items():
+        known = [*((name, place) for name in models), *((name, PHYSICS_ONLY) for name in fixed)]
+        lead = table.compare([[(1.0, REGRESSION, place), (-1.0, *model)] for model in known])
+        _, worse, unknown = case.sides([*models, *(f"{name} alone" for name in fixed)], lead)
+        words = [f"beats {model_list(worse)}"] if worse else []
+        words += [f"is not shown to be beaten by {model_list(unknown)}"] if unknown else []
+        one = f"regression on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
+        yield f"A {one} {' and '.join(words)}." if words else f"All compared models, physics alone too, beat a {one}."
 
 
 def _sentences_on_sides(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:

@@ -30,6 +30,7 @@ from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.modules import ModulesCorrector, physics_without_modules
 from shipid.hybrid.one_step import OneStepCorrector
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector
+from shipid.hybrid.regression import RegressionCorrector, law_terms
 from shipid.hybrid.stepping import VELOCITY_LIMIT
 from shipid.hybrid.units import Units
 from shipid.physics.signals import measurable_signals
@@ -355,6 +356,22 @@ def missed_accelerations(known: PredictorInputs, delays: int) -> list[MX]:
     return missed
 
 
+def regression_path(known: PredictorInputs, corrector: RegressionCorrector) -> MX:
+    """A law of acceleration through the water, which flows steadily; velocities stay within their limits."""
+    h, current, weights = known.physics.step, MX(ca.DM(corrector.current[0])), ca.DM(corrector.weights[0].T)
+
+    def added(start: StepStart, alone: MX, kept: MX) -> tuple[MX, MX]:
+        table, psi = feature_expressions(start.row, corrector.commands), start.row["psi"]
+        water = ca.vertcat(turn_vectors(current, -psi), 0)
+        through = table | {"u": table["u"] - water[0], "v": table["v"] - water[1]}
+        after = alone - water + h * ca.mtimes(weights, ca.vertcat(*law_terms(through, corrector.names)))
+        after = ca.fmin(ca.fmax(after, ca.DM(corrector.low)), ca.DM(corrector.high))
+        later = psi + h / 2 * (table["r"] + after[2])
+        return (after + ca.vertcat(turn_vectors(current, -later), 0) - alone) / h, kept
+
+    return stepped_path(known, added)
+
+
 CORRECTORS: dict[type[Any], Callable[[PredictorInputs, Any], MX]] = {
     UnchangedPath: physics_path,
     ForceCorrector: physics_path,
@@ -366,5 +383,6 @@ CORRECTORS: dict[type[Any], Callable[[PredictorInputs, Any], MX]] = {
     OneStepCorrector: one_step_path,
     ModulesCorrector: modules_path,
     HankelCorrector: hankel_path,
+    RegressionCorrector: regression_path,
 }
 """Class of a corrector -> its path (2, T)."""

@@ -20,6 +20,7 @@ from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
+from shipid.hybrid.regression import Regression
 
 METHODS: dict[str, type[Method]] = {
     "alone": Alone,
@@ -33,6 +34,7 @@ METHODS: dict[str, type[Method]] = {
     "path-drawn": PathDrawn,
     "path-trained": PathTrained,
     "recurrent": Recurrent,
+    "regression": Regression,
 }
 
 

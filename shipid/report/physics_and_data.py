@@ -49,7 +49,15 @@ from shipid.report.selection import (
     spread_items,
     words_on_left_out,
 )
-from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text, shorten_name
+from shipid.report.wording import (
+    CONSTANT_MOTION,
+    REGRESSION,
+    counted_text,
+    join_few_names,
+    metres_text,
+    number_text,
+    shorten_name,
+)
 
 HEIGHT, THICKEST_CELL = 580, 26  # of the map and at most of a cell [px]
 MAP_MARGIN = {"l": 52, "r": 84, "t": 12, "b": 44}  # the right one holds the names of rows [px]
@@ -299,7 +307,8 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         how="Position error at the horizon, or over all predicted points of all windows of all test manoeuvres: their "
         "mean is H (15), or A (14) for the physics alone, at N_D = 0. Where a cell has several seeds, the line joins "
         "their means and the pale points are the seeds. The dashed line is constant u, v, r: surge, sway and yaw rate "
-        "stay as they are at the instant of prediction, the least that any model must beat."
+        "stay as they are at the instant of prediction, the least that any model must beat; "
+        "the dotted one is least squares of accelerations on motion and orders."
         + (" Colour is A; marker" if span else " Marker")
         + " and dashes are the family; N_D counts manoeuvres to train and to validate."
         + words_on_left_out(content)
@@ -313,7 +322,11 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
             Control("Position error", statistics),
             Control("Axis", ["logarithmic", "linear"]),
         ],
-        chips=[*model_chips(order, looks, words), Chip("naive", CONSTANT_MOTION, NAIVE, "dash")],
+        chips=[
+            *model_chips(order, looks, words),
+            Chip("naive", CONSTANT_MOTION, NAIVE, "dash"),
+            Chip("regression", REGRESSION, NAIVE, "dot"),
+        ],
         scale=ColourScale("error of the physics alone, A [m]", *span) if span else None,
     )
 
@@ -352,6 +365,9 @@ def _draw_sizes(
     level, dashed = content.naive[constant], {"color": NAIVE, "dash": "dash", "width": 1.5}
     hover = f"{CONSTANT_MOTION}: {metres_text(level)}"
     traces.append(make_line(CONSTANT_MOTION, [sizes[0], sizes[-1]], [level] * 2, ["naive"], line=dashed, hover=hover))
+    if len(known := content.frame("regression")):
+        dotted = {**dashed, "dash": "dot"}
+        traces.append(make_line(REGRESSION, known.N_D, known[column], ["regression"], line=dotted))
     x = make_axis("manoeuvres, N_D [1]", tickvals=[int(size) for size in sizes])
     return make_plot(traces, x, log_axis(title) if logarithmic else make_axis(title, rangemode="tozero"))
 

@@ -9,12 +9,13 @@ from shipid.report.content import AnswerSentence, ReportContent
 from shipid.report.errors_over import error_by_kind
 from shipid.report.factors import cells_table, models_table
 from shipid.report.page import split_answer
-from shipid.report.wording import CONSTANT_MOTION, metres_text
+from shipid.report.wording import CONSTANT_MOTION, REGRESSION, metres_text, number_text
 
 
 def summary_text(content: ReportContent) -> str:
-    """Answer, findings, errors of constant u, v, r, models, cells and provenance as Markdown."""
+    """Answer, findings, errors of constant u, v, r and of regressions, models, cells and provenance as Markdown."""
     errors = {name: metres_text(value) for name, value in content.naive.items()}
+    known = content.frame("regression").map(number_text)
     headline, more = split_answer(content.answer)
     findings = [[f["id"], f["claim"], f["verdict"], f["evidence"]] for f in content.findings]
     parts = [
@@ -25,6 +26,11 @@ def summary_text(content: ReportContent) -> str:
         f"## {CONSTANT_MOTION.capitalize()}",
         "At the horizon {end}, nine in ten below {end_90}; mean over it {mean}, 90th percentile {p90}.".format(
             **errors
+        ),
+        *(
+            [f"## {REGRESSION.capitalize()}", _markdown_table([*map(str, known)], known.to_numpy().tolist())]
+            if len(known)
+            else []
         ),
     ]
     by_kind = [error_by_kind(content)] if len(content.frame("kinds")) else []

@@ -11,6 +11,8 @@ from shipid.units import length_decimals, plural_word
 
 CONSTANT_MOTION = "constant u, v, r"
 """Name of the path that no model and no data are needed for: the motion at the instant goes on."""
+REGRESSION = "regression on accelerations"
+"""Name of the simplest path that data give without physics; no family has such a name."""
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -42,7 +42,9 @@ from shipid.data.windows import (
 )
 from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
+from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics, check_columns, missing_columns
+from shipid.hybrid.regression import MOST_FOLDS, Regression
 from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
@@ -541,6 +543,25 @@ def constant_motion(windows: Windows) -> Array:
     along, across = chord * np.cos(half), chord * np.sin(half)
     path: Array = np.stack([u * along - v * across, u * across + v * along], axis=-1)
     return path
+
+
+def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> dict[str, Array]:
+    """Paths (T, S, 2) [m] on the test windows by `Regression` on the runs of each batch, by its key.
+
+    A batch whose runs do not suffice for one is left out.
+    """
+    study, paths, method = prepared.study, dict[str, Array](), Regression()
+    physics, known = physics_of(study, None), study.prediction.known
+    for batch in batches:
+        windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
+        cases = {batch.key: Case(physics, np.zeros_like(windows.future))}
+        with suppress(DataError):
+            folds = run_folds(windows, method.validation, batch.seed, MOST_FOLDS)
+            fitted = method.fit(Task(cases, windows, folds, prepared.commands, known, batch.seed))[batch.key]
+            if fitted.corrector is not None:
+                instants = prepared.test.instants(known=known)
+                paths[batch.key] = fitted.corrector.predict(physics, instants, np.empty(0))
+    return paths
 
 
 def foundation_record(foundation: Foundation) -> dict[str, Any]:

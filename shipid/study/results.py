@@ -45,6 +45,7 @@ class Results:
     """A run's folder, read: the plan, one row per cell, models, test windows, and the predictions of every cell.
 
     naive : errors (T, S) [m] of constant u, v, r. physics : model -> path (T, S, 2) [m] of the physics alone.
+    regression : key of a batch -> path (T, S, 2) [m] of a regression on its runs.
     paths : cell -> predicted path (T, S, 2) [m] in the frame (11). bands : cell -> its bands, where it has any;
     no_band : cell -> why it has none of the level of the study.
     """
@@ -61,6 +62,7 @@ class Results:
     provenance: Mapping[str, Any]
     bands: Mapping[str, Bands] = field(default_factory=dict)
     no_band: Mapping[str, str] = field(default_factory=dict)
+    regression: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         done = f"{len(self.cells)} of {self.plan.cells} cells"
@@ -165,7 +167,7 @@ def _with_errors_at_horizon(folder: Path, cells: pd.DataFrame) -> pd.DataFrame:
     without = cells[cells["status"].eq("ok") & cells["H_end"].isna()]
     if without.empty:
         return cells
-    test, physics, _ = store.read_test(folder)
+    test, physics, *_ = store.read_test(folder)
     for index, cell, foundation in without[["cell", "foundation"]].itertuples():
         predicted = read_arrays(store.paths_file(folder, cell))["paths"]
         for name, path in (("H", predicted), ("A", physics.get(foundation))):
@@ -187,7 +189,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         raise ResultError(f"holds a study of several parts: read them one by one ({named})", file=folder)
     seals.check_seals(folder)
     cells = _read_part_cells(folder, plan)
-    test, physics, naive = store.read_test(folder)
+    test, physics, naive, regression = store.read_test(folder)
     bands: dict[str, Bands] = {}
     no_band: dict[str, str] = {}
     good = [str(cell) for cell in cells["cell"][cells["status"] == "ok"]]
@@ -214,6 +216,7 @@ def read_results(folder: str | os.PathLike[str], say: Callable[[str], object] | 
         provenance=store.provenance(folder),
         bands=bands,
         no_band=no_band,
+        regression=regression,
     )
 
 

@@ -37,7 +37,14 @@ from shipid.study.cluster import Line, SentJournal, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
 from shipid.study.plan import USER_SCRIPT, Plan, Unit, own_code
-from shipid.study.prepare import PreparedStudy, foundation_record, obtain_runs, prepare, runs_by_amount
+from shipid.study.prepare import (
+    PreparedStudy,
+    foundation_record,
+    obtain_runs,
+    prepare,
+    regression_paths,
+    runs_by_amount,
+)
 from shipid.study.workers import import_for_workers, on_workers
 from shipid.users import code_digest
 from shipid.version import __version__
@@ -195,7 +202,7 @@ def _paths_alone(prepared: PreparedStudy) -> dict[str, np.ndarray]:
 
 def _check_common(folder: Path, prepared: PreparedStudy) -> None:
     """Raise ResultError where true or physics paths of the test are stored that this shipid makes otherwise."""
-    test, stored, _ = store.read_test(folder)
+    test, stored, *_ = store.read_test(folder)
     now = {"truth": prepared.test.future, **_paths_alone(prepared)}
     for name, old in {"truth": test.future, **stored}.items():
         if old.shape != now[name].shape or not np.allclose(old, now[name], rtol=1e-3, atol=1e-4, equal_nan=True):
@@ -204,9 +211,9 @@ def _check_common(folder: Path, prepared: PreparedStudy) -> None:
 
 
 def _write_common(plan: Plan, folder: Path, prepared: PreparedStudy) -> None:
-    """Store what all batches share, so that a report needs nothing else."""
+    """Store what no unit computes, so that a report needs nothing else."""
     test, lost, paths = prepared.test, prepared.diverged, _paths_alone(prepared)
-    store.write_test(folder, test, paths, prepared.naive)
+    store.write_test(folder, test, paths, prepared.naive, regression_paths(prepared, plan.batches))
     rows = input_envelope(prepared.pool, test, runs_by_amount(plan.study, prepared.pool), prepared.commands)
     write_json(folder / store.ENVELOPE, rows)
     known = {

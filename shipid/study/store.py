@@ -343,17 +343,24 @@ def write_results(folder: Path, plan: Plan, rows: pd.DataFrame, whole: bool = Tr
     return folder / "results.parquet"
 
 
-def write_test(folder: Path, test: Windows, paths: Mapping[str, np.ndarray], naive: np.ndarray) -> None:
-    """Store the test windows and the physics paths of every foundation on them, so that a report needs nothing else."""
+def write_test(
+    folder: Path,
+    test: Windows,
+    paths: Mapping[str, np.ndarray],
+    naive: np.ndarray,
+    regression: Mapping[str, np.ndarray],
+) -> None:
+    """Store the test windows, the physics paths of every foundation on them and those of the regressions by batch."""
     arrays: dict[str, np.ndarray] = {"run": test.run, "t": test.t, "future": test.future, "naive": naive}
-    for prefix, named in {**{one: getattr(test, field) for field, one in PREFIXES.items()}, "physics ": paths}.items():
+    columns = {one: getattr(test, field) for field, one in PREFIXES.items()}
+    for prefix, named in {**columns, "physics ": paths, "regression ": regression}.items():
         arrays |= {f"{prefix}{name}": values for name, values in named.items()}
     arrays["meta"] = np.array(json.dumps({"horizon": test.horizon, "step": test.step, "shared": test.shared_clock}))
     write_arrays(folder / TEST, arrays, compressed=True)
 
 
-def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]:
-    """Test windows, physics paths by foundation, and the errors (T, S) of constant u, v, r."""
+def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray, dict[str, np.ndarray]]:
+    """Test windows, physics paths by foundation, errors (T, S) of constant u, v, r, paths of regressions by batch."""
     try:
         arrays = read_arrays(folder / TEST)
         meta = json.loads(str(arrays["meta"]))
@@ -370,7 +377,8 @@ def read_test(folder: Path) -> tuple[Windows, dict[str, np.ndarray], np.ndarray]
         shared_clock=meta["shared"],
         **named,
     )
-    return windows, arrays_with_prefix(arrays, "physics "), arrays["naive"]
+    physics, regression = (arrays_with_prefix(arrays, prefix) for prefix in ("physics ", "regression "))
+    return windows, physics, arrays["naive"], regression
 
 
 def shard_folder(folder: Path, shard: tuple[int, int]) -> Path:

@@ -21,6 +21,7 @@ from shipid.hybrid.novelty import alarm_inputs, calibrate_alarm
 from shipid.hybrid.one_step import OneStepCorrector, OutputWeights
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.recurrent import GatedNetwork, RecurrentCorrector, SequenceReader
+from shipid.hybrid.regression import RegressionCorrector, law_terms
 from shipid.hybrid.ridge import smooth_basis
 from shipid.hybrid.units import Units
 from shipid.observer import ESTIMATE_COLUMNS, Observer
@@ -31,9 +32,9 @@ from tests.conftest import ENVELOPE, SPEEDS, pace, variety
 
 KINDS = (
     *("alone", "calibrator", "forest", "hankel-dmd", "learned-force", "modules"),
-    *("one-step", "path-drawn", "path-trained", "recurrent", "kernel"),
+    *("one-step", "path-drawn", "path-trained", "recurrent", "kernel", "regression"),
 )
-STEPPED = ("hankel-dmd", "modules", "one-step")  # corrected by step: they refuse an observer
+STEPPED = ("hankel-dmd", "modules", "one-step", "regression")  # corrected by step: they refuse an observer
 NEEDS_PHYSICS = ("alone", "calibrator", "learned-force", "modules")
 
 
@@ -256,6 +257,14 @@ def _corrector(kind, rng, physics, inputs, instants, slow):
         weights = rng.normal(0, 0.01 * slow, (len(names) + 1, 3))
         law = LinearLaw(inputs.commands, delays, normaliser, weights)
         return HankelCorrector(law, delays * physics.step, {})
+    if kind == "regression":
+        table = feature_table(instants.columns, inputs.commands)
+        names = tuple(name for name in table if not name.endswith("_rw") or name in wind)
+        terms = np.stack(law_terms(table, names))
+        weights = rng.normal(0, 0.01 * slow, (1, len(terms), 3)) / np.abs(terms).max(axis=1)[:, None]
+        reach = slow * rng.uniform([3.0, 1.0, 0.1], [9.0, 3.0, 0.5])
+        current = slow * rng.normal(0, 0.3, (1, 2))
+        return RegressionCorrector(inputs.commands, names, weights, current, -reach, reach, {})
     if kind == "calibrator":
         inputs = TrajectoryInputs(inputs.commands, inputs.memory, int(rng.integers(1, 4)))
     planned = instants if rng.random() < 0.5 else seen

@@ -90,7 +90,7 @@ def test_a_stored_predictor_takes_the_plan(tmp_path: Path, recorded: Callable[..
     """What it predicts from the stored windows is the H of its cell; without a plan it says what it needs."""
     plan, _ = recorded(weaving(), split={"test": 2}, prediction={"ahead": 5.0, "commands": "known"})
     run_here(plan, tmp_path / "run")
-    test, _, _ = store.read_test(tmp_path / "run")
+    test, *_ = store.read_test(tmp_path / "run")
     rows = store.read_rows(tmp_path / "run")
     for row in rows.itertuples():
         predictor = Predictor.load(store.cell_file(tmp_path / "run", str(row.cell)))

@@ -138,9 +138,10 @@ def test_results_are_a_row_for_each_metric_and_each_trial(tiny_run: Path, tmp_pa
 
 
 def test_the_test_windows_come_back_as_they_were(tiny_run: Path, tmp_path: Path) -> None:
-    windows, paths, naive = store.read_test(tiny_run)
-    store.write_test(tmp_path, windows, paths, naive)
-    again, others, floor = store.read_test(tmp_path)
+    windows, paths, naive, regression = store.read_test(tiny_run)
+    store.write_test(tmp_path, windows, paths, naive, regression)
+    again, others, floor, regressed = store.read_test(tmp_path)
+    assert {key: path.tolist() for key, path in regressed.items()} == {k: p.tolist() for k, p in regression.items()}
     np.testing.assert_array_equal(again.future, windows.future)
     np.testing.assert_array_equal(floor, naive)
     assert (again.horizon, again.step, again.shared_clock) == (windows.horizon, windows.step, windows.shared_clock)
