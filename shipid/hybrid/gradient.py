@@ -9,56 +9,53 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import count, pairwise
 from math import ceil
+from typing import Any, cast
 
 import numpy as np
 import optuna
+import torch
+from torch import Tensor
 
-from shipid.hybrid.compensator import Compensator, Layers, Network, flatten_paths, smooth_basis
+from shipid.hybrid.compensator import Compensator, Network, flatten_paths
 from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
-from shipid.hybrid.method import Array, FitResult, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import (
     Search,
     SearchMethod,
     best_trials,
-    mean_squared_error,
     seed_of,
     setting_at_share,
     trial_row,
+    windows_of_folds,
 )
-from shipid.hybrid.training import Learner, Length, StackTraining
+from shipid.hybrid.training import Learner, Length, StackTraining, train_units
 from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
 """Model and number."""
 NARROW = 32  # units up to which a core waits for Python: networks of different widths train faster as one stack
 STACK = 4  # of them; with more nothing is gained
+PARTS = 3  # of the folds: with one for each fold Adam soon finds what only they have in common
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
 
 def tune_gradient(
-    task: Task,
-    method: SearchMethod,
-    inputs: Inputs,
-    length: Length,
-    *,
-    mirror: bool = False,
-    at_once: int = 1,
-    terms: int | None = None,
+    task: Task, method: SearchMethod, inputs: Inputs, length: Length, at_once: int = 1
 ) -> dict[str, FitResult]:
     """Train networks for each foundation.
 
     The objective is the mean validation error over the folds; the compensator is the mean of the fold networks of the
     best trial. The sampler of a trial is seeded by its number.
 
-    mirror : whether networks are symmetric to port and starboard, where the inputs allow it.
-    at_once : trials that are proposed at a time; more than one race. terms : of the polynomials that outputs weigh.
+    at_once : trials that are proposed at a time; more than one race.
     """
-    trainer, search = _Trainer(task, method, inputs, length, mirror, terms), Search(task, task.cases, method)
+    trainer, search = _Trainer(task, inputs, length), Search(task, task.cases, method)
     space = method.space()
     if search.done != search.count:  # a round that was interrupted begins again
         search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
@@ -101,29 +98,12 @@ class _TrialOutcome:
 
 @dataclass(frozen=True, eq=False)
 class _StackMember:
-    """A network in training: its trial and fold, what its inputs are, the scales (d,) that divide them, its data.
-
-    basis : (T, r) [m] that its outputs weigh. floor : mean square [m^2] of the targets to watch that it cannot follow.
-    """
+    """A network in training: its trial and fold, what its inputs are, its data."""
 
     trial: Trial
     fold: int
     varying: VaryingInputs
-    scales: Array
     learner: Learner
-    basis: Array
-    floor: float
-
-    def networks(self, layers: Layers) -> list[Network]:
-        """The network as it predicts, twice as large; with a mirror also its image, whose mean with it is symmetric."""
-        (weight, bias), *others = layers
-        scaled, mirror = weight / self.scales[:, None], self.varying.reflection
-        every: list[Layers] = [((scaled, bias), *others)]
-        if mirror is not None:
-            *hidden, (last, offset) = ((mirror @ scaled, bias), *others)
-            sign = np.repeat([1.0, -1.0], len(offset) // 2)
-            every.append((*hidden, (last * sign, offset * sign)))
-        return [Network(self.varying.features, self.varying.normaliser, self.basis, one) for one in every]
 
 
 _RunningStack = tuple[list[_StackMember], StackTraining]
@@ -132,13 +112,10 @@ _RunningStack = tuple[list[_StackMember], StackTraining]
 class _Trainer:
     """What all trials share: inputs, targets and folds."""
 
-    def __init__(
-        self, task: Task, method: SearchMethod, inputs: Inputs, length: Length, mirror: bool, terms: int | None
-    ) -> None:
-        self.task, self.method, self.inputs, self.length = task, method, inputs, length
-        self.mirror, self.terms = mirror, terms
+    def __init__(self, task: Task, inputs: Inputs, length: Length) -> None:
+        self.task, self.inputs, self.length = task, inputs, length
         self.tables = shared_tables(task, inputs)
-        self.targets = task.targets
+        self.targets = {key: flatten_paths(paths) for key, paths in task.targets.items()}
         self._seen: dict[object, tuple[VaryingInputs, Array]] = {}
         self._again: dict[int, dict[Trial, _TrialOutcome]] = {}
 
@@ -148,21 +125,9 @@ class _Trainer:
         place = (fold, input_table_key(table))
         if place not in self._seen:
             training = {name: values[self.task.folds[fold][0]] for name, values in table.items()}
-            varying = VaryingInputs.of(training, self.mirror)
+            varying = VaryingInputs.of(training, mirror=False)
             self._seen[place] = varying, varying.normaliser.apply(table)
         return self._seen[place]
-
-    def _outputs(self, key: str, fold: int) -> tuple[Array, Array, float]:
-        """Basis (T, r) [m], what it weighs (S, 2 r), about 1 in training, and what validation holds beside [m^2]."""
-        training, validation = self.task.folds[fold]
-        targets, terms = self.targets[key], self.terms
-        if terms is None:  # as in the paper: each step, in metres
-            return np.eye(len(targets)), flatten_paths(targets), 0.0
-        plain = smooth_basis(len(targets), terms)
-        weights = np.tensordot(plain.T, targets, 1)
-        scale = max(float(np.sqrt(np.square(weights[:, training]).mean())), 1e-9)
-        floor = mean_squared_error(np.tensordot(plain, weights, 1)[:, validation], targets[:, validation])
-        return plain * scale, flatten_paths(weights / scale), floor
 
     def _stacks(self, asked: Mapping[Trial, Mapping[str, float]]) -> list[list[_StackMember]]:
         """Members of all trials and folds; those that are alike, and several that are narrow, as one stack."""
@@ -171,18 +136,12 @@ class _Trainer:
         for (key, number), settings in asked.items():
             for fold, (training, validation) in enumerate(self.task.folds):
                 varying, values = self._inputs(key, fold)
-                names = varying.normaliser.names
-                scales = np.array([settings.get(f"{input_group(name)}_scale", 1.0) for name in names])
-                scaled = values if (scales == 1).all() else values / scales
                 seed = seed_of(self.task.seed, number, fold, key)
-                basis, outputs, floor = self._outputs(key, fold)
-                learner = Learner(scaled, outputs, training, validation, settings, seed)
+                learner = Learner(values, self.targets[key], training, validation, settings, seed)
                 narrow = race and settings["units"] <= NARROW
                 alike = (number, fold, input_table_key(self.tables[key]), settings["units"])
-                sizes = (settings["layers"], len(names), len(training), len(validation))
-                mirror = varying.reflection if varying.reflection is None else varying.reflection.tobytes()
-                place = (sizes, mirror, None if narrow else alike)
-                stacks[place].append(_StackMember((key, number), fold, varying, scales, learner, basis, floor))
+                sizes = (settings["layers"], values.shape[1], len(training), len(validation))
+                stacks[sizes, None if narrow else alike].append(_StackMember((key, number), fold, varying, learner))
         return [
             members[start : start + size]
             for place, members in stacks.items()
@@ -199,7 +158,6 @@ class _Trainer:
                     [one.learner for one in members],
                     self.length,
                     order_seed=seed_of(self.task.seed, members[0].trial[1], members[0].fold),
-                    reflection=members[0].varying.reflection,
                     device=self.task.device,
                 ),
             )
@@ -265,17 +223,63 @@ def _stop_worst(running: list[_RunningStack], kept: int) -> set[Trial]:
 
 def _gather_trials(running: list[_RunningStack]) -> dict[Trial, tuple[float, int, tuple[Network, ...]]]:
     """Mean validation loss [m^2] over the folds, the most epochs of a fold, and the networks, for each trial."""
-    ended: dict[Trial, list[tuple[int, float, int, list[Network]]]] = defaultdict(list)
+    ended: dict[Trial, list[tuple[int, float, int, Network]]] = defaultdict(list)
     for members, training in running:
         parts = zip(members, training.losses(), training.best.epochs.tolist(), training.layers(), strict=True)
         for one, loss, epochs, layers in parts:
-            error = float(loss) * np.square(one.basis).sum() / len(one.basis) + one.floor
-            ended[one.trial].append((one.fold, error, epochs, one.networks(layers)))
+            basis = np.eye(one.learner.targets.shape[1] // 2)
+            network = Network(one.varying.features, one.varying.normaliser, basis, layers)
+            ended[one.trial].append((one.fold, float(loss), epochs, network))
     return {
         trial: (
             float(np.mean([loss for _, loss, _, _ in folds])),
             max(epochs for _, _, epochs, _ in folds),
-            tuple(network for _, _, _, networks in sorted(folds, key=lambda fold: fold[0]) for network in networks),
+            tuple(network for _, _, _, network in sorted(folds, key=lambda fold: fold[0])),
         )
         for trial, folds in ended.items()
     }
+
+
+def train_drawn(task: Task, method: Any, drawn: Mapping[str, FitResult]) -> dict[str, FitResult]:
+    """Train the hidden weights of drawn networks; output weights are solved in closed form at every step.
+
+    Variable projection (Golub and Pereyra, 1973), but of the error on runs left out: each step deals the folds anew
+    into `PARTS`, and predicts each part by output weights solved without it. What solves them is learned by heart.
+
+    method : a `PathRefined`. drawn : foundation -> what `path-drawn` gives.
+    """
+    windows, refined = windows_of_folds(task), dict(drawn)
+    rows = part_of_runs(task.windows.run[windows], method.search_windows)
+    for key, table in shared_tables(task, method.inputs(task.commands)).items():
+        fit, start, networks = drawn[key], time.process_time(), []
+        if fit.corrector is None:
+            continue
+        corrector = cast(Compensator, fit.corrector)
+        for row, network in zip(best_trials(fit.trials), corrector.networks, strict=False):
+            left_out = method.left_out(row["params"])
+            taken = {name: values[windows] for name, values in table.items() if input_group(name) not in left_out}
+            seen = VaryingInputs.of(taken, bool(row["params"]["mirror"]))
+            values, mirror = seen.normaliser.apply(taken), seen.reflection
+            mirrors = [np.eye(values.shape[1]), *([] if mirror is None else [mirror])]
+            outputs = flatten_paths(np.tensordot(network.basis.T, task.targets[key][:, windows], 1))
+            dealt = _deal_folds(task.folds, windows[rows], method.epochs, seed_of(task.seed, row["number"]))
+            rate, ridge = method.learning_rate, row["params"]["ridge"]
+            layers = train_units(network.layers[0], mirrors, values, outputs, rows, dealt, rate, ridge)
+            networks.append(replace(network, layers=layers))
+        seconds = fit.seconds + time.process_time() - start
+        corrector = replace(corrector, networks=tuple(networks))
+        refined[key] = replace(fit, corrector=corrector, seconds=seconds, left_out=None)
+    return refined
+
+
+def _deal_folds(
+    folds: Sequence[tuple[Index, Index]], windows: Index, epochs: int, seed: int
+) -> Iterator[list[tuple[Tensor, Tensor]]]:
+    """Masks (S,) of the windows that train, and of those that are judged, for each part of every epoch."""
+    training, judged = (np.stack([np.isin(windows, fold[side]) for fold in folds]) for side in (0, 1))
+    generator = np.random.default_rng(seed)
+    for _ in range(epochs):
+        parts = np.array_split(generator.permutation(len(folds)), min(PARTS, len(folds)))
+        yield [
+            (torch.from_numpy(training[one].all(axis=0)), torch.from_numpy(judged[one].any(axis=0))) for one in parts
+        ]

@@ -18,6 +18,7 @@ from shipid.hybrid.method import Method
 from shipid.hybrid.modules import Modules
 from shipid.hybrid.one_step import OneStep
 from shipid.hybrid.path_drawn import PathDrawn
+from shipid.hybrid.path_refined import PathRefined
 from shipid.hybrid.path_trained import PathTrained
 from shipid.hybrid.recurrent import Recurrent
 from shipid.hybrid.regression import Regression
@@ -32,6 +33,7 @@ METHODS: dict[str, type[Method]] = {
     "modules": Modules,
     "one-step": OneStep,
     "path-drawn": PathDrawn,
+    "path-refined": PathRefined,
     "path-trained": PathTrained,
     "recurrent": Recurrent,
     "regression": Regression,

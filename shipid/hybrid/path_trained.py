@@ -30,13 +30,8 @@ class PathTrained(SearchMethod):
     batch : samples per optimiser step; 0 = all.
     patience : epochs without a better validation loss after which training stops; 0 = never.
     memory : what the inputs hold of the past.
-    mirror : whether port and starboard are mirror images, where the inputs allow it.
-    groups : range of the scales, one for each kind of input (motion, command, wind, and of the memory), that divide
-        the inputs in their standard deviations: searched by their logarithm. None: all are 1.
     at_once : trials that are proposed at a time. More than one race: the better half goes on, after 1/16, 1/8, ... of
         the epochs.
-    terms : the compensation is a polynomial of time with so many terms, and the outputs of the networks are about 1.
-        None, as in the paper: an output for each step, in metres.
     """
 
     SEARCHED: ClassVar[tuple[str, ...]] = (
@@ -61,16 +56,7 @@ class PathTrained(SearchMethod):
     batch: NonNegativeInt = 0
     patience: NonNegativeInt = 200
     memory: Memory = Memory()
-    mirror: bool = False
-    groups: tuple[PositiveFloat, PositiveFloat] | None = None
     at_once: PositiveInt = 1
-    terms: PositiveInt | None = None
-
-    def ranges(self) -> dict[str, tuple[float, float]]:
-        """Return what is to be searched: name -> (low, high), the scales of the groups of inputs too."""
-        memory = self.memory.kinds
-        groups = ("motion", "command", "wind", *memory) if self.groups else ()
-        return super().ranges() | {f"{name}_scale": self.groups for name in groups if self.groups}
 
     @property
     def together(self) -> bool:
@@ -83,4 +69,4 @@ class PathTrained(SearchMethod):
         from shipid.hybrid.training import Length
 
         inputs, length = Inputs(task.commands, self.memory), Length(self.epochs, self.batch, self.patience)
-        return tune_gradient(task, self, inputs, length, mirror=self.mirror, at_once=self.at_once, terms=self.terms)
+        return tune_gradient(task, self, inputs, length, self.at_once)

@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from shipid.hybrid.compensator import Layers
-from shipid.hybrid.method import Array
+from shipid.hybrid.method import Array, Index
 
 Stack = Sequence[tuple[Tensor, Tensor]]
 Shapes = Mapping[str, tuple[int, ...]]
@@ -76,7 +76,6 @@ class StackTraining:
     learners : with as many layers, inputs, outputs and samples each. Narrower ones are padded: what is added to a
         weight is 0, and stays 0.
     order_seed : of the order of the samples in batches, the same for all.
-    reflection : (d, d) of inputs, image = inputs @ it: x is made even and y odd; None without a mirror.
     device : a PyTorch device; random numbers are drawn on the CPU.
 
     A member that diverges keeps its best weights before that; others go on.
@@ -88,7 +87,6 @@ class StackTraining:
         length: Length,
         *,
         order_seed: int = 0,
-        reflection: Array | None = None,
         device: str = "cpu",
     ) -> None:
         self.learners = learners
@@ -99,7 +97,7 @@ class StackTraining:
         dropout = [
             [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(self.widest) - 2))
         ]
-        (x, y), watched = (self._samples(part, reflection, device) for part in ("training", "validation"))
+        (x, y), watched = (self._samples(part, device) for part in ("training", "validation"))
         num_samples = y.shape[1]
         generators = [torch.Generator().manual_seed(int(one.seed)) for one in learners]
         order = torch.Generator().manual_seed(order_seed)
@@ -107,15 +105,12 @@ class StackTraining:
         layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, self.widest)]  # leaves
 
         def loss(rows: Tensor | slice) -> Tensor:
-            seen = torch.cat([side[:, rows] for side in x], dim=1)
+            seen = x[:, rows]
             masks = [  # for the input of each layer, or None where no member drops any
                 draw_dropout(rates, seen.shape[1], sizes, generators).to(device) if any(rates) else None
                 for rates, *sizes in zip(dropout, *widths, strict=False)
             ]
-            return _stack_losses(stack_outputs(seen, layers, masks), y[:, rows], len(x) == 2)
-
-        def watch() -> Tensor:
-            return _stack_losses(stack_outputs(torch.cat(watched[0], dim=1), layers), watched[1], len(x) == 2)
+            return _stack_losses(stack_outputs(seen, layers, masks), y[:, rows])
 
         batch = min(length.batch or num_samples, num_samples)
         self.best = BestEpochs(weights, length.patience)
@@ -132,16 +127,13 @@ class StackTraining:
             ),
             rate=lambda _: learning,
             loss=loss,
-            watched=watch,
+            watched=lambda: _stack_losses(stack_outputs(watched[0], layers), watched[1]),
         )
 
-    def _samples(self, part: str, reflection: Array | None, device: str) -> tuple[list[Tensor], Tensor]:
-        """Inputs (K, n, d) of `training` or `validation`, then their images if there is a mirror; targets (K, n, m)."""
-        rows = [(one, getattr(one, part)) for one in self.learners]
-        plain = np.stack([one.inputs[mine] for one, mine in rows])
-        both = [plain] if reflection is None else [plain, plain @ reflection]
-        targets = np.stack([one.targets[mine] for one, mine in rows])
-        return [_single_tensor(side, device) for side in both], _single_tensor(targets, device)
+    def _samples(self, part: str, device: str) -> tuple[Tensor, ...]:
+        """Inputs (K, n, d) and targets (K, n, m) of `training` or `validation`."""
+        pairs = [(one.inputs[rows], one.targets[rows]) for one in self.learners for rows in (getattr(one, part),)]
+        return tuple(_single_tensor(np.stack(side), device) for side in zip(*pairs, strict=True))
 
     def advance(self, epochs: int | None = None) -> None:
         """Train for so many further epochs, by default to the end."""
@@ -167,18 +159,9 @@ class StackTraining:
         )
 
 
-def _stack_losses(made: Tensor, targets: Tensor, mirrored: bool) -> Tensor:
-    """Mean squared errors (K,) of outputs (K, n, m); mirrored ones (K, 2 n, m) are followed by those of the images."""
-    if mirrored:
-        made = mirrored_outputs(made)
+def _stack_losses(made: Tensor, targets: Tensor) -> Tensor:
+    """Mean squared errors (K,) of outputs (K, n, m)."""
     return (made - targets).square().mean(dim=(1, 2))
-
-
-def mirrored_outputs(made: Tensor) -> Tensor:
-    """Outputs (..., n, 2 r), x made even and y odd, of those of inputs and then of their images (..., 2 n, 2 r)."""
-    sign = torch.tensor([1.0, -1.0], device=made.device).repeat_interleave(made.shape[-1] // 2)
-    plain, image = made.chunk(2, dim=-2)
-    return (plain + sign * image) / 2
 
 
 def minimise_losses(
@@ -262,6 +245,63 @@ class Adam:
         spread = self.second.sqrt().mul_((1 - BETA_2**self.count) ** -0.5).add_(EPSILON)
         self.weights.mul_(1 - rate * self.decay)
         self.weights.addcdiv_(self.first * rate, spread, value=-1 / (1 - BETA_1**self.count))
+
+
+def train_units(
+    layer: tuple[Array, Array],
+    mirrors: Sequence[Array],
+    values: Array,
+    outputs: Array,
+    rows: Index,
+    dealt: Iterable[Sequence[tuple[Tensor, Tensor]]],
+    learning_rate: float,
+    ridge: float,
+) -> Layers:
+    """Train the weight (d, M) and offset (M,) of hidden units, a step of Adam for each list of parts.
+
+    The output weights of a step are solved with a ridge [m^2] on a part, and judged by another; in the end, on all.
+
+    mirrors : (d, d) of inputs, the identity first, for each block of the units; with two, x is made of even units, y of
+        odd ones. values, outputs : (S, d), normalised, and (S, 2 r) [m]. rows : windows that train.
+    dealt : masks of these rows, of the windows that solve and of those that judge.
+    """
+    sides = [torch.from_numpy(values @ mirror) for mirror in mirrors]
+    targets = torch.from_numpy(outputs).chunk(len(mirrors), dim=1)
+    first = [torch.from_numpy(part).chunk(len(mirrors), dim=-1)[0] for part in layer]
+    weights = torch.cat([part.flatten() for part in first])[None]
+    leaves = [leaf.requires_grad_() for leaf in split_layers(weights, [part.shape for part in first])]
+    adam, size = Adam(weights, [0.0]), len(layer[1]) ** 0.5
+
+    def weighed(rows: Index | slice) -> Iterator[tuple[Tensor, Tensor]]:
+        """Features (S, M) and what they make, for x and y."""
+        units = [torch.tanh(side[rows] @ leaves[0][0] + leaves[1]) / size for side in sides]
+        parts = units if len(units) == 1 else [units[0] + units[1], units[0] - units[1]]
+        return zip(parts, [side[rows] for side in targets], strict=True)
+
+    with threadpool_limits(1):
+        for parts in dealt:
+            errors = [
+                made[judged] @ _ridge_solution(made[rest], wanted[rest], ridge * len(rows) / len(values))
+                - wanted[judged]
+                for made, wanted in weighed(rows)
+                for rest, judged in parts
+            ]
+            gradients = torch.autograd.grad(torch.cat(errors).square().sum(), leaves)
+            with torch.no_grad():
+                adam.step(torch.cat([one.flatten() for one in gradients])[None], torch.tensor([[learning_rate]]))
+        solved = [_ridge_solution(made, wanted, ridge).detach().numpy() / size for made, wanted in weighed(slice(None))]
+    weight, offset = (leaf[0].detach().numpy() for leaf in leaves)
+    blocks = [solved, *([one, -other] for one, other in [solved][: len(mirrors) - 1])]
+    last = np.concatenate([np.concatenate(block, axis=1) for block in blocks])
+    inner = np.concatenate([mirror @ weight for mirror in mirrors], axis=1)
+    return (inner, np.tile(offset, len(mirrors))), (last, np.zeros(last.shape[1]))
+
+
+def _ridge_solution(features: Tensor, targets: Tensor, ridge: float) -> Tensor:
+    """Weights (M, K) of features (S, M) that minimise |targets - features W|^2 + ridge |W|^2."""
+    gram = features.T @ features + ridge * torch.eye(features.shape[1], dtype=features.dtype)
+    solved: Tensor = torch.linalg.solve(gram, features.T @ targets)
+    return solved
 
 
 class BestEpochs:
@@ -413,4 +453,9 @@ def _mirrored_loss(
 ) -> Tensor:
     """Mean squared error (1,) of the network on outputs (S, 2 r); with an image, x is made even and y odd."""
     past, now = (torch.cat(arrays, dim=-2) for arrays in zip(*seen, strict=True))
-    return _stack_losses(network(past, now)[None], outputs[None], len(seen) == 2)
+    made = network(past, now)
+    if len(seen) == 2:
+        sign = torch.tensor([1.0, -1.0]).repeat_interleave(made.shape[1] // 2)
+        plain, image = made.chunk(2)
+        made = (plain + sign * image) / 2
+    return _stack_losses(made[None], outputs[None])
