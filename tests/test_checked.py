@@ -33,6 +33,7 @@ MADE: list[type[BaseModel]] = [
 def test_an_unknown_argument_is_one_line(kind: Any) -> None:
     with pytest.raises(DocumentError, match=rf"^{kind.__name__}\.typo: unknown key: [^\n]+$"):
         kind(typo=1)
+    assert kind.model_config["frozen"]
 
 
 @pytest.mark.parametrize(

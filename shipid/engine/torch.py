@@ -118,7 +118,7 @@ def lower_function(function: ca.Function) -> LoweredFunction:
     """
     printed = print_function(function, STAGES, PYTORCH)
     last = len(STAGES)
-    space: dict[str, Any] = {**_NAMES, "_stack": _stack_channels, "_channels": _split_saved}
+    space: dict[str, Any] = {**_NAMES, "_stack": _stack_broadcast, "_channels": _split_saved}
     for number in range(last + 1):
         arguments = ", ".join([*printed.inputs(number), *(f"s{earlier}" for earlier in range(number))])
         saved = "" if number == last else ", ".join(printed.saved[number])
@@ -135,7 +135,7 @@ def _split_saved(saved: torch.Tensor) -> Any:
     return saved.unbind(0) if saved.requires_grad else saved
 
 
-def _stack_channels(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
+def _stack_broadcast(inputs: Sequence[torch.Tensor], values: Sequence[Any]) -> torch.Tensor:
     """Numbers and tensors as one tensor (num_values, ...), in the broadcast shape of the inputs."""
     shape = np.broadcast_shapes(*(channels.shape[1:] for channels in inputs))
     like = inputs[0]
@@ -199,11 +199,11 @@ def _lower_step(model: Dynamics, method: Method, step: float, rows: tuple[int, .
                 entries = left.pop(0) if arrays is None else arrays.to(tau)
                 wrench = function.main(*wide, entries, *(part.unsqueeze(-1) for part in early))
                 total = [a + _sum_components(b, entries.shape[-1]) for a, b in zip(total, wrench, strict=True)]
-            return _stack_channels([state], functions[0].main(state, memory, total, *saved[0]))
+            return _stack_broadcast([state], functions[0].main(state, memory, total, *saved[0]))
 
         def advance(memory: torch.Tensor, dt: float) -> torch.Tensor:
             time = [torch.full_like(greatest, dt)]
-            return _stack_channels([memory], functions[1].main(x, memory, time, *saved[1])) if len(memory) else memory
+            return _stack_broadcast([memory], functions[1].main(x, memory, time, *saved[1])) if len(memory) else memory
 
         both = torch.cat(integrate_step(rates, advance, lambda state, a, k: state + a * k, x, m, step, method))
         speed = torch.maximum(greatest, both[speeds].abs().amax(0)) + 0 * both.sum(0)  # keeps what is not finite
