@@ -241,7 +241,7 @@ class Predictor(DeployedMethod):
         return np.asarray(raised | self._is_unsettled(known, raised.shape))
 
     def diverges(self, instants: Instants) -> Array:
-        """Return whether the physics diverges from each instant (S,): its path is no faster than the ship."""
+        """Return whether the physics diverges from each instant (S,): its path keeps its last velocity."""
         return np.asarray(self.physics_with_force.variant_paths(self._known(instants))[1][0])
 
     def outside(self, columns: Mapping[str, Array]) -> Array:

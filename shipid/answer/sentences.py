@@ -174,7 +174,7 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
         verb, (training, test) = plural_word(len(lost), "diverges", "diverge"), lost.filter(like="diverged_").sum()
         yield (
             f"{model_list(lost['model'])} {verb} on {training:.0f} training and {test:.0f} test windows: a path then "
-            "is no faster than the ship is at the instant."
+            "keeps its last velocity, no farther than the present speed takes the ship."
         )
     if floor := sorted(results.aside - results.saw_test):
         yield (

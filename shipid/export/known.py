@@ -14,7 +14,7 @@ from casadi import MX
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.export.equations import Equations, rollout_records, split_by_name, symbols_of
 from shipid.hybrid.features import MOTIONS, PLAN_PARTS, Inputs, count_steps
-from shipid.hybrid.physics import ROUNDING, Physics
+from shipid.hybrid.physics import Physics
 from shipid.observer import ESTIMATE_COLUMNS, filter_bank, moves_start
 from shipid.physics.signals import direct_inputs
 
@@ -169,13 +169,16 @@ class PredictorInputs:
             way += column_of_entries(self.seen, ("current_north", "current_east")) @ ages.T
         path = turn_vectors(way, -self.now["psi"])
         places, last = [MX(np.zeros(2))], self.physics.step * column_of_entries(self.now, "uv")
-        before, sound, limit = places[0], MX(1), last.T @ last * (1 + ROUNDING) ** 2
+        before, sound = places[0], MX(1)
+        reach = _row_lengths(last) @ ca.DM(np.arange(1, path.shape[1] + 1)).T
         for place in ca.horzsplit(path):
             step = place - before
-            sound = ca.logic_and(sound, step.T @ step <= limit)
+            sound = ca.logic_and(sound, step.T @ step <= (SPEED_LIMIT * self.physics.step) ** 2)
             last, before = ca.if_else(sound, step, last), place
             places.append(ca.if_else(sound, place, places[-1] + last))
-        return ca.if_else(self._slow(self.records), path, ca.horzcat(*places[1:]))
+        held = ca.horzcat(*places[1:])
+        held *= ca.repmat(reach / ca.fmax(_row_lengths(held), reach), 2, 1)
+        return ca.if_else(self._slow(self.records), path, held)
 
     @property
     def diverges(self) -> MX:
@@ -275,3 +278,8 @@ def feature_expressions(now: NamedExpressions, commands: Sequence[str]) -> dict[
         table["u_rw"] = now["u"] - now["V_w"] * ca.cos(angle)
         table["v_rw"] = now["v"] - now["V_w"] * ca.sin(angle)
     return table | {name: now[name] for name in direct_inputs(now)}
+
+
+def _row_lengths(places: MX) -> MX:
+    """Lengths (1, T) of places (2, T), above 0: the root of 0 has no derivative."""
+    return ca.sqrt(ca.fmax(ca.sum1(places**2), 1e-300))

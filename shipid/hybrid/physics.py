@@ -20,7 +20,7 @@ from shipid.data.windows import Instants, PathSource, from_frame, to_frame
 from shipid.engine.engines import AUTO, REPEATED
 from shipid.engine.gradient import rollout_gradient, squared_distance_loss
 from shipid.engine.integrate import Method as Integrator
-from shipid.engine.rollout import Distances, Trajectories, rollout, rollout_distances
+from shipid.engine.rollout import SPEED_LIMIT, Distances, Trajectories, rollout, rollout_distances
 from shipid.errors import DataError, ShipidError
 from shipid.metrics import vector_lengths
 from shipid.observer import ESTIMATE_COLUMNS, Observer, filter_bank, observed_start
@@ -32,7 +32,6 @@ from shipid.vessel.load import Vessel
 Array = np.ndarray
 MOTION = ("u", "v", "r", "psi")
 ESTIMATED = tuple(f"observer.{name}" for name in ESTIMATE_COLUMNS)
-ROUNDING = 1e-6  # of a step: a first step by the present velocity is as long as it
 REPEATED_FROM = 5_000  # steps of one rollout: who asks for so many at once, in training or on a log, asks again
 RolloutInputs = tuple[dict[str, Array], Mapping[str, Array], Mapping[str, Array], Array | None, Array | None]
 """Start, commands, environment, slow force (T, S, n_dof) and drift (2, S) of a rollout."""
@@ -85,7 +84,7 @@ class Physics:
     ) -> tuple[Array, Array]:
         """Paths (T, V, S, 2) [m] in the frame (11) of V variants, `parameters` (V, P), and which diverged (V, S).
 
-        One that diverges is nowhere faster than the ship is now, see `hold_velocity`. It is no number where an input is
+        From where one diverges it keeps its last velocity, see `hold_velocity`. It is no number where an input is
         none. What the columns do not hold is zero: see `missing_columns`. Without physics there is one, zero.
         """
         check_instants(instants)
@@ -94,8 +93,8 @@ class Physics:
         result, (north, east), lost = self._rollout(instants, ("north", "east"), parameters, device)
         paths = np.stack(_positions_in_frame(instants, north, east), axis=-1)
         begun = self.step * np.stack([instants.columns.get(name, 0 * lost) for name in ("u", "v")], axis=-1)
-        bad = result.diverged
-        paths[:, bad] = hold_velocity(paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad])
+        bad, limit = result.diverged, SPEED_LIMIT * self.step
+        paths[:, bad] = hold_velocity(paths[:, bad], np.broadcast_to(begun, paths.shape[1:])[bad], limit)
         return paths + lost[:, None], bad
 
     def states(self, instants: Instants, *, engine: str = AUTO) -> dict[str, Array]:
@@ -249,19 +248,23 @@ class Physics:
         return start, commands, environment, slow, drift
 
 
-def hold_velocity(paths: Array, begun: Array) -> Array:
-    """Paths (T, ..., 2) [m] from the origin that repeat their last step from where one is longer than the step begun.
+def hold_velocity(paths: Array, begun: Array, limit: float) -> Array:
+    """Paths (T, ..., 2) [m] from the origin that repeat their last sound step from where a step is none.
 
-    begun : (..., 2) [m], what the present velocity makes: so no path is longer than the way that the ship would go on.
+    No place is farther from the origin than the step `begun` takes the ship by then; it lies on the line to it.
+
+    begun : (..., 2) [m], by the present velocity; repeated where the first step is none. limit : [m], no sound step is
+        longer.
     """
     places = np.concatenate([np.zeros_like(paths[:1]), paths])
-    with np.errstate(all="ignore"):  # a step from infinity to infinity
+    with np.errstate(all="ignore"):  # a step from infinity to infinity, a place at the origin
         steps = np.concatenate([begun[None], np.diff(places, axis=0)])
-    limit = vector_lengths(begun) * (1 + ROUNDING)
-    sound = np.logical_and.accumulate(vector_lengths(steps[1:]) <= limit)[..., None]
-    last = sound.sum(axis=0, keepdims=True)
-    place, step = (np.take_along_axis(each, last, axis=0) for each in (places, steps))
-    return np.where(sound, paths, place + np.cumsum(~sound, axis=0) * step)
+        sound = np.logical_and.accumulate(vector_lengths(steps[1:]) <= limit)[..., None]
+        last = sound.sum(axis=0, keepdims=True)
+        place, step = (np.take_along_axis(each, last, axis=0) for each in (places, steps))
+        held = np.where(sound, paths, place + np.cumsum(~sound, axis=0) * step)
+        reach = np.multiply.outer(np.arange(1, len(held) + 1), vector_lengths(begun))
+        return np.asarray(held * np.fmin(reach / vector_lengths(held), 1.0)[..., None])
 
 
 def _place_of_instants(instants: Instants) -> tuple[Array, Array, Array]:

@@ -144,15 +144,12 @@ def limits_in_words(predictor: Predictor, dataset: Dataset, diverged: pd.Series[
     """Why errors along a log may mislead: its runs trained the predictor, or the physics diverges from instants."""
     trained = set(predictor.provenance.get("runs", ())).intersection(dataset.runs)
     many = f"{len(trained)} of {len(dataset.runs)} {plural_word(len(dataset.runs), 'run')}"
-    share = percent_text(diverged.mean(), 1)
-    return [
-        *([f"{many} trained this predictor, by their names: errors there are no evidence"] if trained else []),
-        *(
-            [f"physics diverges on {share} of the instants: paths there are no faster than the ship is then"]
-            if diverged.any()
-            else []
-        ),
-    ]
+    lost = f"physics diverges on {percent_text(diverged.mean(), 1)} of the instants"
+    texts = (
+        f"{many} trained this predictor, by their names: errors there are no evidence" if trained else "",
+        f"{lost}: paths there go no farther than the present speed takes the ship" if diverged.any() else "",
+    )
+    return [*filter(None, texts)]
 
 
 def _errors_in_words(error: Array, step: float) -> str:

@@ -251,7 +251,7 @@ def _test_errors(
     if lost.any():
         share = f"physics diverges on {percent_text(lost.mean(), 1)} of the test windows"
         sentence = "; ".join(
-            filter(None, [sentence, f"{share}: paths there are no faster than the ship is at the instant"])
+            filter(None, [sentence, f"{share}: paths there go no farther than the present speed takes the ship"])
         )
     return {**outcome, "status": "ok", "sentence": sentence}, paths
 

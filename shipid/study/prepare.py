@@ -343,7 +343,7 @@ def _roll_out(
                 continue
             finished[foundation.name] = (foundation, paths)
             if lost:
-                notes.append(f"{words}: its path there is no faster than the ship is at the instant")
+                notes.append(f"{words}: its path goes on there, no farther than the present speed takes the ship")
         waiting = again
     pool, test = (np.zeros_like(part.future) for part in parts)
     zeros = PathsOfParts(pool, test, (np.zeros(len(parts[0]), bool), np.zeros(len(parts[1]), bool)))
