@@ -174,12 +174,12 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
         verb, (training, test) = plural_word(len(lost), "diverges", "diverge"), lost.filter(like="diverged_").sum()
         yield (
             f"{model_list(lost['model'])} {verb} on {training:.0f} training and {test:.0f} test windows: a path then "
-            "keeps its last velocity, and its error is limited to the distance run."
+            "keeps its last velocity, and its error counts as the distance run at most, which nobody aboard can see."
         )
     if floor := sorted(results.aside - results.saw_test):
         yield (
-            f"{model_list(floor)} is set aside ([claims] nominal): the base as it is, the floor for models made worse; "
-            "it is shown, but counted in no other sentence."
+            f"{model_list(floor)} is set aside ([claims] nominal): the base as it is, the floor for models made worse. "
+            "It is in figures, tables and bands, but not among the models compared above."
         )
     saw = families_set_from(results.plan, results.test.spans)
     if saw:
