@@ -28,7 +28,7 @@ from shipid.study.run import run_study
 Known = tuple[float, float, float]  # a number of one world with its interval, as logarithms
 METRICS = ("H", "H_end")
 FIRST_SEED, PLAIN = 57_2026, 0.2  # PLAIN: a mean gain over worlds from which on an effect is plain
-HEAD = """| number | N_D | held [%] | width / spread | width (log) | plain gains shown [%] | pairs disjoint [%] |
+HEAD = """| number | N_D | held [%] | width / spread | width (log) | plain gains shown [%] (of models) | disjoint [%] |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: |"""
 
 
@@ -100,7 +100,10 @@ def measure_intervals(worlds: list[dict[str, ErrorTable]]) -> list[str]:
         every, world = np.concatenate(held), np.concatenate([np.arange(len(one)) for one in held])
         low, high = share_interval(every, world)
         numbers_ = [f"{100 * every.mean():.0f} [{100 * low:.0f}, {100 * high:.0f}]", f"{np.nanmedian(width):.2f}"]
-        numbers_ += [f"{np.nanmedian(wide):.2f}", "" if np.isnan(shown).all() else f"{100 * np.nanmean(shown):.0f}"]
+        numbers_ += [
+            f"{np.nanmedian(wide):.2f}",
+            "" if np.isnan(shown).all() else f"{100 * np.nanmean(shown):.0f} ({np.isfinite(shown).sum()})",
+        ]
         numbers_ += [f"{100 * np.mean(apart):.1f}" if kind == "break-even" else ""]
         lines.append(f"| {kind} | {amount} | {' | '.join(numbers_)} |")
     return lines

@@ -256,11 +256,10 @@ def document_differences(plans: Sequence[Plan], called: Sequence[Mapping[str, st
         }
         for plan, names in zip(plans, called or [{}] * len(plans), strict=True)
     ]
-    words = {
-        path: [ABSENT if one is None else one if isinstance(one, str) else json.dumps(one) for one in values]
+    rows = [
+        [path, *(ABSENT if one is None else one if isinstance(one, str) else json.dumps(one) for one in values)]
         for path, values in _differing_values(whole, "")
-    }
-    rows = [[path, *values] for path, values in words.items()]
+    ]
     return pd.DataFrame(rows, columns=["path", *map(str, range(len(plans)))])
 
 

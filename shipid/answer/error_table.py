@@ -266,8 +266,11 @@ def break_even(table: ErrorTable, models: Sequence[str], place: int) -> Estimate
     harder = table.compare([[(1 / len(models), model, PHYSICS_ONLY) for model in models]])  # all A rise together
     wide = np.hypot(np.log([found.value / found.low, found.high / found.value]), (harder.high - harder.low) / 2)
     low, high = np.clip(found.value * np.exp(wide * [-1, 1]), *found.limits)
-    known = (found.low if found.low >= A[-1] else low, found.high if found.high <= A[0] else high)
-    return replace(found, low=min([known[0], *A[lead.low <= 0]]), high=max([known[1], *A[lead.high >= 0]]))
+    return replace(
+        found,
+        low=min([found.low if found.low >= A[-1] else low, *A[lead.low <= 0]]),
+        high=max([found.high if found.high <= A[0] else high, *A[lead.high >= 0]]),
+    )
 
 
 def runs_without_physics(table: ErrorTable, model: str, place: int) -> Estimate:

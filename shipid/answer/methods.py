@@ -165,9 +165,10 @@ def sentences_on_worlds(plan: Plan, cells: pd.DataFrame) -> list[str]:
         return []
     mine = cells[cells["method"].eq(verdict_method(plan)) & ~cells["family"].isin(uncounted_families(plan))]
     mine = mine[mine["status"].eq("ok") & mine["N_D"].isin([cells["N_D"].min(), cells["N_D"].max()])]
-    by_world = np.log(mine.astype({"H_end": float}).groupby(["condition", "N_D", "family", "world"])["H_end"].mean())
+    mine = mine.astype({"H_end": float}).sort_values("N_D", ascending=False, kind="stable")  # the largest comes first
+    by_world = np.log(mine.groupby(["condition", "N_D", "family", "world"], sort=False)["H_end"].mean())
     sentences = []
-    for (condition, N_D, family), logs in by_world.groupby(level=[0, 1, 2]):
+    for (condition, N_D, family), logs in by_world.groupby(level=[0, 1, 2], sort=False):
         pure, count = (
             by_world[by_world.index.isin([(condition, N_D, NO_MODEL, world) for *_, world in logs.index])],
             len(logs),

@@ -171,15 +171,19 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
     counts = results.models.filter(like="diverged_").sum(axis=1)
     if counts.any():
         lost = results.models[counts > 0]
-        verb, (training, test) = plural_word(len(lost), "diverges", "diverge"), lost.filter(like="diverged_").sum()
+        training, test = lost.filter(like="diverged_").sum()
         yield (
-            f"{model_list(lost['model'])} {verb} on {training:.0f} training and {test:.0f} test windows: a path then "
-            "keeps its last velocity, no farther than the present speed takes the ship."
+            f"The physics of {model_list(lost['model'])} diverges on {training:.0f} training and {test:.0f} test "
+            "windows: a path then keeps its last velocity, no farther than the present speed takes the ship."
         )
+    cells = results.cells[results.cells["family"].isin(fitted_families(results.plan))]
+    if len(bad := cells["model"][cells["sentence"].str.contains("physics diverges")]):
+        where = f"on test windows of {counted_text(len(bad), 'cell')}"
+        yield f"Fitted to the runs, that of {model_list(bad.unique())} diverges {where}, where paths go on in the same way."
     if floor := sorted(results.aside - results.saw_test):
         yield (
-            f"{model_list(floor)} is set aside ([claims] nominal): the base as it is, the floor for models made worse; "
-            "it is shown, but counted in no other sentence."
+            f"The family {model_list(floor)} is set aside ([claims] nominal): the base as it is, the floor for models "
+            "made worse. It is in figures, tables and bands, but not among the models compared above."
         )
     saw = families_set_from(results.plan, results.test.spans)
     if saw:

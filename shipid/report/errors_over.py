@@ -218,7 +218,7 @@ def _takeaway_horizon(content: ReportContent, means: pd.DataFrame, size: int) ->
     )
     text += "on average" + (f", its physics alone {metres_text(alone[best])}" if best in alone.index else "")
     rival = pure and pure != best and pure in together.index
-    return text + (f"; {in_words(pure)} {metres_text(together[pure])}." if rival else ".")
+    return text + (f"; {in_words(pure)} {metres_text(together[pure])}: means, without a test." if rival else ".")
 
 
 def _worst_instant(content: ReportContent, means: pd.DataFrame) -> Any | None:
@@ -251,7 +251,11 @@ def error_by_kind(content: ReportContent) -> PageTable:
         f"{row['kind']}: {number_text(row['end'])} m at the horizon, H {number_text(row['mean'])} m ({row['model']})"
         for row in best.to_dict("records")
     ]
-    takeaway = f"Least error on the test {of}: {'; '.join(parts)}." if parts else "No model with data has a result."
+    takeaway = (
+        f"Least mean on the test itself, which nobody can choose by, {of}: {'; '.join(parts)}."
+        if parts
+        else "No model with data has a result."
+    )
     shown = frame.assign(how=how, model=frame.model.where(frame.model.ne("naive"), ""))
     return frame_table("kinds", "Errors by kind of run", takeaway, shown, KIND_COLUMNS)
 

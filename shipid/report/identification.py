@@ -373,12 +373,6 @@ def programme_table(content: IdentificationContent) -> PageTable:
     return frame_table("programme", "Candidates", takeaway, shown, PROGRAMME_COLUMNS)
 
 
-def errors_by_side(content: IdentificationContent) -> PageTable:
-    """Errors by side, helm and speed."""
-    runs = "Runs held out" if content.held_out else "Fitted runs"
-    return group_errors(content.groups, f"{runs}, over the horizon of the fit.")
-
-
 IDENTIFICATION_PAGE = {
     "what-is-known": Section(
         "What is known",
@@ -400,7 +394,12 @@ IDENTIFICATION_PAGE = {
     "what-is-left": Section(
         "What is left over",
         {
-            "sides": (errors_by_side, "groups"),
+            "sides": (
+                lambda one: group_errors(
+                    one.groups, f"{'Runs held out' if one.held_out else 'Fitted runs'}, over the horizon of the fit."
+                ),
+                "groups",
+            ),
             "residuals": (residuals_figure, "colours"),
             "profiles": (profiles_figure, "profiles"),
         },

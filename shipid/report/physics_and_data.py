@@ -384,7 +384,7 @@ def _takeaway_sizes(content: ReportContent, learned: pd.DataFrame) -> str:
         known = known or f"errors run from {metres_text(mine.min())} to {metres_text(mine.max())}"
         parts.append(f"with N_D = {size} {known}")
     best = f" {content.best} is the best in validation." if content.best else ""
-    return f"{words}, {'; '.join(parts)}.{best}"
+    return f"{words}, by means, without a test: {'; '.join(parts)}.{best}"
 
 
 WHAT_PHYSICS_AND_DATA_BUY = Section(

@@ -20,7 +20,7 @@ from shipid.engine.engines import REPEATED
 from shipid.errors import DocumentError, suggest_name
 from shipid.evidence import SIGNIFICANT, holm_correction
 from shipid.hybrid.physics import check_columns
-from shipid.metrics import BINS, cap_paths, position_error, rank_correlation, summarise_errors, tally_quantile
+from shipid.metrics import BINS, position_error, rank_correlation, summarise_errors, tally_quantile
 from shipid.study.plan import Plan
 from shipid.study.prepare import instants_of, not_measured, partition, physics_of
 from shipid.vessel.load import Vessel
@@ -66,8 +66,8 @@ def screen(
     """Roll `count` members of each family out on all windows of a study, pool and test; yield the rows block by block.
 
     A row has family, member, accuracy A (method, eq. 14) and A_90 [m] over all windows (exact to 0.2 %), the share of
-    windows on which the member diverged (their errors count as in a study, see `cap_paths`), and the factor on the base
-    of each drawn parameter. Members are those that the study itself draws, none redrawn.
+    windows on which the member diverged (their paths go on as in a study, see `hold_velocity`), and the factor on the
+    base of each drawn parameter. Members are those that the study itself draws, none redrawn.
 
     engine : as of `rollout`; "single" takes half the time and gives A to about six digits.
     cut : the windows of the study as of `partition`, where they are cut already.
@@ -121,8 +121,8 @@ def _rows_of_block(
             errors = []
             for windows in parts:
                 instants = instants_of(plan.study, vessel, dataset, windows)
-                paths, lost = physics_of(plan.study, vessel).variant_paths(instants, values[[k]], device)
-                errors.append(position_error(cap_paths(paths[:, 0], windows.future, lost[0]), windows.future))
+                paths, _ = physics_of(plan.study, vessel).variant_paths(instants, values[[k]], device)
+                errors.append(position_error(paths[:, 0], windows.future))
             known: Mapping[str, Any] = summarise_errors(np.concatenate(errors, axis=1))
             mean[k], p90[k] = known["mean"], known["p90"]
     rows: dict[str, Any] = {

@@ -123,7 +123,7 @@ def test_a_study_of_several_worlds_has_an_interval_over_them(worlds: int, condit
     study.repeat = {"split.test": [["a"], ["b"], ["c"]]}
     assert not sentences_on_worlds(plan, pd.DataFrame(rows)), "tests in turn are no worlds"
     wide = stats.t.ppf(0.975, worlds - 1) * (np.log(2) * np.arange(worlds)).std(ddof=1) / worlds**0.5
-    mean = 0.5 * 2**1.5
+    mean = 0.5 * 2**1.5 / 3
     for text in told[:1]:
         assert (
             f"physics of 'moderate' errs by {difference_text(mean, mean / np.exp(wide), mean * np.exp(wide))} at"

@@ -243,6 +243,11 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
     said = text(made(harmed, alone=alone, changes={"family": family}))
     assert "Compensation harms good." in said, "2 m alone, but `fitted` has less"
     assert "Identified models were fitted to the runs that validate them" in advice
+    told = np.where(results.cells["family"].eq("fitted"), "physics diverges on 3 % of the test windows", "")
+    advice = text(replace(results, cells=results.cells.assign(sentence=told)))
+    assert (
+        "\nFitted to the runs, that of fitted diverges on test windows of 2 cells, where errors count alike." in advice
+    )
 
 
 def test_numbers_that_were_set_from_runs_that_train_are_named(made: Any) -> None:

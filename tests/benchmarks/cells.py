@@ -14,7 +14,7 @@ from tests.study.tiny import whole_unit
 
 def run() -> dict[str, Any]:
     """Seconds per cell of each batch, and the mean H over the foundations with physics [m]."""
-    plan = read_plan("calm")
+    plan = read_plan("calm", {"repeat": {}, "grid.seeds": [0]})
     start = time.perf_counter()
     prepared = prepare(plan, obtain_runs(plan))
     result: dict[str, Any] = {"simulate, roll out [s]": round(time.perf_counter() - start, 2)}

@@ -205,7 +205,8 @@ def test_a_single_size_begins_at_the_physics_alone(full_scale):
     assert np.isfinite(failed.y).tolist() == [True, False]
     assert np.isfinite(pure.y).tolist() == [False, True]
     assert figure.takeaway == (
-        'At the horizon, with N_D = 15 accurate (Gunnerus, 28.9 m) errs by 2.26 m and "no physics" errs by 10.3 m. '
+        "At the horizon, by means, without a test: with N_D = 15 accurate (Gunnerus, 28.9 m) errs by 2.26 m and "
+        '"no physics" errs by 10.3 m. '
         "accurate (Gunnerus, 28.9 m) is the best in validation."
     )
 

@@ -46,7 +46,7 @@ PACKAGE = ROOT / "shipid"
 @pytest.mark.parametrize(
     ("name", "foundations", "alone", "batches"),
     [
-        ("calm", 3 + 2 + 1, 0, 3),
+        ("calm", 3 + 2 + 1, 0, 3 + 2 + 1),
         ("full-scale", 4 + 1 + 1, 1, 8 * 3),
         ("simulation", 10 + 8 + 1 + 1, 0, 10),
         ("simulation-small", 4 + 2 * 3 + 1 + 1, 3, 3 * 2),

@@ -13,7 +13,7 @@ from scipy import stats
 from shipid.engine import engines, native
 from shipid.errors import DocumentError, ShipidError
 from shipid.hybrid.physics import Physics
-from shipid.metrics import cap_paths, position_error, summarise_errors
+from shipid.metrics import position_error, summarise_errors
 from shipid.study import screen as module
 from shipid.study.plan import Plan
 from shipid.study.prepare import obtain_runs, partition, window_memory
@@ -46,8 +46,8 @@ def by_paths(plan: Plan, count: int) -> list[dict[str, Any]]:
         vessel, errors = base.with_values(variant.values), []
         for windows in partition(plan, dataset)[:2]:
             hidden = window_memory(vessel, dataset, windows)
-            paths, lost = Physics(vessel, windows.horizon, 1.0).variant_paths(windows.instants(hidden=hidden))
-            errors.append(position_error(cap_paths(paths[:, 0], windows.future, lost[0]), windows.future))
+            paths, _ = Physics(vessel, windows.horizon, 1.0).variant_paths(windows.instants(hidden=hidden))
+            errors.append(position_error(paths[:, 0], windows.future))
         whole = summarise_errors(np.concatenate(errors, axis=1))
         rows.append({"member": variant.name, "factors": variant.factors, **whole})
     return rows
