@@ -98,14 +98,14 @@ class Kernel(SearchedAlone):
     validation: ClassVar[str] = "runs"
     corrector: ClassVar[type[Any]] = KernelCompensator
 
-    trials: PositiveInt = 2
-    steps: PositiveInt = 20
-    scale: tuple[PositiveFloat, PositiveFloat] = (0.5, 50.0)
-    linear: Scale = (0.02, 20.0)
-    ridge: Scale = (1e-3, 1.0)
+    trials: PositiveInt = 3
+    steps: PositiveInt = 12
+    scale: tuple[PositiveFloat, PositiveFloat] = (1.0, 400.0)
+    linear: Scale = (0.01, 4.0)
+    ridge: Scale = (1e-3, 10.0)
     terms: PositiveInt = 8
     mirror: bool = True
-    search_windows: PositiveInt = 300
+    search_windows: PositiveInt = 200
     centres: PositiveInt = 1200
     memory: Memory = Memory()
 

@@ -20,7 +20,7 @@ from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_folds
 from shipid.hybrid.units import VaryingInputs
 
-PRIOR = 0.01  # weight of the squared distance from the start of a descent, in logarithms
+PRIOR = 0.1  # weight of the squared distance from the start of a descent, in logarithms, where one run is seen
 FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, every trial sees all
 
 
@@ -39,6 +39,7 @@ class KernelProblem(PathProblem):
         self.outputs = self._tensor(self.weights.T)  # (2, S, r)
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
         self.parts = method.trials if len(task.folds) >= FOLDS_OF_PART * method.trials else 1
+        self.worth: dict[int, TrialWorth] = {}  # of each part
 
     def _tensor(self, values: Any) -> Tensor:
         return torch.as_tensor(values, dtype=torch.float64, device=self.task.device)
@@ -64,12 +65,15 @@ class KernelProblem(PathProblem):
 
     def judge(self, number: int, point: Point) -> TrialWorth:
         """Descend from a point; return the mean error [m^2] at the end, the settings there, and the steps made."""
+        if number % self.parts in self.worth:
+            return self.worth[number % self.parts]
         hidden, folds, seen = self.folds_left_out(number), self.task.folds, self.windows
         if self.parts > 1:
             folds = [fold for place, fold in enumerate(folds) if place % self.parts != number % self.parts]
             seen = np.setdiff1d(seen, np.concatenate([np.setdiff1d(seen, training) for training, _ in hidden]))
         rows = seen[part_of_runs(self.task.windows.run[seen], self.method.search_windows)]
         blocks, names = FoldBlocks(folds, rows, self.task.device), list(self.method.ranges())
+        prior = PRIOR / len(np.unique(self.task.windows.run[rows]))
         start, ends = (np.log([table[name] for name in names]) for table in (point, self.method.ranges()))
 
         def value_and_slope(logs: Array) -> tuple[float, Array]:
@@ -82,14 +86,15 @@ class KernelProblem(PathProblem):
                 whole.backward(slope, retain_graph=True)
             assert x.grad is not None
             away = logs - start
-            return np.log(value) + PRIOR * away @ away, x.grad.cpu().numpy() / value + 2 * PRIOR * away
+            return np.log(value) + prior * away @ away, x.grad.cpu().numpy() / value + 2 * prior * away
 
         options = {"maxfun": self.method.steps}
         best = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", bounds=ends, options=options)
         values = np.clip(np.exp(best.x), *np.exp(ends).T)
-        squares = np.exp(best.fun - PRIOR * np.square(best.x - start).sum())
-        worth = float(squares) / (2 * len(self.basis) * blocks.count)
-        return worth, dict(zip(names, map(float, values), strict=True)), int(best.nfev)
+        squares = np.exp(best.fun - prior * np.square(best.x - start).sum())
+        chosen = dict(zip(names, map(float, values), strict=True))
+        worth = float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)
+        return self.worth.setdefault(number % self.parts, worth)
 
     def solve(self, settings: Mapping[str, Any]) -> list[tuple[Tensor, Tensor]]:
         """G (C, C) and weights (C, r) of x and of y."""
@@ -105,14 +110,13 @@ class KernelProblem(PathProblem):
         """Return the mean of the solutions of all trials, and keep what they miss without each fold."""
         varying, centres, members = self.varying, self.values[self.part].cpu().numpy(), []
         self.left_out = left_out = np.full_like(self.targets, np.nan)
-        for row in best:
+        for row in best if self.parts > 1 else best[:1]:
             settings = row["params"]
             scales = np.array([settings[f"{kernel_group(name)}_scale"] for name in varying.normaliser.names])
             solved = self.solve(settings)
             weights = torch.cat([weights for _, weights in solved], dim=1).cpu().numpy()
             members.append(KernelMember(scales, settings["linear"], weights))
-            if self.parts > 1 or row is best[0]:
-                self._leave_out(self.folds_left_out(row["number"]), settings, solved, left_out)
+            self._leave_out(self.folds_left_out(row["number"]), settings, solved, left_out)
         return KernelCompensator(
             self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), best[0]["params"]
         )
