@@ -78,7 +78,13 @@ class AnswerCase:
 
     def with_physics(self, amount: int) -> pd.DataFrame:
         """Rows of physics models at an amount of data."""
-        return self.rows[(self.rows["N_D"] == amount) & (self.rows["family"] != NO_MODEL)]
+        apart = [NO_MODEL, *self.means]
+        return self.rows[(self.rows["N_D"] == amount) & ~self.rows["family"].isin(apart)]
+
+    @property
+    def means(self) -> list[str]:
+        """Means over foundations: models without an A, which no sentence counts among the physics."""
+        return [block.name for block in self.results.plan.study.model]
 
     def fixed_physics(self) -> list[str]:
         """Physics models whose numbers do not depend on the cell and that have a result in every one."""
@@ -138,6 +144,7 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
         ("methods", methods if len(learning) > 1 else ()),
         (chart, _physics_that_pays(case)),
         ("gain", _mean_over_horizon(case)),
+        ("gain", _means_over_foundations(case)),
         (chart, _runs_that_physics_saves(case)),
         ("cells", [several] if len(learning) > 1 else ()),
         ("gain", _reservations(case)),
@@ -288,6 +295,18 @@ def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
             f"with {counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
             + (f" Without physics H is {case.error(NO_MODEL, largest)}." if NO_MODEL in rows.index else "")
         )
+
+
+def _means_over_foundations(case: AnswerCase) -> Iterator[str]:
+    """H of each mean over foundations at the largest amount of data, and whether it beats the best model."""
+    table, largest = case.table, case.table.amounts[-1]
+    for name in (name for name in case.means if name in table.H):
+        text = f"The mean {name} of foundations has H {case.error(name, largest)} with {counted_text(largest, 'run')}"
+        if case.best in table.H:
+            better, worse, _ = case.sides([name], table.lead(str(case.best), [name], case.ends[largest]))
+            verdict = "lower" if better else "higher" if worse else "not shown to differ"
+            text += f": {verdict}{' than that of' if better or worse else ' from that of'} {case.best}"
+        yield f"{text}."
 
 
 def _reservations(case: AnswerCase) -> Iterator[str]:
