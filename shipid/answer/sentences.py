@@ -78,13 +78,8 @@ class AnswerCase:
 
     def with_physics(self, amount: int) -> pd.DataFrame:
         """Rows of physics models at an amount of data."""
-        apart = [NO_MODEL, *self.means]
+        apart = [NO_MODEL, *(block.name for block in self.results.plan.study.model)]  # a mean has no A
         return self.rows[(self.rows["N_D"] == amount) & ~self.rows["family"].isin(apart)]
-
-    @property
-    def means(self) -> list[str]:
-        """Means over foundations: models without an A, which no sentence counts among the physics."""
-        return [block.name for block in self.results.plan.study.model]
 
     def fixed_physics(self) -> list[str]:
         """Physics models whose numbers do not depend on the cell and that have a result in every one."""
@@ -298,15 +293,13 @@ def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
 
 
 def _means_over_foundations(case: AnswerCase) -> Iterator[str]:
-    """H of each mean over foundations at the largest amount of data, and whether it beats the best model."""
+    """H of each mean over foundations at the largest amount of data, beside the best model."""
     table, largest = case.table, case.table.amounts[-1]
-    for name in (name for name in case.means if name in table.H):
+    for name in (block.name for block in case.results.plan.study.model if {block.name, case.best} <= set(table.H)):
+        sides = case.sides([name], table.lead(str(case.best), [name], case.ends[largest]))
+        verdict = ("lower than", "higher than", "not shown to differ from")[[bool(side) for side in sides].index(True)]
         text = f"The mean {name} of foundations has H {case.error(name, largest)} with {counted_text(largest, 'run')}"
-        if case.best in table.H:
-            better, worse, _ = case.sides([name], table.lead(str(case.best), [name], case.ends[largest]))
-            verdict = "lower" if better else "higher" if worse else "not shown to differ"
-            text += f": {verdict}{' than that of' if better or worse else ' from that of'} {case.best}"
-        yield f"{text}."
+        yield f"{text}: {verdict} that of {case.best}."
 
 
 def _reservations(case: AnswerCase) -> Iterator[str]:

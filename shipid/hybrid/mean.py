@@ -6,7 +6,7 @@ Errors of foundations that differ cancel in part (Bates and Granger 1969, Breima
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -47,11 +47,17 @@ class MeanCorrector:
         return getattr(self.parts[0].corrector, "inputs", None)
 
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
-        """Return paths (T, S, 2) [m] in the frame (11); each part rolls out its own physics."""
-        return sum_paths(
-            [part.corrector.predict(part.physics, instants, part.physics.paths(instants)) for part in self.parts],
-            self.weights,
-        )
+        """Return paths (T, S, 2) [m] in the frame (11); each part rolls out its physics, from its own actuators."""
+        known = instants.hidden or {}
+        every = [
+            replace(instants, hidden={name.removeprefix(f"{k}:"): values for name, values in known.items()} or None)
+            for k in range(len(self.parts))
+        ]
+        each = [
+            part.corrector.predict(part.physics, at, part.physics.paths(at))
+            for part, at in zip(self.parts, every, strict=True)
+        ]
+        return sum_paths(each, self.weights)
 
     def header(self) -> dict[str, Any]:
         """Return all that is not an array."""

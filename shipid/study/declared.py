@@ -113,7 +113,7 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
 
 
 def _mean_of_foundations(block: MeanBlock, path: str, foundations: Sequence[Foundation]) -> Foundation:
-    """The mean that a block declares; DocumentError unless its parts can be told from the same instants."""
+    """The mean that a block declares; DocumentError where it has no parts, or such as it cannot take."""
     families = list(dict.fromkeys(one.family for one in foundations if one.base is not None))
     matched = {pattern: documents.match_paths(pattern, families) for pattern in block.mean_of}
     for pattern, found in matched.items():
@@ -121,23 +121,12 @@ def _mean_of_foundations(block: MeanBlock, path: str, foundations: Sequence[Foun
             words = f"{pattern!r} is no family with physics: {suggest_name(pattern, families)}"
             raise DocumentError(words, path=f"{path}.mean_of")
     parts = [one for one in foundations if any(one.family in found for found in matched.values())]
-    gear = {one.name: _actuator_numbers(one) for one in parts}
-    if len(parts) < 2 or len(set(gear.values())) > 1 or any(one.observer is not None for one in parts):
-        raise DocumentError(
-            f"{', '.join(gear)}: a mean takes two foundations or more, whose actuators are the same and that have no "
-            "observer: name other families",
-            path=f"{path}.mean_of",
-        )
-    words = f"mean of {', '.join(gear)}"
-    return Foundation(
-        block.name, block.name, 0, None, None, words, mean_of=tuple(gear), by_left_out=block.weights != "equal"
-    )
-
-
-def _actuator_numbers(foundation: Foundation) -> tuple[tuple[str, float], ...]:
-    """Numbers of the actuators of a foundation: where they are equal, so are the states that orders leave them in."""
-    assert foundation.vessel is not None
-    return tuple((path, value) for path, value in foundation.vessel.parameters.items() if ".actuator." in path)
+    names = tuple(one.name for one in parts)
+    if len(parts) < 2 or any(one.observer is not None for one in parts):
+        words = f"{', '.join(names)}: a mean takes two foundations or more, none with an observer: name other families"
+        raise DocumentError(words, path=f"{path}.mean_of")
+    words, by_left_out = f"mean of {', '.join(names)}", block.weights != "equal"
+    return Foundation(block.name, block.name, 0, None, None, words, mean_of=names, by_left_out=by_left_out)
 
 
 def check_file_names(names: Sequence[str], path: str, what: str) -> None:

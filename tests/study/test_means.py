@@ -7,13 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomlkit
 
 from shipid.answer.pages import write_pages
+from shipid.data.windows import to_frame
 from shipid.errors import DocumentError
 from shipid.predictor import Predictor
+from shipid.study.apply import predict_log
 from shipid.study.plan import Plan, build_plan
 from shipid.study.results import read_results
 from shipid.study.store import cell_file, finished_units
+from shipid.vessel.load import load_vessel
 from tests.study.tiny import MIXED, run_here, tiny_plan
 
 EQUAL, WEIGHED = {"name": "equal", "mean_of": ["*"]}, {"name": "weighed", "mean_of": ["*"], "weights": "left-out"}
@@ -76,6 +80,27 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     counted = [line for line in answer.splitlines() if "physics models do" in line]
     assert all("equal" not in line and "weighed" not in line for line in counted)
     assert results.complete
+
+
+def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
+    document = tiny_plan(tmp_path).document
+    vessel = dict(load_vessel("gunnerus-28.9").document)
+    actuator = {"n": {"kind": "first_order", "T": 4.0, "rate": 0.1}}
+    vessel["thruster"] = {name: {**one, "actuator": actuator} for name, one in vessel["thruster"].items()}
+    (tmp_path / "lazy.toml").write_text(tomlkit.dumps(vessel))
+    lazy = {"name": "lazy", "base": "./lazy.toml"}
+    plan = plan_of(tmp_path, family=[*document["family"], lazy], model=[EQUAL], method=MIXED[:1], grid={"N_D": [4]})
+    run_here(plan, tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    cell = next(row["cell"] for row in results.rows if row["foundation"] == "equal")
+    frame, _ = predict_log(tmp_path / "run", cell, tmp_path / "run" / "dataset.parquet", None, tmp_path / "out.parquet")
+    test, steps = results.test, results.test.horizon
+    for place in range(0, len(test), 3):
+        rows = frame[(frame["run"] == test.run[place]) & np.isclose(frame["t"], test.t[place])]
+        here = (test.columns[name][place] for name in ("north", "east", "psi"))
+        x, y = to_frame(rows["cooperative_north"].to_numpy(), rows["cooperative_east"].to_numpy(), *here)
+        np.testing.assert_allclose(np.stack([x, y], axis=1), results.paths[cell][:, place], atol=1e-4)
+        assert len(rows) == steps
 
 
 def test_what_was_interrupted_ends_alike(finished: tuple[Plan, Path], tmp_path: Path) -> None:
