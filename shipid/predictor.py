@@ -32,6 +32,7 @@ from shipid.hybrid.bands import FEWEST, Bands, Region
 from shipid.hybrid.calibration import calibrate_bands
 from shipid.hybrid.contract import fault_of_corrector, name_of_class
 from shipid.hybrid.deployed import DeployedMethod, reason_of_no_band
+from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.method import Case, Index, Method, Task, fit_all, widen_range
 from shipid.hybrid.methods import METHODS, method_kind, method_names
 from shipid.hybrid.novelty import NoveltyAlarm, alarm_inputs, calibrate_alarm
@@ -380,6 +381,7 @@ class Predictor(DeployedMethod):
             alarm = _read_part(
                 NoveltyAlarm, ALARM_PARTS, header.get("alarm"), arrays
             )  # the arrays left are the method's
+            made = MeanCorrector if "mean_of" in header["corrector"] else METHODS[kind].corrector
             loaded = cls(
                 physics=Physics(
                     None if vessel is None else check_document(vessel["document"], vessel["file"]),
@@ -390,7 +392,7 @@ class Predictor(DeployedMethod):
                     known.path,
                 ),
                 method=kind,
-                corrector=METHODS[kind].corrector.from_arrays(header["corrector"], arrays),
+                corrector=made.from_arrays(header["corrector"], arrays),
                 limits=known.limits,
                 provenance=known.provenance,
                 commands=known.commands,

@@ -105,7 +105,6 @@ def kinds_frame(results: Results) -> pd.DataFrame:
     """
     test, kinds = results.test, np.array([results.kinds.get(str(run), "") for run in results.test.run])
     errors = {("naive", "naive", 0): [results.naive]}
-    errors |= {("naive", "regression", N): each for N, each in list(regression_errors(results).items())[-1:]}
     for model, path in _finite_physics(results).items():
         errors[model, "physics", 0] = [position_error(path, test.future)]
     for row in results.rows:
@@ -124,23 +123,13 @@ def kinds_frame(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["kind", "runs", "model", "source", "N_D", "mean", "end"])
 
 
-def regression_errors(results: Results) -> dict[int, list[np.ndarray]]:
-    """Errors (T, S) [m] of the regressions by amount of data, the least first."""
-    batches = [(batch.N_D, results.regression.get(batch.key)) for batch in reversed(results.plan.batches)]
-    errors: dict[int, list[np.ndarray]] = {}
-    for amount, path in batches:
-        if path is not None:
-            errors.setdefault(amount, []).append(position_error(path, results.test.future))
-    return errors
-
-
 def regression_frame(results: Results) -> pd.DataFrame:
     """Errors [m] of the regressions, mean over draws: N_D, H_end, H_end_90, H, H_90, rms."""
-    names = {**PREDICTION_ERRORS, "rms": "rms"}
-    known = [
-        (amount, summarise_errors(one)) for amount, several in regression_errors(results).items() for one in several
-    ]
-    rows = [{"N_D": amount, **{name: dict(one)[key] for name, key in names.items()}} for amount, one in known]
+    names, rows = {**PREDICTION_ERRORS, "rms": "rms"}, []
+    for batch in results.plan.batches:
+        if (path := results.regression.get(batch.key)) is not None:
+            known: Mapping[str, Any] = summarise_errors(position_error(path, results.test.future))
+            rows.append({"N_D": batch.N_D, **{name: known[key] for name, key in names.items()}})
     return pd.DataFrame(rows, columns=["N_D", *names]).groupby("N_D", as_index=False).mean()
 
 

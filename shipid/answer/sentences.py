@@ -78,7 +78,8 @@ class AnswerCase:
 
     def with_physics(self, amount: int) -> pd.DataFrame:
         """Rows of physics models at an amount of data."""
-        return self.rows[(self.rows["N_D"] == amount) & (self.rows["family"] != NO_MODEL)]
+        apart = [NO_MODEL, *(block.name for block in self.results.plan.study.model)]  # a mean has no A
+        return self.rows[(self.rows["N_D"] == amount) & ~self.rows["family"].isin(apart)]
 
     def fixed_physics(self) -> list[str]:
         """Physics models whose numbers do not depend on the cell and that have a result in every one."""
@@ -146,6 +147,7 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
         ("methods", methods if len(learning) > 1 else ()),
         (chart, _physics_that_pays(case)),
         ("gain", _mean_over_horizon(case)),
+        ("gain", _means_over_foundations(case)),
         (chart, _runs_that_physics_saves(case)),
         ("cells", [several] if len(learning) > 1 else ()),
         ("gain", _reservations(case)),
@@ -179,7 +181,7 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
     cells = results.cells[results.cells["family"].isin(fitted_families(results.plan))]
     if len(bad := cells["model"][cells["sentence"].str.contains("physics diverges")]):
         where = f"on test windows of {counted_text(len(bad), 'cell')}"
-        yield f"Fitted to the runs, that of {model_list(bad.unique())} diverges {where}, where paths go on in the same way."
+        yield f"Fitted to the runs, that of {model_list(bad.unique())} diverges {where}; paths go on in the same way."
     if floor := sorted(results.aside - results.saw_test):
         yield (
             f"The family {model_list(floor)} is set aside ([claims] nominal): the base as it is, the floor for models "
@@ -315,6 +317,16 @@ def _mean_over_horizon(case: AnswerCase) -> Iterator[str]:
             f"with {counted_text(largest, 'run')}. Its physics alone has A = {metres_text(float(rows['A'][best]))}."
             + (f" Without physics H is {case.without_physics(best, largest)}." if NO_MODEL in rows.index else "")
         )
+
+
+def _means_over_foundations(case: AnswerCase) -> Iterator[str]:
+    """H of each mean over foundations at the largest amount of data, beside the best model."""
+    table, largest = case.table, case.table.amounts[-1]
+    for name in (block.name for block in case.results.plan.study.model if {block.name, case.best} <= set(table.H)):
+        sides = case.sides([name], table.lead(str(case.best), [name], case.ends[largest]))
+        verdict = ("lower than", "higher than", "not shown to differ from")[[bool(side) for side in sides].index(True)]
+        text = f"The mean {name} of foundations has H {case.error(name, largest)} with {counted_text(largest, 'run')}"
+        yield f"{text}: {verdict} that of {case.best}."
 
 
 def _reservations(case: AnswerCase) -> Iterator[str]:

@@ -53,6 +53,8 @@ class ExportModel:
         ShipidError for a method that has no counterpart, whose parts do not fit together, or are too large.
         """
         corrector, bands = self.predictor.corrector, self.predictor.bands
+        if hasattr(corrector, "parts"):
+            raise ShipidError("a mean over foundations cannot be exported: export the cells of its foundations")
         if type(corrector) not in CORRECTORS:
             kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]
             raise ShipidError(

@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 
 from shipid.data.windows import Instants, choose_evenly
 from shipid.hybrid.features import MOTIONS, feature_table
-from shipid.hybrid.method import Array, FitResult, Index, Method, Task, Traits
+from shipid.hybrid.method import Array, FitResult, Index, Method, Task
 from shipid.hybrid.physics import Physics
 from shipid.hybrid.search import best_trials, trial_row, windows_of_folds
 from shipid.hybrid.stepping import Stepper, step_alone, stepped_paths, true_motion
@@ -62,6 +62,11 @@ def water_velocity(current: Array, psi: Array) -> Array:
     return np.stack([c * north + s * east, c * east - s * north, np.zeros_like(c)], axis=1)
 
 
+def through_water(table: Mapping[str, Array], water: Array) -> dict[str, Array]:
+    """Inputs (S,) with u and v through water of a velocity (S, 3)."""
+    return {**table, "u": table["u"] - water[:, 0], "v": table["v"] - water[:, 1]}
+
+
 @dataclass(frozen=True)
 class RegressionCorrector(StoredData):
     """Laws of acceleration, rolled over the horizon: R of them for instants in R blocks, of a fitted method one.
@@ -86,8 +91,7 @@ class RegressionCorrector(StoredData):
         def acceleration(at: Instants, _: int, alone: Array) -> Array:
             psi, table = at.columns["psi"], feature_table(at.columns, self.commands)
             water = water_velocity(current, psi)
-            through = table | dict(zip("uv", (np.stack([table["u"], table["v"]]) - water.T[:2]), strict=True))
-            more = apply_blocks(np.stack(law_terms(through, self.names), axis=1), self.weights)
+            more = apply_blocks(np.stack(law_terms(through_water(table, water), self.names), axis=1), self.weights)
             after = np.clip(alone - water + step * more, self.low, self.high)
             later = psi + step / 2 * (table["r"] + after[:, 2])
             return np.asarray((after + water_velocity(current, later) - alone) / step)
@@ -104,14 +108,18 @@ def successive_windows(task: Task) -> Index:
 
 
 def ridge_laws(terms: Array, missing: Array, ridges: Sequence[float]) -> Array:
-    """Weights (R, M, 3) of terms (N, M) for accelerations (N, 3), for each ridge; both count by their size."""
+    """Weights (R, M, 3) of terms (..., M) for accelerations (..., 3), for each ridge; both count by their size."""
+    terms, missing = (each.reshape(-1, each.shape[-1]) for each in (terms, missing))
     scale = np.maximum(np.sqrt(np.square(terms).mean(axis=0)), 1e-12)
     size = np.maximum(np.sqrt(np.square(missing).mean(axis=0)), 1e-12)
     return np.asarray(solve_ridges(terms / scale, missing / size, ridges) / scale[:, None] * size)
 
 
 class RegressionProblem:
-    """A foundation of a task: its true steps, (T, S) of windows one after the other, and the laws that they teach."""
+    """A foundation of a task: its true steps, (T, S) of windows one after the other, and the laws that they teach.
+
+    Without physics there is a current, which is that of all windows.
+    """
 
     def __init__(self, method: Regression, task: Task, name: str) -> None:
         self.method, self.task, self.physics = method, task, task.cases[name].physics
@@ -121,66 +129,52 @@ class RegressionProblem:
         self.shape, motion = (part.horizon, len(part)), true_motion(part)
         number, window = (each.ravel() for each in np.indices(self.shape))
         at = stepper.at(number, {key: values[number, window] for key, values in motion.items()}, window)
-        self.table, self.psi = feature_table(at.columns, task.commands), motion["psi"]
-        self.missing = np.stack([motion[key][1:].ravel() for key in MOTIONS], axis=1) - step_alone(self.physics, at)
-        self.seen = VaryingInputs.of(self.table, method.mirror)
-
-    def steps(self, windows: Index, current: Array, mean: int) -> tuple[Array, Array]:
-        """Terms (N, M) and missing accelerations (N, 3) of steps of some windows, with their images in the mirror.
-
-        windows : places in `self.windows`. current : (2,) [m/s]. mean : of so many steps after one another.
-        """
-        step, flat = self.task.windows.step, np.arange(np.prod(self.shape)).reshape(self.shape)[:, windows].ravel()
-        now, later = (
-            water_velocity(np.broadcast_to(current, (len(flat), 2)), psi[:, windows].ravel())
-            for psi in (self.psi[:-1], self.psi[1:])
+        self.table, self.psi = (
+            feature_table(at.columns, task.commands),
+            np.stack([motion["psi"][:-1], motion["psi"][1:]]),
         )
-        table = {key: values[flat] for key, values in self.table.items()}
-        table |= {"u": table["u"] - now[:, 0], "v": table["v"] - now[:, 1]}
-        missing = (self.missing[flat] - later + now) / step
-        names, values = self.seen.normaliser.names, self.seen.samples(table)
-        images = dict(zip(names, values.T, strict=True))
-        terms = np.stack(law_terms({"u": np.resize(table["u"], len(values))} | images, names), axis=1)
+        self.missing = np.stack([motion[key][1:].ravel() for key in MOTIONS], axis=1) - step_alone(self.physics, at)
+        self.seen = VaryingInputs.of(self.table, mirror=True)
+        self.currents = [np.zeros(2)] if self.physics.vessel else [np.zeros(2), self.fit_current()]
+
+    def steps(self, current: Array) -> tuple[Array, Array]:
+        """Terms (N, S, M) and missing accelerations (N, S, 3): means over steps, with their images in the mirror."""
+        now, later = (water_velocity(np.broadcast_to(current, (psi.size, 2)), psi.ravel()) for psi in self.psi)
+        names, through = self.seen.normaliser.names, through_water(self.table, now)
+        values = self.seen.samples(through)
+        table = {"u": np.resize(through["u"], len(values)), **dict(zip(names, values.T, strict=True))}
+        missing = (self.missing - later + now) / self.task.windows.step
         missing = np.concatenate([missing, missing * MIRROR])[: len(values)]
-        return tuple(self._means(each, len(windows), mean) for each in (terms, missing))  # type: ignore[return-value]
+        mean = min(self.method.steps, self.shape[0])
+        blocks = (
+            each.reshape(-1, *self.shape, each.shape[1])[:, : self.shape[0] // mean * mean]
+            for each in (np.stack(law_terms(table, names), axis=1), missing)
+        )
+        terms, missing = (each.reshape(-1, mean, self.shape[1], each.shape[-1]).mean(axis=1) for each in blocks)
+        return terms, missing
 
-    def _means(self, values: Array, windows: int, mean: int) -> Array:
-        """Means over `mean` steps after one another, of values (K T S, n) with their images or without."""
-        by_step = values.reshape(-1, self.shape[0], windows, values.shape[1])
-        kept = by_step[:, : self.shape[0] // mean * mean]
-        means = kept.reshape(len(kept), -1, mean, windows, values.shape[1]).mean(axis=2)
-        return np.asarray(means.reshape(-1, values.shape[1]))
-
-    def fit_current(self, windows: Index, mean: int) -> Array:
-        """The steady current (2,) north and east [m/s] with which a law misses least of some windows."""
-        some, ridge = choose_evenly(windows, OF_CURRENT), [float(np.median(self.method.ridge))]
+    def fit_current(self) -> Array:
+        """The steady current (2,) north and east [m/s] with which a law misses least."""
+        some, ridge = choose_evenly(np.arange(self.shape[1]), OF_CURRENT), [float(np.median(self.method.ridge))]
         speed = float(np.hypot(self.table["u"], self.table["v"]).mean()) or 1.0
-        size = np.maximum(self.steps(some, np.zeros(2), mean)[1].std(axis=0), 1e-12)
+        size = np.maximum(self.steps(np.zeros(2))[1][:, some].std(axis=(0, 1)), 1e-12)
 
         def missed(share: Array) -> Array:
-            terms, missing = self.steps(some, share * speed, mean)
+            terms, missing = (each[:, some] for each in self.steps(share * speed))
             return np.append(((missing - terms @ ridge_laws(terms, missing, ridge)[0]) / size).ravel(), 0.1 * share)
 
         return np.asarray(least_squares(missed, np.zeros(2), bounds=(-1.0, 1.0), max_nfev=12).x * speed)
 
-    def laws(self, several: Sequence[Index]) -> tuple[Array, Array]:
-        """Weights (F, R, M, 3) of every point of the search, learned from each of F sets of windows; currents (R, 2).
-
-        The current is that of all windows.
-        """
-        every, weights, currents, ridges = np.arange(len(self.windows)), [], [], self.method.ridge
+    def laws(self, several: Sequence[Index]) -> Array:
+        """Weights (F, R, M, 3) for each current and ridge, learned from each of F sets of windows."""
+        steps, ridges = [self.steps(current) for current in self.currents], self.method.ridge
         places = [np.isin(self.windows, windows) for windows in several]
-        settings = self.method.settings(self.physics.vessel is None)
-        steady = (
-            self.fit_current(every, max(self.method.steps)) if any(drifts for _, drifts in settings) else np.zeros(2)
+        return np.stack(
+            [
+                np.concatenate([ridge_laws(terms[:, place], missing[:, place], ridges) for terms, missing in steps])
+                for place in places
+            ]
         )
-        for mean, drifts in settings:
-            current = drifts * steady
-            terms, missing = self.steps(every, current, mean)
-            rows = [np.resize(place, len(terms)) for place in places]
-            weights.append([ridge_laws(terms[row], missing[row], ridges) for row in rows])
-            currents += [current] * len(ridges)
-        return np.concatenate(weights, axis=1), np.array(currents)
 
     def corrector(self, weights: Array, current: Array, params: Mapping[str, float]) -> RegressionCorrector:
         """The corrector of some laws; a path may leave the velocities of training by a margin and the current."""
@@ -198,8 +192,7 @@ class Regression(Method):
 
     Parameters
     ----------
-    ridge : weights of the squared weights of terms of size 1. steps : numbers of steps over whose mean it learns.
-    mirror : whether port and starboard are mirror images, where the inputs allow it.
+    ridge : weights of the squared weights of terms of size 1. steps : number of steps over whose mean it learns.
     """
 
     validation: ClassVar[str] = "runs"
@@ -207,44 +200,34 @@ class Regression(Method):
     corrector: ClassVar[type[Any]] = RegressionCorrector
 
     ridge: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (1e-6, 1e-4, 1e-3, 1e-2)
-    steps: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1, 5)
-    mirror: bool = True
-
-    @property
-    def traits(self) -> Traits:
-        """What a study says of this method."""
-        return Traits(mirror=self.mirror)
+    steps: PositiveInt = 5
 
     def varied(self) -> tuple[str, ...]:
         """Names of what differs between trials."""
-        return "steps", "current", "ridge"
-
-    def settings(self, alone: bool) -> list[tuple[int, bool]]:
-        """Numbers of steps, each without a current and, if there is no physics, which has its own, with one."""
-        return list(product(self.steps, (False, True)[: 1 + alone]))
+        return "current", "ridge"
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Learn every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
         return {name: self._fit(task, name) for name in task.cases}
 
     def _fit(self, task: Task, name: str) -> FitResult:
-        begun, case = time.process_time(), task.cases[name]
-        settings = self.settings(case.physics.vessel is None)
-        points = [
-            {"steps": float(mean), "current": float(drifts), "ridge": ridge}
-            for (mean, drifts), ridge in product(settings, self.ridge)
-        ]
-        if not np.isfinite(case.paths[:, windows_of_folds(task)]).all():
+        begun, case, every = time.process_time(), task.cases[name], windows_of_folds(task)
+        if not np.isfinite(case.paths[:, every]).all():
+            points = [{"current": 0.0, "ridge": ridge} for ridge in self.ridge]
             return FitResult(None, [trial_row(i, point, np.nan, begun) for i, point in enumerate(points)], 0.0)
         problem, folds = RegressionProblem(self, task, name), task.folds[:: -(-len(task.folds) // MOST_FOLDS)]
-        weights, currents = problem.laws([*(training for training, _ in folds), windows_of_folds(task)])
+        currents = np.repeat(problem.currents, len(self.ridge), axis=0)
+        points = [
+            {"current": float(np.hypot(*current)), "ridge": ridge}
+            for current, ridge in zip(currents, np.tile(self.ridge, len(problem.currents)).tolist(), strict=True)
+        ]
+        *weights, last = problem.laws([*(training for training, _ in folds), every])
         judged = [part[np.linspace(0, len(part) - 1, JUDGED).round().astype(int)] for _, part in folds]
-        every = np.concatenate([np.tile(part, len(points)) for part in judged])
-        left_out = problem.corrector(np.concatenate(weights[:-1]), np.tile(currents, (len(folds), 1)), {})
-        paths = left_out.predict(case.physics, task.instants(name).select(every), np.empty(0))
-        missed = np.square(paths - task.windows.future[:, every]).mean(axis=(0, 2))
-        losses = missed.reshape(len(folds), len(points), -1).mean(axis=(0, 2))
-        rows = [trial_row(i, point, float(losses[i]), begun) for i, point in enumerate(points)]
-        chosen = [row["number"] for row in best_trials(rows)[:1]]
-        best = problem.corrector(weights[-1][chosen], currents[chosen], points[chosen[0]]) if chosen else None
-        return FitResult(best, rows, time.process_time() - begun)
+        chosen = np.concatenate([np.tile(part, len(points)) for part in judged])
+        left_out = problem.corrector(np.concatenate(weights), np.tile(currents, (len(folds), 1)), {})
+        paths = left_out.predict(case.physics, task.instants(name).select(chosen), np.empty(0))
+        missed = np.square(paths - task.windows.future[:, chosen]).reshape(len(paths), len(folds), len(points), -1)
+        rows = [trial_row(i, point, float(missed[:, :, i].mean()), begun) for i, point in enumerate(points)]
+        best = [int(row["number"]) for row in best_trials(rows)[:1]]
+        whole = problem.corrector(last[best], currents[best], points[best[0]]) if best else None
+        return FitResult(whole, rows, time.process_time() - begun)

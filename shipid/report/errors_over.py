@@ -37,7 +37,7 @@ from shipid.report.selection import (
     over_seeds,
 )
 from shipid.report.tables import PageTable, frame_table
-from shipid.report.wording import CONSTANT_MOTION, REGRESSION, counted_text, join_few_names, metres_text, number_text
+from shipid.report.wording import CONSTANT_MOTION, counted_text, join_few_names, metres_text, number_text
 
 LINE_COLUMNS = ["model", "source", "N_D"]
 ERROR_HEIGHT, COMMAND_HEIGHT = 326, 134  # of the error over time and of a row of commands below it [px]
@@ -61,12 +61,7 @@ KIND_COLUMNS = {
     "at the horizon [m]": "end",
     "mean over the horizon [m]": "mean",
 }
-HOW_PREDICTED = {
-    "naive": CONSTANT_MOTION,
-    "regression": REGRESSION,
-    "physics": "physics alone",
-    "cooperative": "with data",
-}
+HOW_PREDICTED = {"naive": CONSTANT_MOTION, "physics": "physics alone", "cooperative": "with data"}
 
 
 def horizon_figure(content: ReportContent) -> PageFigure:

@@ -325,7 +325,7 @@ def gain_figure(content: ReportContent) -> PageFigure | None:
         chips=[
             *model_chips(order, looks, words),
             Chip("naive", CONSTANT_MOTION, NAIVE, "dash"),
-            Chip("regression", REGRESSION, NAIVE, "dot"),
+            *([Chip("regression", REGRESSION, NAIVE, "dot")] if len(content.frame("regression")) else []),
         ],
         scale=ColourScale("error of the physics alone, A [m]", *span) if span else None,
     )

@@ -215,8 +215,14 @@ def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, s
         planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
     hidden, estimates = None, {}
     if predictor.vessel is not None:
-        along = states_along(predictor.vessel, dataset.commands, seen.frame)
-        hidden = along and {name: values[some] for name, values in along.items()}
+        vessels = {"": predictor.vessel}
+        vessels |= {f"{k}:": one.physics.ship for k, one in enumerate(getattr(predictor.corrector, "parts", ()))}
+        along = {
+            prefix + name: values[some]
+            for prefix, vessel in vessels.items()
+            for name, values in (states_along(vessel, dataset.commands, seen.frame) or {}).items()
+        }
+        hidden = along or None
         if physics.observer is not None:
             observed = run_observer(predictor.vessel, seen, physics.observer).columns
             estimates = {name: values[some] for name, values in observed.items()}

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from shipid.data.dataset import Dataset
-from shipid.data.windows import Windows, covered_time
+from shipid.data.windows import Instants, Windows, covered_time
 from shipid.engine.rollout import SPEED_LIMIT
 from shipid.errors import DataError, ShipidError, shorten_line
+from shipid.hybrid.mean import MeanCorrector, sum_paths, weigh_errors
 from shipid.hybrid.method import Case, Corrector, FitResult, Task, TrialJournal, fit_all
 from shipid.metrics import (
     PREDICTION_ERRORS,
@@ -78,7 +79,7 @@ def work_of(prepared: PreparedStudy, unit: Unit, ways: tuple[StudyMethod, ...], 
 def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None) -> dict[str, FitResult]:
     """Results of one method for the foundations that it meets; no corrector where it cannot learn from these runs."""
     prepared, windows, batch, method = work.prepared, work.windows, work.batch, way.method
-    mine = {name: work.known[name] for name in way.foundations}
+    mine = {name: work.known[name] for name in way.foundations if not work.known[name].foundation.mean_of}
     cases = {
         name: Case(physics_of(prepared.study, one.foundation.vessel, one.foundation.observer), one.paths)
         for name, one in mine.items()
@@ -116,7 +117,7 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
     adapted = {one.name for one in prepared.foundations if one.fitted}
     wanted: dict[str, tuple[str, ...]] = {}
     for way in work.ways.values():
-        trained = [name for name in way.foundations if fitted[way.name][name].corrector is not None]
+        trained = [name for name, one in fitted[way.name].items() if one.corrector is not None]
         if names := tuple(one for one in trained if one in adapted or fitted[way.name][one].left_out is None):
             wanted[way.name] = names
     refits = prepared.study.bands.refits
@@ -165,6 +166,38 @@ def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -
     return left_out
 
 
+def _fair_errors(
+    work: Work, pair: tuple[str, str], fitted: Mapping[str, Mapping[str, FitResult]], left_out: Errors
+) -> Array | None:
+    """Errors (T, S, 2) [m] on the windows by models that saw nothing of their runs; None where there are none."""
+    name, method = pair
+    family, result = work.known[name].foundation.family, fitted[method][name]
+    if result.left_out is None or any(one.fitted for one in work.prepared.foundations if one.family == family):
+        return left_out.get(pair, (None, 0.0))[0]
+    return result.left_out
+
+
+def _described_cell(work: Work, pair: tuple[str, str], seconds: float, trials: list[dict[str, Any]]) -> dict[str, Any]:
+    """The columns of a row that do not depend on the result."""
+    (name, method), prepared, batch = pair, work.prepared, work.batch
+    one = work.known[name]
+    foundation = one.foundation
+    return {
+        "cell": batch.cell(name, method),
+        "foundation": name,
+        "family": foundation.family,
+        "member": foundation.member,
+        "method": method,
+        **(accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY),
+        "N_D": batch.N_D,
+        "seed": batch.seed,
+        "runs": len(prepared.runs(batch)),
+        "minutes": covered_time(work.windows) / 60,
+        "seconds": seconds,
+        "trials": trials,
+    }
+
+
 def evaluate_cell(
     work: Work,
     pair: tuple[str, str],
@@ -177,36 +210,60 @@ def evaluate_cell(
     left_out : errors of refits. origin : name and digest of the study, for the provenance of the predictor.
     """
     name, method = pair
-    one, way, result = work.known[name], work.ways[method], fitted[method][name]
-    foundation, prepared, batch = one.foundation, work.prepared, work.batch
-    errors, seconds = left_out.get(pair, (None, 0.0))
-    row: dict[str, Any] = {
-        "cell": batch.cell(name, method),
-        "foundation": name,
-        "family": foundation.family,
-        "member": foundation.member,
-        "method": method,
-        **(accuracy_of(one.test_paths, prepared.test) if foundation.base is not None else NO_ACCURACY),
-        "N_D": batch.N_D,
-        "seed": batch.seed,
-        "runs": len(prepared.runs(batch)),
-        "minutes": covered_time(work.windows) / 60,
-        "seconds": result.seconds + one.seconds + seconds,
-        "trials": result.trials,
-    }
+    one, way, result, prepared = work.known[name], work.ways[method], fitted[method][name], work.prepared
+    seconds = result.seconds + one.seconds + left_out.get(pair, (None, 0.0))[1]
+    row = _described_cell(work, pair, seconds, result.trials)
     if result.corrector is None:
         return Cell(
             row | _failed_columns("failed", shorten_line(result.sentence or one.sentence or "no training converged"))
         )
-    if not any(other.fitted for other in prepared.foundations if other.family == foundation.family):
-        errors = result.left_out if result.left_out is not None else errors  # fair: the physics saw none of these runs
-    predictor = _predictor(work, foundation, way, result.corrector, origin)
+    predictor = _predictor(work, one.foundation, way, result.corrector, origin)
     instants = instants_of(prepared.study, predictor.vessel, prepared.data, work.windows, one.estimates)
+    errors = _fair_errors(work, pair, fitted, left_out)
     predictor = with_bands(predictor, errors, work.windows, instants, prepared.kinds)
     chosen = result.corrector.hyperparameters
     words = ", ".join(f"{key} {chosen[key]:.3g}" for key in way.method.varied() if key in chosen)
     outcome, paths = _test_errors(prepared, one, predictor, way)
     return Cell({**row, **outcome, "hyperparameters": words}, predictor, paths)
+
+
+def evaluate_mean(
+    work: Work,
+    pair: tuple[str, str],
+    cells: Mapping[tuple[str, str], Cell],
+    fitted: Mapping[str, Mapping[str, FitResult]],
+    left_out: Errors,
+) -> Cell:
+    """The mean of some foundations with one method, whose cells are there; price and errors as of `evaluate_cell`."""
+    (name, method), prepared = pair, work.prepared
+    foundation, pairs = work.known[name].foundation, [(part, method) for part in work.known[name].foundation.mean_of]
+    parts = [cells[one] for one in pairs]
+    row = _described_cell(work, pair, sum(part.row["seconds"] for part in parts), [])
+    predictors = [part.predictor for part in parts if part.predictor is not None and part.paths is not None]
+    if len(predictors) < len(parts):
+        lost = next(part.row["foundation"] for part in parts if part.predictor is None or part.paths is None)
+        return Cell(row | _failed_columns("failed", f"{lost}, of which it is the mean, has no result"))
+    known = [_fair_errors(work, one, fitted, left_out) for one in pairs]
+    errors = [one for one in known if one is not None]
+    weights, mean_errors, sentence = np.full(len(parts), 1 / len(parts)), None, ""
+    if len(errors) == len(parts):
+        weights, mean_errors = weigh_errors(np.stack(errors), work.windows.run, by_left_out=foundation.by_left_out)
+    elif foundation.by_left_out:
+        sentence = "weights are equal: errors on runs left out need `bands.refits`, such as 5"
+    first = predictors[0]
+    predictor = replace(
+        first,
+        corrector=MeanCorrector(tuple(predictors), weights),
+        provenance={**first.provenance, "cell": row["cell"], "foundation": name},
+        bands=None,
+    )
+    instants = instants_of(prepared.study, first.vessel, prepared.data, work.windows)
+    predictor = with_bands(predictor, mean_errors, work.windows, instants, prepared.kinds)
+    paths = sum_paths([part.paths for part in parts if part.paths is not None], weights)
+    test = instants_of(prepared.study, first.vessel, prepared.data, prepared.test)
+    words = ", ".join(f"{part} {weight:.2g}" for part, weight in zip(foundation.mean_of, weights, strict=True))
+    outcome = _errors_of_paths(prepared, predictor, test, paths)
+    return Cell({**row, **outcome, "status": "ok", "sentence": sentence, "hyperparameters": words}, predictor, paths)
 
 
 def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:
@@ -240,20 +297,26 @@ def _test_errors(
         return _failed_columns(
             "diverged", f"the prediction is not a number, or farther than any ship gets, on {where}"
         ), None
-    error: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
-    outcome = {column: error[name] for column, name in PREDICTION_ERRORS.items()}
-    outcome |= {"rms": error["rms"], "coverage": np.nan, "width": np.nan}
-    level = study.bands.level
-    if predictor.bands is not None and predictor.bands.promises(level):
-        region = predictor.band(paths, instants, level)
-        outcome["coverage"] = coverage_share(region.holds(test.future - paths), test.run)
-        outcome["width"] = float(region.radius.mean())
+    outcome = _errors_of_paths(prepared, predictor, instants, paths)
     if lost.any():
         share = f"physics diverges on {percent_text(lost.mean(), 1)} of the test windows"
         sentence = "; ".join(
             filter(None, [sentence, f"{share}: paths there go no farther than the present speed takes the ship"])
         )
     return {**outcome, "status": "ok", "sentence": sentence}, paths
+
+
+def _errors_of_paths(prepared: PreparedStudy, predictor: Predictor, instants: Instants, paths: Array) -> dict[str, Any]:
+    """Errors [m] of paths (T, S, 2) [m] of a predictor on the test windows, and coverage and width [m] of its band."""
+    test, level = prepared.test, prepared.study.bands.level
+    error: Mapping[str, Any] = summarise_errors(position_error(paths, test.future))
+    outcome = {column: error[name] for column, name in PREDICTION_ERRORS.items()}
+    outcome |= {"rms": error["rms"], "coverage": np.nan, "width": np.nan}
+    if predictor.bands is not None and predictor.bands.promises(level):
+        region = predictor.band(paths, instants, level)
+        outcome["coverage"] = coverage_share(region.holds(test.future - paths), test.run)
+        outcome["width"] = float(region.radius.mean())
+    return outcome
 
 
 def _predictor(

@@ -13,7 +13,7 @@ from shipid.hybrid.method import Method
 from shipid.hybrid.methods import method_of
 from shipid.identification.settings import Identify, free_factors
 from shipid.observer import Observer, filter_bank
-from shipid.study.schema import PAIRED_ROLES, Study
+from shipid.study.schema import PAIRED_ROLES, MeanBlock, Study
 from shipid.vessel.load import Vessel, load_vessel
 from shipid.vessel.perturb import Family, Variant, change_structure, draw_members, resolve_families
 
@@ -30,6 +30,8 @@ class Foundation:
     base : the vessel that the variant changes.
     identify : what is identified from the runs of each batch; None: nothing.
     observer : what filters the start of the physics and adds slow forces; None: nothing.
+    mean_of : foundations of whose compensated paths it is the mean, without physics of its own.
+    by_left_out : whether runs left out weigh them.
     """
 
     name: str
@@ -40,6 +42,8 @@ class Foundation:
     description: str = ""
     identify: Identify | None = None
     observer: Observer | None = None
+    mean_of: tuple[str, ...] = ()
+    by_left_out: bool = False
 
     @property
     def fitted(self) -> bool:
@@ -101,8 +105,28 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
             foundations.append(
                 Foundation(name, family.name, variant.member, variant, vessel, words, identify, observer)
             )
+    foundations += [
+        _mean_of_foundations(block, f"model.{place}", foundations) for place, block in enumerate(study.model)
+    ]
     check_file_names([foundation.name for foundation in foundations], "family", "models")
     return (*foundations, Foundation(NO_MODEL, NO_MODEL, 0, None, None, "no physics: data alone"))
+
+
+def _mean_of_foundations(block: MeanBlock, path: str, foundations: Sequence[Foundation]) -> Foundation:
+    """The mean that a block declares; DocumentError where it has no parts, or such as it cannot take."""
+    families = list(dict.fromkeys(one.family for one in foundations if one.base is not None))
+    matched = {pattern: documents.match_paths(pattern, families) for pattern in block.mean_of}
+    for pattern, found in matched.items():
+        if not found:
+            words = f"{pattern!r} is no family with physics: {suggest_name(pattern, families)}"
+            raise DocumentError(words, path=f"{path}.mean_of")
+    parts = [one for one in foundations if any(one.family in found for found in matched.values())]
+    names = tuple(one.name for one in parts)
+    if len(parts) < 2 or any(one.observer is not None for one in parts):
+        words = f"{', '.join(names)}: a mean takes two foundations or more, none with an observer: name other families"
+        raise DocumentError(words, path=f"{path}.mean_of")
+    words, by_left_out = f"mean of {', '.join(names)}", block.weights != "equal"
+    return Foundation(block.name, block.name, 0, None, None, words, mean_of=names, by_left_out=by_left_out)
 
 
 def check_file_names(names: Sequence[str], path: str, what: str) -> None:
@@ -170,7 +194,7 @@ def methods_of(study: Study, foundations: Sequence[Foundation]) -> tuple[StudyMe
     """The methods with their settings checked, and the foundations that each meets."""
     check_file_names([block.name for block in study.method], "method.*.name", "methods")
     ways: list[StudyMethod] = []
-    families = list(dict.fromkeys(foundation.family for foundation in foundations))
+    families = list(dict.fromkeys(foundation.family for foundation in foundations if not foundation.mean_of))
     for index, block in enumerate(study.method):
         path = f"method.{index}"
         method = method_of(block.kind, block.settings, path)
@@ -192,7 +216,9 @@ def methods_of(study: Study, foundations: Sequence[Foundation]) -> tuple[StudyMe
             if words := method.unfit(base):
                 raise DocumentError(f"{family} with {block.kind}: {words}", path=path)
         left_out = tuple(f.name for f in foundations if f.family in met & refused)
-        ways.append(StudyMethod(block.name, block.kind, method, tuple(f.name for f in taken), left_out))
+        names = [f.name for f in taken]
+        names += [f.name for f in foundations if f.mean_of and method.compensates and {*f.mean_of} <= {*names}]
+        ways.append(StudyMethod(block.name, block.kind, method, tuple(names), left_out))
     met_by_any = {name for way in ways for name in way.foundations} | {NO_MODEL}
     idle = next((foundation.name for foundation in foundations if foundation.name not in met_by_any), None)
     if idle is not None:
@@ -205,7 +231,7 @@ def check_claims(study: Study, models: Sequence[Foundation]) -> None:
     """Refuse claims about families that are not there, or that are not what their role needs."""
     if study.claims is None:
         return
-    families, roles = [model.family for model in models if model.family != NO_MODEL], study.claims.roles
+    families, roles = [model.family for model in models if model.base is not None], study.claims.roles
     named = [(role, name, families, "family") for role, name in roles.items()]
     named += [("aside", name, families, "family") for name in study.claims.aside]
     if study.claims.method is not None:

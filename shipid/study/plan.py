@@ -161,6 +161,7 @@ def _shared_pairs(
 ) -> list[tuple[tuple[str, str], ...]]:
     """The cells of a batch in groups: one group shares a fit of several foundations, or one to the runs."""
     known = {one.name: one for one in foundations}
+    of_means = {name for one in known.values() if one.mean_of for name in (one.name, *one.mean_of)}
     groups: list[tuple[set[Any], list[tuple[str, str]]]] = []
     for name, way in pairs:
         one = known[name]
@@ -169,6 +170,7 @@ def _shared_pairs(
             shares.add((one.variant.name, one.identify.model_dump_json()))
         elif one.fitted:
             shares.add(one.name)
+        shares |= {(part, way.name) for part in (name, *one.mean_of)} if name in of_means else set()
         mine = [(name, way.name)]
         for group in [group for group in groups if group[0] & shares]:
             groups.remove(group)

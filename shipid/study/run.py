@@ -32,7 +32,15 @@ from shipid.hybrid.device import use_threads, vector_instructions
 from shipid.hybrid.journal import Journal
 from shipid.hybrid.method import TrialJournal as Searches
 from shipid.study import seals, store
-from shipid.study.cells import NO_ACCURACY, accuracy_of, errors_left_out, evaluate_cell, fit_method, work_of
+from shipid.study.cells import (
+    NO_ACCURACY,
+    accuracy_of,
+    errors_left_out,
+    evaluate_cell,
+    evaluate_mean,
+    fit_method,
+    work_of,
+)
 from shipid.study.cluster import Line, SentJournal, on_dask
 from shipid.study.envelope import input_envelope
 from shipid.study.lock import PAGES, sole_writer
@@ -167,7 +175,15 @@ def run_unit(
     fitted = {name: fit_method(work, way, journal) for name, way in work.ways.items()}
     left_out = errors_left_out(work, fitted)
     origin = {"study": plan.name, "digest": plan.digest}
-    return [evaluate_cell(work, pair, fitted, left_out, origin) for pair in unit.pairs]
+    cells: dict[tuple[str, str], store.Cell] = {}
+    for name, method in unit.pairs:  # a mean comes after its parts
+        is_mean = bool(work.known[name].foundation.mean_of)
+        cells[name, method] = (
+            evaluate_mean(work, (name, method), cells, fitted, left_out)
+            if is_mean
+            else evaluate_cell(work, (name, method), fitted, left_out, origin)
+        )
+    return list(cells.values())
 
 
 def _prepare_folder(
@@ -196,8 +212,9 @@ def _prepare_folder(
 
 
 def _paths_alone(prepared: PreparedStudy) -> dict[str, np.ndarray]:
-    """Paths (T, S, 2) [m] on the test windows by foundation that is not fitted."""
-    return {one.name: prepared.test_paths[one.name] for one in prepared.foundations if not one.fitted}
+    """Paths (T, S, 2) [m] on the test windows by foundation that is not fitted and no mean of others."""
+    fixed = [one.name for one in prepared.foundations if not one.fitted and not one.mean_of]
+    return {name: prepared.test_paths[name] for name in fixed}
 
 
 def _check_common(folder: Path, prepared: PreparedStudy) -> None:

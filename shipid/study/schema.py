@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
@@ -198,6 +198,16 @@ class MethodBlock(BaseModel):
         return dict(self.model_extra or {})
 
 
+class MeanBlock(Strict):
+    """`[[model]]`: the mean of the compensated paths of several foundations, for each method that meets them all."""
+
+    name: Annotated[str, Field(pattern=NAME)]
+    mean_of: Annotated[list[str], Field(min_length=1, description="families with physics; * matches any text")]
+    weights: Literal["equal", "left-out"] = Field(
+        default="equal", description="left-out: those that err least on runs left out, from 0 on, of sum 1"
+    )
+
+
 class Study(Strict):
     """A whole study document."""
 
@@ -218,6 +228,7 @@ class Study(Strict):
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     families: str | None = Field(default=None, description="a document of families that come first: a path, or a study")
     family: Annotated[list[Family], Field(min_length=1)]
+    model: list[MeanBlock] = []
     repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
         default={}, description="dotted path -> values: the study is done for each; the comparison pools them"
     )

@@ -92,7 +92,7 @@ def split(dataset, horizon=20):
 def test_a_law_that_is_linear_in_its_numbers_is_found_to_the_last_digits(seed: int) -> None:
     random = np.random.default_rng([seed, 5])
     train, test = split(log_of(drawn_law(random), np.zeros(2), random, runs=12))
-    physics, corrector = learned(train, Regression(ridge=(1e-13,), steps=(1,)))
+    physics, corrector = learned(train, Regression(ridge=(1e-13,), steps=1))
     paths = corrector.predict(physics, test.instants(known=True), np.empty(0))
     scale = np.hypot(*np.moveaxis(test.future, -1, 0)).max()
     starts = np.stack([test.columns[name] for name in "uvr"], axis=1)
@@ -107,7 +107,7 @@ def test_a_steady_current_is_found(seed: int) -> None:
     current = random.uniform(-0.3, 0.3, 2)
     train, _ = split(log_of(drawn_law(random), current, random, runs=12))
     problem = RegressionProblem(Regression(), task_of(train), "none")
-    found = problem.fit_current(np.arange(len(problem.windows)), 5)
+    found = problem.fit_current()
     assert np.hypot(*(found - current)) < 0.3 * np.hypot(*current) + 0.02
 
 
@@ -117,7 +117,7 @@ def test_it_is_plain_least_squares(seed: int) -> None:
     random = np.random.default_rng([seed, 6])
     train, _ = split(log_of(drawn_law(random), np.zeros(2), random, noise=0.05))
     task = task_of(train)
-    problem = RegressionProblem(Regression(ridge=(1e-12,), steps=(1,), mirror=False), task, "none")
+    problem = RegressionProblem(Regression(ridge=(1e-12,), steps=1), task, "none")
     rows, change = [], []
     for s in successive_windows(task):
         motion = {name: np.append(train.columns[name][s], train.states[name][:, s]) for name in "uvr"}
@@ -127,7 +127,7 @@ def test_it_is_plain_least_squares(seed: int) -> None:
         change.append(np.stack([np.diff(motion[name]) for name in "uvr"], axis=1) / STEP)
     terms = np.concatenate(rows)
     weights = np.linalg.lstsq(terms, np.concatenate(change), rcond=None)[0]
-    still = problem.laws([np.arange(len(train))])[0][0, 0]
+    still = problem.laws([np.arange(len(train))])[0, 0]
     np.testing.assert_allclose(terms @ still, terms @ weights, atol=1e-5 * SMALL.max())
 
 
@@ -156,6 +156,6 @@ def test_runs_left_out_choose_a_heavier_ridge_where_noise_is_all() -> None:
     random = np.random.default_rng(8)
     quiet, _ = split(log_of(drawn_law(random), np.zeros(2), random, runs=3))
     noisy, _ = split(log_of(drawn_law(random), np.zeros(2), random, runs=3, noise=2.0))
-    method = Regression(ridge=(1e-9, 1.0), steps=(1,))
+    method = Regression(ridge=(1e-9, 1.0), steps=1)
     ridges = [learned(windows, method)[1].hyperparameters["ridge"] for windows in (quiet, noisy)]
     assert ridges == [1e-9, 1.0]

@@ -1,0 +1,129 @@
+"""The mean of the paths of several foundations, each compensated by one method: equal weights, or by runs left out.
+
+Errors of foundations that differ cancel in part (Bates and Granger 1969, Breiman 1996: stacked regressions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from shipid.data.windows import Instants
+from shipid.files import arrays_with_prefix
+from shipid.hybrid.deployed import DeployedMethod
+from shipid.hybrid.method import Array
+from shipid.hybrid.methods import METHODS
+from shipid.hybrid.physics import Physics
+from shipid.vessel.load import check_document
+
+SUM = 1e4  # weight, of the size of the errors, with which weights are held to the sum 1
+
+
+@dataclass(frozen=True, eq=False)
+class MeanCorrector:
+    """Foundations with their fitted methods, and the weights (K,) of their paths."""
+
+    parts: tuple[DeployedMethod, ...]
+    weights: Array
+
+    @property
+    def hyperparameters(self) -> Mapping[str, float]:
+        """The weights, for the record."""
+        return {f"weight {number}": float(weight) for number, weight in enumerate(self.weights, start=1)}
+
+    @property
+    def past(self) -> float:
+        """Length of the past that a prediction needs [s]."""
+        return max(part.corrector.past for part in self.parts)
+
+    @property
+    def inputs(self) -> Any:
+        """Inputs of the first method, where it has some: of all, as they have the same settings."""
+        return getattr(self.parts[0].corrector, "inputs", None)
+
+    def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
+        """Return paths (T, S, 2) [m] in the frame (11); each part rolls out its physics, from its own actuators."""
+        known = instants.hidden or {}
+        every = [
+            replace(instants, hidden={name.removeprefix(f"{k}:"): values for name, values in known.items()} or None)
+            for k in range(len(self.parts))
+        ]
+        each = [
+            part.corrector.predict(part.physics, at, part.physics.paths(at))
+            for part, at in zip(self.parts, every, strict=True)
+        ]
+        return sum_paths(each, self.weights)
+
+    def header(self) -> dict[str, Any]:
+        """Return all that is not an array."""
+        return {"mean_of": [_part_header(part) for part in self.parts]}
+
+    def arrays(self) -> dict[str, Array]:
+        """Return all arrays by name, those of a part after its number."""
+        tables = {f"{number}.": part.corrector.arrays() for number, part in enumerate(self.parts)}
+        arrays = {prefix + name: values for prefix, table in tables.items() for name, values in table.items()}
+        return {"weights": self.weights, **arrays}
+
+    @classmethod
+    def from_arrays(cls, header: Mapping[str, Any], arrays: Mapping[str, Array]) -> Self:
+        """Rebuild what `header` and `arrays` gave."""
+        parts = []
+        for number, part in enumerate(header["mean_of"]):
+            physics = Physics(check_document(part["document"], part["file"]), **part["physics"])
+            own = arrays_with_prefix(arrays, f"{number}.")
+            corrector = METHODS[part["method"]].corrector.from_arrays(part["corrector"], own)
+            parts.append(DeployedMethod(physics, part["method"], corrector))
+        return cls(tuple(parts), arrays["weights"])
+
+
+def _part_header(part: DeployedMethod) -> dict[str, Any]:
+    physics, vessel = part.physics, part.physics.ship
+    names = ("horizon", "step", "integrator", "path")
+    return {
+        "document": vessel.document,
+        "file": vessel.file,
+        "physics": {name: getattr(physics, name) for name in names},
+        "method": part.method,
+        "corrector": part.corrector.header(),
+    }
+
+
+def sum_paths(paths: list[Array], weights: Array) -> Array:
+    """Weighted sum (T, S, 2) [m] of K paths."""
+    return np.asarray(np.tensordot(weights, np.stack(paths), 1))
+
+
+def weigh_errors(errors: Array, run: NDArray[np.str_], *, by_left_out: bool) -> tuple[Array, Array]:
+    """Weights (K,) of K foundations, and the errors (T, S, 2) [m] of their mean on runs left out.
+
+    errors : (K, T, S, 2) [m] on runs left out, not numbers where there are none. run : (S,) of each window.
+
+    With `by_left_out` weights are those, from 0 on and of sum 1, that leave the least squared error; errors on a run
+    are by the weights that the others give. Of one run weights are equal.
+    """
+    count, runs = len(errors), np.unique(run)
+    equal = np.full(count, 1 / count)
+    if not by_left_out or len(runs) < 2:
+        return equal, sum_paths([*errors], equal)
+    known = np.isfinite(errors).all(axis=(0, 1, 3))
+    each = [np.where(known, errors.swapaxes(2, 3), 0.0)[..., run == one].reshape(count, -1) for one in runs]
+    squares = np.stack([values @ values.T / max(values.shape[1], 1) for values in each])
+    left_out = np.full_like(errors[0], np.nan)
+    for one, own in zip(runs, squares, strict=True):
+        mine = run == one
+        left_out[:, mine] = sum_paths([*errors[:, :, mine]], _least_weights(squares.sum(axis=0) - own))
+    return _least_weights(squares.sum(axis=0)), left_out
+
+
+def _least_weights(squares: Array) -> Array:
+    """Weights (K,) from 0 on and of sum 1 with the least w' S w, S (K, K)."""
+    values, axes = np.linalg.eigh(squares)
+    size = float(np.sqrt(max(values.max(), 1e-300)))
+    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * axes.T / size
+    weights = nnls(np.concatenate([rows, np.full((1, len(rows)), SUM)]), np.append(np.zeros(len(rows)), SUM))[0]
+    return np.asarray(weights / weights.sum())
