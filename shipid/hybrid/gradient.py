@@ -39,8 +39,6 @@ from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
 """Model and number."""
-NARROW = 32  # units up to which a core waits for Python: networks of different widths train faster as one stack
-STACK = 4  # of them; with more nothing is gained
 PARTS = 3  # of the folds: with one for each fold Adam soon finds what only they have in common
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
@@ -130,24 +128,16 @@ class _Trainer:
         return self._seen[place]
 
     def _stacks(self, asked: Mapping[Trial, Mapping[str, float]]) -> list[list[_StackMember]]:
-        """Members of all trials and folds; those that are alike, and several that are narrow, as one stack."""
-        stacks: dict[tuple[object, ...], list[_StackMember]] = defaultdict(list)
-        race = len(asked) > len(self.tables) and not self.length.batch
+        """Members of all trials and folds; those that are alike as one stack."""
+        stacks: dict[object, list[_StackMember]] = defaultdict(list)
         for (key, number), settings in asked.items():
             for fold, (training, validation) in enumerate(self.task.folds):
                 varying, values = self._inputs(key, fold)
                 seed = seed_of(self.task.seed, number, fold, key)
                 learner = Learner(values, self.targets[key], training, validation, settings, seed)
-                narrow = race and settings["units"] <= NARROW
-                alike = (number, fold, input_table_key(self.tables[key]), settings["units"])
-                sizes = (settings["layers"], values.shape[1], len(training), len(validation))
-                stacks[sizes, None if narrow else alike].append(_StackMember((key, number), fold, varying, learner))
-        return [
-            members[start : start + size]
-            for place, members in stacks.items()
-            for size in (len(members) if place[-1] else STACK,)
-            for start in range(0, len(members), size)
-        ]
+                alike = number, fold, input_table_key(self.tables[key]), settings["layers"], settings["units"]
+                stacks[alike].append(_StackMember((key, number), fold, varying, learner))
+        return list(stacks.values())
 
     def train(self, asked: Mapping[Trial, Mapping[str, float]]) -> dict[Trial, _TrialOutcome]:
         """Train the networks of some trials; several of a model race."""
