@@ -88,24 +88,26 @@ class StackTraining:
         device: str = "cpu",
     ) -> None:
         self.learners = learners
-        self.widths = learners[0].widths
+        widths = learners[0].widths
+        self._shapes = [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))]
         settings = [one.settings for one in learners]
         learning = _single_tensor([one["learning_rate"] for one in settings], device)[:, None]
         dropout = [
-            [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(self.widths) - 2))
+            [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(widths) - 2))
         ]
         (x, y), watched = (self._samples(part, device) for part in ("training", "validation"))
         num_samples = y.shape[1]
         generators = [torch.Generator().manual_seed(int(one.seed)) for one in learners]
         order = torch.Generator().manual_seed(order_seed)
-        weights = initial_weights(self.widths, generators).to(device)
-        layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, self.widths)]  # leaves
+        weights = initial_weights(widths, generators).to(device)
+        leaves = [leaf.requires_grad_() for leaf in split_layers(weights, self._shapes)]
+        layers = list(zip(leaves[::2], leaves[1::2], strict=True))
 
         def loss(rows: Tensor | slice) -> Tensor:
             seen = x[:, rows]
             masks = [  # for the input of each layer, or None where no member drops any
                 draw_dropout(rates, (seen.shape[1], width), generators).to(device) if any(rates) else None
-                for rates, width in zip(dropout, self.widths, strict=False)
+                for rates, width in zip(dropout, widths, strict=False)
             ]
             return _stack_losses(stack_outputs(seen, layers, masks), y[:, rows])
 
@@ -113,7 +115,7 @@ class StackTraining:
         self.best = BestEpochs(weights, length.patience)
         self._epochs = minimise_losses(
             weights,
-            [leaf for layer in layers for leaf in layer],
+            leaves,
             [one["weight_decay"] for one in settings],
             length,
             self.best,
@@ -146,9 +148,9 @@ class StackTraining:
 
     def layers(self) -> tuple[Layers, ...]:
         """Weight (i, o) and bias (o,) of each layer of each network, of its best epoch."""
-        views = _layer_views(self.best.kept, self.widths)
-        arrays = [(w.detach().cpu().numpy().astype(float), b.detach().cpu().numpy().astype(float)) for w, b in views]
-        return tuple(tuple((w[k], b[k, 0]) for w, b in arrays) for k in range(len(self.learners)))
+        pieces = [one.detach().cpu().numpy().astype(float) for one in split_layers(self.best.kept, self._shapes)]
+        pairs = list(zip(pieces[::2], pieces[1::2], strict=True))
+        return tuple(tuple((w[k], b[k, 0]) for w, b in pairs) for k in range(len(self.learners)))
 
 
 def _stack_losses(made: Tensor, targets: Tensor) -> Tensor:
@@ -320,12 +322,6 @@ def split_layers(flat: Tensor, shapes: Sequence[tuple[int, ...]]) -> list[Tensor
     """Split flat weights (K, P) into views (K, ...) of these shapes."""
     pieces = torch.split(flat, [prod(shape) for shape in shapes], dim=1)
     return [piece.view(-1, *shape) for piece, shape in zip(pieces, shapes, strict=True)]
-
-
-def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
-    """Split flat weights (K, P) into views: weights (K, i, o) and biases (K, 1, o) of each layer."""
-    views = split_layers(flat, [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))])
-    return list(zip(views[::2], views[1::2], strict=True))
 
 
 def draw_dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:

@@ -57,7 +57,9 @@ def test_networks_start_as_those_of_pytorch():
     widths = [5, 16, 16, 4]
     flat = training.initial_weights(widths, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)])
     for k, seed in enumerate((11, 12)):
-        layers = [(w[k].numpy(), b[k, 0].numpy()) for w, b in training._layer_views(flat, widths)]
+        shapes = [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))]
+        pieces = [piece[k].numpy() for piece in training.split_layers(flat, shapes)]
+        layers = [(w, b[0]) for w, b in zip(pieces[::2], pieces[1::2], strict=True)]
         assert_same_weights(layers, torch_network(seed, widths), 1e-7)
 
 
