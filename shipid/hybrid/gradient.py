@@ -23,7 +23,7 @@ from torch import Tensor
 from shipid.hybrid.compensator import Compensator, Network, flatten_paths
 from shipid.hybrid.features import Inputs, input_group
 from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
-from shipid.hybrid.method import Array, FitResult, Index, Row, Task, input_table_key, shared_tables
+from shipid.hybrid.method import FitResult, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import (
     Search,
@@ -39,8 +39,6 @@ from shipid.hybrid.units import VaryingInputs
 
 Trial = tuple[str, int]
 """Model and number."""
-NARROW = 32  # units up to which a core waits for Python: networks of different widths train faster as one stack
-STACK = 4  # of them; with more nothing is gained
 PARTS = 3  # of the folds: with one for each fold Adam soon finds what only they have in common
 HALVINGS = 4  # of the epochs, down to those after which the first trials of a race stop; with 6 slow ones are lost
 
@@ -77,23 +75,15 @@ def tune_gradient(
                 trials[key, number] = study.ask(space)
         outcomes = trainer.train({one: fixed | trial.params for one, trial in trials.items()})
         for (key, number), trial in trials.items():
-            one, row = outcomes[key, number], outcomes[key, number].row
+            row, _ = outcomes[key, number]
             if row["state"] == "stopped":
                 trial.report(row["value"], row["epochs"])
             studies[key].tell(trial, row["value"] if row["state"] == "complete" else None, TRIAL_STATES[row["state"]])
-            if row["state"] == "complete" and (key not in best or row["value"] < best[key].row["value"]):
-                best[key] = one
+            if row["state"] == "complete" and (key not in best or row["value"] < best[key][0]["value"]):
+                best[key] = outcomes[key, number]
         for number in numbers:
-            search.record({key: outcomes[key, number].row for key in studies})
+            search.record({key: outcomes[key, number][0] for key in studies})
     return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in studies}
-
-
-@dataclass(frozen=True)
-class _TrialOutcome:
-    """A trial of a model: its row, and the networks of the folds."""
-
-    row: Row
-    networks: tuple[Network, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +96,7 @@ class _StackMember:
     learner: Learner
 
 
+_TrialOutcome = tuple[Row, tuple[Network, ...]]  # the row of a trial, and the networks of the folds
 _RunningStack = tuple[list[_StackMember], StackTraining]
 
 
@@ -116,38 +107,19 @@ class _Trainer:
         self.task, self.inputs, self.length = task, inputs, length
         self.tables = shared_tables(task, inputs)
         self.targets = {key: flatten_paths(paths) for key, paths in task.targets.items()}
-        self._seen: dict[object, tuple[VaryingInputs, Array]] = {}
-        self._again: dict[int, dict[Trial, _TrialOutcome]] = {}
-
-    def _inputs(self, key: str, fold: int) -> tuple[VaryingInputs, Array]:
-        """What varies in the training windows of a fold, and its values (S, d), normalised; once for equal inputs."""
-        table = self.tables[key]
-        place = (fold, input_table_key(table))
-        if place not in self._seen:
-            training = {name: values[self.task.folds[fold][0]] for name, values in table.items()}
-            varying = VaryingInputs.of(training, mirror=False)
-            self._seen[place] = varying, varying.normaliser.apply(table)
-        return self._seen[place]
 
     def _stacks(self, asked: Mapping[Trial, Mapping[str, float]]) -> list[list[_StackMember]]:
-        """Members of all trials and folds; those that are alike, and several that are narrow, as one stack."""
-        stacks: dict[tuple[object, ...], list[_StackMember]] = defaultdict(list)
-        race = len(asked) > len(self.tables) and not self.length.batch
+        """Members of all trials and folds; those that are alike as one stack."""
+        stacks: dict[object, list[_StackMember]] = defaultdict(list)
         for (key, number), settings in asked.items():
             for fold, (training, validation) in enumerate(self.task.folds):
-                varying, values = self._inputs(key, fold)
-                seed = seed_of(self.task.seed, number, fold, key)
+                table, seed = self.tables[key], seed_of(self.task.seed, number, fold, key)
+                varying = VaryingInputs.of({name: values[training] for name, values in table.items()}, mirror=False)
+                values = varying.normaliser.apply(table)
                 learner = Learner(values, self.targets[key], training, validation, settings, seed)
-                narrow = race and settings["units"] <= NARROW
-                alike = (number, fold, input_table_key(self.tables[key]), settings["units"])
-                sizes = (settings["layers"], values.shape[1], len(training), len(validation))
-                stacks[sizes, None if narrow else alike].append(_StackMember((key, number), fold, varying, learner))
-        return [
-            members[start : start + size]
-            for place, members in stacks.items()
-            for size in (len(members) if place[-1] else STACK,)
-            for start in range(0, len(members), size)
-        ]
+                alike = number, fold, input_table_key(table), settings["layers"], settings["units"]
+                stacks[alike].append(_StackMember((key, number), fold, varying, learner))
+        return list(stacks.values())
 
     def train(self, asked: Mapping[Trial, Mapping[str, float]]) -> dict[Trial, _TrialOutcome]:
         """Train the networks of some trials; several of a model race."""
@@ -181,7 +153,7 @@ class _Trainer:
             row = trial_row(trial[1], asked[trial], value, 0.0, epochs) | {"seconds": seconds[trial]}
             if trial in stopped and row["state"] == "complete":
                 row["state"] = "stopped"
-            outcomes[trial] = _TrialOutcome(row, networks)
+            outcomes[trial] = row, networks
         return outcomes
 
     def fitted(self, key: str, rows: Mapping[str, list[Row]], best: _TrialOutcome | None, at_once: int) -> FitResult:
@@ -191,17 +163,15 @@ class _Trainer:
         if not kept:
             return FitResult(None, rows[key], seconds)
         number = kept[0]["number"]
-        if best is None or number != best.row["number"]:
+        if best is None or number != best[0]["number"]:
             first = number - number % at_once
-            if first not in self._again:
-                again = {  # in the order of the first training, so that stacks hold the same members
-                    (name, place): rows[name][place]["params"]
-                    for place in range(first, min(first + at_once, len(rows[key])))
-                    for name in rows
-                }
-                self._again[first] = self.train(again)
-            best = self._again[first][key, number]
-        return FitResult(Compensator(self.inputs, best.networks, kept[0]["params"]), rows[key], seconds)
+            again = {  # in the order of the first training, so that stacks hold the same members
+                (name, place): rows[name][place]["params"]
+                for place in range(first, min(first + at_once, len(rows[key])))
+                for name in rows
+            }
+            best = self.train(again)[key, number]
+        return FitResult(Compensator(self.inputs, best[1], kept[0]["params"]), rows[key], seconds)
 
 
 def _stop_worst(running: list[_RunningStack], kept: int) -> set[Trial]:

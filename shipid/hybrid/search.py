@@ -294,8 +294,7 @@ def windows_of_folds(task: Task) -> Index:
 
 def mean_squared_error(paths: Array, future: Array) -> float:
     """Mean squared error [m^2] per coordinate; infinite where a path is not finite."""
-    value = float(np.square(paths - future).mean())
-    return value if np.isfinite(value) else float("inf")
+    return float(np.nan_to_num(np.square(paths - future).mean(), nan=np.inf, posinf=np.inf))
 
 
 class SearchProblem(ABC):

@@ -17,7 +17,6 @@ import torch
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from torch import Tensor
-from torch.nn.functional import pad
 
 from shipid.hybrid.compensator import Layers
 from shipid.hybrid.method import Array, Index
@@ -73,8 +72,7 @@ class StackTraining:
 
     Parameters
     ----------
-    learners : with as many layers, inputs, outputs and samples each. Narrower ones are padded: what is added to a
-        weight is 0, and stays 0.
+    learners : with the same widths and as many samples each.
     order_seed : of the order of the samples in batches, the same for all.
     device : a PyTorch device; random numbers are drawn on the CPU.
 
@@ -90,25 +88,26 @@ class StackTraining:
         device: str = "cpu",
     ) -> None:
         self.learners = learners
-        widths = [one.widths for one in learners]
-        self.widest = list(map(max, zip(*widths, strict=True)))
+        widths = learners[0].widths
+        self._shapes = [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))]
         settings = [one.settings for one in learners]
         learning = _single_tensor([one["learning_rate"] for one in settings], device)[:, None]
         dropout = [
-            [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(self.widest) - 2))
+            [one[name] for one in settings] for name in ("input_dropout", *["hidden_dropout"] * (len(widths) - 2))
         ]
         (x, y), watched = (self._samples(part, device) for part in ("training", "validation"))
         num_samples = y.shape[1]
         generators = [torch.Generator().manual_seed(int(one.seed)) for one in learners]
         order = torch.Generator().manual_seed(order_seed)
         weights = initial_weights(widths, generators).to(device)
-        layers = [(w.requires_grad_(), b.requires_grad_()) for w, b in _layer_views(weights, self.widest)]  # leaves
+        leaves = [leaf.requires_grad_() for leaf in split_layers(weights, self._shapes)]
+        layers = list(zip(leaves[::2], leaves[1::2], strict=True))
 
         def loss(rows: Tensor | slice) -> Tensor:
             seen = x[:, rows]
             masks = [  # for the input of each layer, or None where no member drops any
-                draw_dropout(rates, seen.shape[1], sizes, generators).to(device) if any(rates) else None
-                for rates, *sizes in zip(dropout, *widths, strict=False)
+                draw_dropout(rates, (seen.shape[1], width), generators).to(device) if any(rates) else None
+                for rates, width in zip(dropout, widths, strict=False)
             ]
             return _stack_losses(stack_outputs(seen, layers, masks), y[:, rows])
 
@@ -116,7 +115,7 @@ class StackTraining:
         self.best = BestEpochs(weights, length.patience)
         self._epochs = minimise_losses(
             weights,
-            [leaf for layer in layers for leaf in layer],
+            leaves,
             [one["weight_decay"] for one in settings],
             length,
             self.best,
@@ -149,14 +148,9 @@ class StackTraining:
 
     def layers(self) -> tuple[Layers, ...]:
         """Weight (i, o) and bias (o,) of each layer of each network, of its best epoch."""
-        arrays = [
-            (w.detach().cpu().numpy().astype(float), b[:, 0].detach().cpu().numpy().astype(float))
-            for w, b in _layer_views(self.best.kept, self.widest)
-        ]
-        return tuple(
-            tuple((w[k, :i, :o], b[k, :o]) for (w, b), (i, o) in zip(arrays, pairwise(one.widths), strict=True))
-            for k, one in enumerate(self.learners)
-        )
+        pieces = [one.detach().cpu().numpy().astype(float) for one in split_layers(self.best.kept, self._shapes)]
+        pairs = list(zip(pieces[::2], pieces[1::2], strict=True))
+        return tuple(tuple((w[k], b[k, 0]) for w, b in pairs) for k in range(len(self.learners)))
 
 
 def _stack_losses(made: Tensor, targets: Tensor) -> Tensor:
@@ -211,19 +205,14 @@ def stack_outputs(h: Tensor, layers: Stack, masks: Sequence[Tensor | None] = ())
     return h
 
 
-def initial_weights(widths: Sequence[Sequence[int]], generators: Sequence[torch.Generator]) -> Tensor:
-    """Draw PyTorch's default start of `Linear`, U(-1, 1) / sqrt(i), as flat weights (K, P), a member per generator.
-
-    widths : of each member; those that are less than the widest are padded with zeros.
-    """
-    widest = list(map(max, zip(*widths, strict=True)))
+def initial_weights(widths: Sequence[int], generators: Sequence[torch.Generator]) -> Tensor:
+    """Draw PyTorch's default start of `Linear`, U(-1, 1) / sqrt(i), as flat weights (K, P), a member per generator."""
     members = []
-    for generator, own in zip(generators, widths, strict=True):
+    for generator in generators:
         parts = []
-        for (i, o), (rows, columns) in zip(pairwise(own), pairwise(widest), strict=True):
+        for i, o in pairwise(widths):
             draws = [torch.empty(shape).uniform_(-1.0, 1.0, generator=generator) for shape in ((o, i), (o,))]
-            weight, bias = draws[0].T / i**0.5, draws[1] / i**0.5
-            parts += [pad(weight, (0, columns - o, 0, rows - i)).reshape(-1), pad(bias, (0, columns - o))]
+            parts += [draws[0].T.reshape(-1) / i**0.5, draws[1] / i**0.5]
         members.append(torch.cat(parts))
     return torch.stack(members)
 
@@ -335,29 +324,18 @@ def split_layers(flat: Tensor, shapes: Sequence[tuple[int, ...]]) -> list[Tensor
     return [piece.view(-1, *shape) for piece, shape in zip(pieces, shapes, strict=True)]
 
 
-def _layer_views(flat: Tensor, widths: Sequence[int]) -> list[tuple[Tensor, Tensor]]:
-    """Split flat weights (K, P) into views: weights (K, i, o) and biases (K, 1, o) of each layer."""
-    views = split_layers(flat, [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))])
-    return list(zip(views[::2], views[1::2], strict=True))
-
-
-def draw_dropout(
-    rates: Sequence[float], samples: int, widths: Sequence[int], generators: Sequence[torch.Generator]
-) -> Tensor:
+def draw_dropout(rates: Sequence[float], shape: tuple[int, int], generators: Sequence[torch.Generator]) -> Tensor:
     """Draw inverted drop-out (K, n, i): 1 / (1 - p) with probability 1 - p, else 0; for p = 1 all is 0, not 0 / 0.
 
-    widths : of each member; the widest is i, and what lies beyond the width of another is 0. A member without drop-out
-    draws nothing, alone or in company.
+    A member without drop-out draws nothing, alone or in company.
     """
     masks = []
-    for p, width, generator in zip(rates, widths, generators, strict=True):
+    for p, generator in zip(rates, generators, strict=True):
         if p > 0:  # the draws of `bernoulli_`, bit by bit, in less than half of its time
-            bits = torch.empty((samples, width), dtype=torch.int64).random_(generator=generator)
-            kept = bits.bitwise_and_(2**53 - 1) < ceil((1 - p) * 2**53)
-            mask = kept.float().div_(1 - p if p < 1 else 1.0)
+            bits = torch.empty(shape, dtype=torch.int64).random_(0, 2**53, generator=generator)
+            masks.append((bits < ceil((1 - p) * 2**53)).float().div_(1 - p if p < 1 else 1.0))
         else:
-            mask = torch.ones(samples, width)
-        masks.append(pad(mask, (0, max(widths) - width)))
+            masks.append(torch.ones(shape))
     return torch.stack(masks)
 
 

@@ -20,6 +20,7 @@ QUICK: dict[str, dict[str, Any]] = {
     "modules": {"trials": 2, "units": 4, "centres": 16, "ridge": 1e-3},
     "one-step": {"trials": 2, "units": 16, "averaged": 2},
     "path-drawn": {"trials": 3, "units": 24, "averaged": 2, "search_windows": 40},
+    "path-refined": {"trials": 3, "units": 24, "averaged": 2, "search_windows": 40, "epochs": 2},
     "path-trained": {"trials": 2, "epochs": 20, "units": 8, "layers": 1, "input_dropout": 0.0, "hidden_dropout": 0.0},
     "recurrent": {"trials": 2, "epochs": 3, "units": 6, "seconds": 4.0},
 }

@@ -49,17 +49,9 @@ def test_equal_architectures_train_as_one_stack_and_others_alone(columns, target
     assert stacks == [1] * 6
 
 
-def test_narrow_networks_of_a_race_train_in_stacks_and_the_best_goes_to_the_end(columns, targets, monkeypatch):
-    stacks = []
-
-    def counted(learners, *args, **kwargs):
-        stacks.append(len(learners))
-        return StackTraining(learners, *args, **kwargs)
-
-    monkeypatch.setattr("shipid.hybrid.gradient.StackTraining", counted)
+def test_the_best_of_a_race_goes_to_the_end(columns, targets):
     race = {"trials": 5, "at_once": 3, "layers": 1, "units": (4, 20), "epochs": 128, "patience": 0}
     tuned = tune(columns, COMMANDS, targets, [FOLD], PathTrained(**race), seed=4)
-    assert stacks == [4, 2, 4]  # six networks of three trials, then four
     for fit in tuned.values():
         rows = fit.trials
         assert [row["state"] == "complete" for row in rows].count(True) == 2  # one a round
@@ -91,40 +83,3 @@ def test_the_statistics_are_those_of_the_training_windows(columns, targets):
     np.testing.assert_array_equal(after.normaliser.std, before.normaliser.std)
     assert after.features == before.features
     assert before.normaliser.mean[0] == pytest.approx(columns["u"][40:200].mean())
-
-
-def test_a_mirrored_ship_gets_the_mirrored_path_and_the_loss_is_that_of_the_saved_networks(columns, targets):
-    """Scales of groups and the mirror are in the weights: plain networks predict."""
-    settings = {"mirror": True, "groups": (0.25, 4.0), "input_dropout": 0.0, "hidden_dropout": 0.0}
-    tuned = tune(columns, COMMANDS, targets, [FOLD], SMALL.model_copy(update=settings), seed=4)["high-1"]
-    odd = ("psi", "v", "r", "beta_w", "port.delta", "starboard.delta")
-    image = {name: -values if name in odd else values for name, values in columns.items()}
-    here, there = (compensation(tuned.corrector, seen) for seen in (columns, image))
-    assert np.abs(here).max() > 0.01
-    np.testing.assert_allclose(there, here * [1.0, -1.0], atol=1e-9)
-    best = min(tuned.trials, key=lambda row: row["value"])
-    assert {"motion_scale", "command_scale", "wind_scale"} < set(best["params"])
-    assert np.square(here - targets["high-1"])[:, FOLD[1]].mean() == pytest.approx(best["value"], rel=1e-4)
-
-
-def test_on_polynomials_networks_do_not_depend_on_the_unit_of_the_targets(columns, targets):
-    """In metres Adam, whose steps have one size, gets further to a small target than to a large one."""
-    far = {"high-1": targets["high-1"] * 64.0}
-    scaled, metres = (SMALL.model_copy(update={"terms": terms, "epochs": 20}) for terms in (3, None))
-    left = {}
-    for method in (scaled, metres):
-        near, large = (
-            tune(columns, COMMANDS, given, [FOLD], method, seed=4)["high-1"].trials
-            for given in ({"high-1": targets["high-1"]}, far)
-        )
-        left[method.terms] = [one["value"] / 64.0**2 / other["value"] for one, other in zip(large, near, strict=True)]
-    np.testing.assert_allclose(left[3], 1.0, rtol=1e-4)
-    assert min(left[None]) > 1.1
-
-
-def test_the_error_of_a_trial_on_polynomials_counts_what_they_cannot_follow(columns, targets):
-    bent = {"high-1": targets["high-1"] + np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])[:, None, None]}
-    fit = tune(columns, COMMANDS, bent, [FOLD], SMALL.model_copy(update={"terms": 2}), seed=4)["high-1"]
-    made = compensation(fit.corrector, columns)[:, FOLD[1]]
-    best = min(fit.trials, key=lambda row: row["value"])
-    assert np.square(made - bent["high-1"][:, FOLD[1]]).mean() == pytest.approx(best["value"], rel=1e-4)

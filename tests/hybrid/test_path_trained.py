@@ -46,8 +46,5 @@ def test_the_trained_path_is_what_the_method_pins():
         "batch": 0,  # full
         "patience": 200,
         "memory": {"history": (), "turned": (), "positions": (), "states": (), "error": (), "observer": False},
-        "mirror": False,
-        "groups": None,
         "at_once": 1,
-        "terms": None,
     }

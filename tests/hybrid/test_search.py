@@ -31,6 +31,7 @@ LONGER: dict[str, dict[str, Any]] = {
     "hankel-dmd": {"delays": (2.0, 3.0, 4.0)},
     "path-trained": {"trials": 14, "epochs": 3, "units": (4, 12)},
     "path-drawn": {"trials": 3, "search_windows": 1000},
+    "path-refined": {"trials": 3, "search_windows": 1000},
     DOCUMENTED: {},
 }
 documented = pytest.fixture(autouse=True)(list_documented)
@@ -78,7 +79,7 @@ def task_in(here: World, kind: str, journal: Journal | None) -> Task:
 
 
 CUT = [(kind, 1 + len(kind) % 2, {}) for kind in SEARCHING]
-RACE = {"at_once": 4, "epochs": 64, "mirror": True, "groups": (0.5, 4.0)}
+RACE = {"at_once": 4, "epochs": 64}
 
 
 @pytest.mark.parametrize(

@@ -55,11 +55,11 @@ def assert_same_weights(layers, network, tolerance):
 
 def test_networks_start_as_those_of_pytorch():
     widths = [5, 16, 16, 4]
-    flat = training.initial_weights(
-        [widths] * 2, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)]
-    )
+    flat = training.initial_weights(widths, [torch.Generator().manual_seed(11), torch.Generator().manual_seed(12)])
     for k, seed in enumerate((11, 12)):
-        layers = [(w[k].numpy(), b[k, 0].numpy()) for w, b in training._layer_views(flat, widths)]
+        shapes = [shape for i, o in pairwise(widths) for shape in ((i, o), (1, o))]
+        pieces = [piece[k].numpy() for piece in training.split_layers(flat, shapes)]
+        layers = [(w, b[0]) for w, b in zip(pieces[::2], pieces[1::2], strict=True)]
         assert_same_weights(layers, torch_network(seed, widths), 1e-7)
 
 
@@ -100,24 +100,53 @@ def test_a_member_does_not_notice_its_company(problem):
             np.testing.assert_allclose(mine[0], theirs[0], atol=2e-4)
 
 
-def test_a_narrow_member_does_not_notice_that_it_is_padded_nor_that_it_is_trained_in_parts(problem):
+def test_a_stack_does_not_notice_that_it_is_trained_in_parts(problem):
     x, y = problem
-    widths, run = (3, 12, 7), {"epochs": 40, "patience": 6, "input_dropout": 0.1, "hidden_dropout": 0.2}
-    members, length = settings(3, units=widths, **run)
-    learners = [Learner(x, y[k], TRAIN, VAL, members[k], k) for k in range(3)]
-    stack = StackTraining(learners, length)
+    run = {"epochs": 40, "patience": 6, "input_dropout": 0.1, "hidden_dropout": 0.2}
+    members, length = settings(3, **run)
+    stack = StackTraining([Learner(x, y[k], TRAIN, VAL, members[k], k) for k in range(3)], length)
     for part in (7, 3, None):
         stack.advance(part)
-    for k, units in enumerate(widths):
-        alone = train_stack(x, y[k : k + 1], TRAIN, VAL, *settings(units=units, **run), [k])
-        assert alone.losses()[0] == pytest.approx(stack.losses()[k], rel=1e-3)
-        assert [w.shape for w, _ in alone.layers()[0]] == [w.shape for w, _ in stack.layers()[k]]
+    whole = train_stack(x, y, TRAIN, VAL, members, length, range(3))
+    np.testing.assert_array_equal(stack.losses(), whole.losses())
+
+
+def solved_error(x, y, weight, offset, ridge):
+    """Mean squared error of each third of the samples, by output weights of drawn units that the others solve."""
+    features = np.tanh(x @ weight + offset) / len(offset) ** 0.5
+    missed = []
+    for part in np.split(np.arange(96), 3):
+        rest = np.setdiff1d(np.arange(96), part)
+        gram = features[rest].T @ features[rest] + ridge * np.eye(len(offset))
+        missed.append(features[part] @ np.linalg.solve(gram, features[rest].T @ y[rest]) - y[part])
+    return np.square(missed).mean()
+
+
+def test_a_step_moves_hidden_units_against_the_gradient_of_the_error_on_what_is_left_out(problem):
+    """The first step of Adam moves each weight by the learning rate, against the sign of its slope."""
+    x, y = problem[0][:96], problem[1][0, :96]
+    rng, rate, ridge = np.random.default_rng(0), 1e-3, 0.03
+    weight, offset = rng.normal(size=(5, 7)), rng.normal(size=7)
+    part = torch.arange(96) // 32
+    dealt = [[(part != k, part == k) for k in range(3)]]
+    (moved, shifted), (last, _) = training.train_units(
+        (weight, offset), [np.eye(5)], x, y, np.arange(96), dealt, rate, ridge
+    )
+    for new, old, place in ((moved, weight, (2, 3)), (moved, weight, (0, 6)), (shifted, offset, (4,))):
+        near = [weight.copy(), offset.copy(), weight.copy(), offset.copy()]
+        for copy, step in ((near[old is offset], 1e-5), (near[2 + (old is offset)], -1e-5)):
+            copy[place] += step
+        slope = solved_error(x, y, *near[:2], ridge) - solved_error(x, y, *near[2:], ridge)
+        assert new[place] - old[place] == pytest.approx(-rate * np.sign(slope), rel=1e-3)
+    features = np.tanh(x @ moved + shifted) / 7**0.5  # in the end all samples solve
+    expected = np.linalg.solve(features.T @ features + ridge * np.eye(7), features.T @ y)
+    np.testing.assert_allclose(last * 7**0.5, expected, rtol=1e-8)
 
 
 @pytest.mark.parametrize("rate", [0.1, 0.5, 0.999])
 def test_drop_out_is_that_of_torch_bit_by_bit(rate):
     one, other = torch.Generator().manual_seed(3), torch.Generator().manual_seed(3)
-    drawn = training.draw_dropout([rate], 40, [30], [one])[0]
+    drawn = training.draw_dropout([rate], (40, 30), [one])[0]
     assert torch.equal(drawn, torch.empty(40, 30).bernoulli_(1 - rate, generator=other).div_(1 - rate))
     assert torch.equal(one.get_state(), other.get_state())
 
