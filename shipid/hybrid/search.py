@@ -404,7 +404,7 @@ class SearchedAlone(SearchMethod):
         """Search for one foundation; the best trials make its corrector."""
         search, problem = Search(task, [name], self, again=self.CHAINED), self.problem(self, task, name)
         rounds = enumerate(suggested_points(self, search, task.seed)) if self.suggest else ()
-        points = (asked[name, number] for number, asked in rounds) if self.suggest else self.points()
+        points = (asked.get((name, number), {}) for number, asked in rounds) if self.suggest else self.points()
         for number, point in search.left(points):
             start = time.process_time()
             value, params, epochs = problem.judge(number, point)
