@@ -11,18 +11,16 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count, pairwise
+from itertools import pairwise
 from math import ceil
 from typing import Any, cast
 
 import numpy as np
-import optuna
 import torch
 from torch import Tensor
 
 from shipid.hybrid.compensator import Compensator, Network, flatten_paths
 from shipid.hybrid.features import Inputs, input_group
-from shipid.hybrid.journal import TRIAL_STATES, frozen_trial
 from shipid.hybrid.method import FitResult, Index, Row, Task, input_table_key, shared_tables
 from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import (
@@ -30,7 +28,7 @@ from shipid.hybrid.search import (
     SearchMethod,
     best_trials,
     seed_of,
-    setting_at_share,
+    suggested_points,
     trial_row,
     windows_of_folds,
 )
@@ -54,36 +52,17 @@ def tune_gradient(
     at_once : trials that are proposed at a time; more than one race.
     """
     trainer, search = _Trainer(task, inputs, length), Search(task, task.cases, method)
-    space = method.space()
     if search.done != search.count:  # a round that was interrupted begins again
         search.rows = {key: rows[: search.done - search.done % at_once] for key, rows in search.rows.items()}
-    studies = {key: optuna.create_study(direction="minimize") for key in search.rows}
-    for key, study in studies.items():
-        study.add_trials([frozen_trial(row, space) for row in search.rows[key]])
     best: dict[str, _TrialOutcome] = {}  # of the trials that were trained here
-    fixed = {  # what `suggest` leaves out is in the middle
-        name: setting_at_share(method, name, 0.5) if name in method.ranges() else getattr(method, name)
-        for name in method.SEARCHED
-    }
-    for first, _ in search.left(count()):
-        numbers = range(first, min(first + at_once, search.count or first + at_once))
-        trials: dict[Trial, optuna.Trial] = {}
-        for number in numbers:
-            for key, study in studies.items():  # TPE as the paper's Optuna had it: later defaults differ
-                seed = seed_of(task.seed, key, number)
-                study.sampler = optuna.samplers.TPESampler(multivariate=False, constant_liar=at_once > 1, seed=seed)
-                trials[key, number] = study.ask(space)
-        outcomes = trainer.train({one: fixed | trial.params for one, trial in trials.items()})
-        for (key, number), trial in trials.items():
-            row, _ = outcomes[key, number]
-            if row["state"] == "stopped":
-                trial.report(row["value"], row["epochs"])
-            studies[key].tell(trial, row["value"] if row["state"] == "complete" else None, TRIAL_STATES[row["state"]])
+    for first, asked in search.left(suggested_points(method, search, task.seed, at_once)):
+        outcomes = trainer.train(asked)
+        for (key, _), (row, networks) in outcomes.items():
             if row["state"] == "complete" and (key not in best or row["value"] < best[key][0]["value"]):
-                best[key] = outcomes[key, number]
-        for number in numbers:
-            search.record({key: outcomes[key, number][0] for key in studies})
-    return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in studies}
+                best[key] = row, networks
+        for number in range(first, first + len(asked) // len(search.rows)):
+            search.record({key: outcomes[key, number][0] for key in search.rows})
+    return {key: trainer.fitted(key, search.rows, best.get(key), at_once) for key in search.rows}
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,24 +230,44 @@ def trial_points(method: SearchMethod, idle: frozenset[str] = frozenset({"ridge"
         yield {**fixed, **point}
 
 
-def suggested_points(method: SearchMethod, search: Search, name: str, seed: int) -> Iterator[dict[str, float]]:
-    """The trials of a foundation as Optuna's TPE chooses them by `suggest`; other settings are in the middle.
+def suggested_points(
+    method: SearchMethod, search: Search, seed: int, at_once: int = 1
+) -> Iterator[dict[tuple[str, int], dict[str, Any]]]:
+    """The trials (foundation, number) as Optuna's TPE chooses them, so many at a time: a round for each of its numbers.
 
-    The trials of an interrupted search are told again; the sampler of a trial is seeded by its number.
+    What `suggest` leaves out is in the middle. The trials of an interrupted search are told again; the sampler of a
+    trial is seeded by its number.
     """
     import optuna  # a study is read without it
 
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study, middle, rows = optuna.create_study(), next(trial_points(method, frozenset())), search.rows[name]
-    for number in count():
-        study.sampler = optuna.samplers.TPESampler(seed=seed_of(seed, name, number))
-        if number < len(rows):
-            study.enqueue_trial(rows[number]["params"])
-        trial = study.ask()
-        method.suggest(trial)
-        yield {**middle, **trial.params}
-        value = rows[number]["value"] if rows[number]["state"] == "complete" else None
-        study.tell(trial, value, state=optuna.trial.TrialState.FAIL if value is None else None)
+    from shipid.hybrid.journal import TRIAL_STATES
+
+    space, studies = method.space(), {key: optuna.create_study() for key in search.rows}
+    older: dict[str, Any] = (
+        {} if method.suggest else {"multivariate": False, "constant_liar": at_once > 1}
+    )  # the paper's defaults
+    fixed = {
+        name: setting_at_share(method, name, 0.5) if name in method.ranges() else getattr(method, name)
+        for name in method.SEARCHED
+    }
+    for first in count(0, at_once):
+        trials: dict[tuple[str, int], optuna.Trial] = {}
+        for number in range(first, min(first + at_once, search.count or first + at_once)):
+            for key, study in studies.items():
+                study.sampler = optuna.samplers.TPESampler(**older, seed=seed_of(seed, key, number))
+                if number < len(search.rows[key]):
+                    study.enqueue_trial(search.rows[key][number]["params"])
+                trials[key, number] = study.ask(None if method.suggest else space)
+                if method.suggest:
+                    method.suggest(trials[key, number])
+        asked = {one: fixed | trial.params for one, trial in trials.items()}
+        yield from [asked] * at_once
+        for (key, number), trial in trials.items():
+            row = search.rows[key][number]
+            if row["state"] == "stopped":
+                trial.report(row["value"], row["epochs"])
+            value = row["value"] if row["state"] == "complete" else None
+            studies[key].tell(trial, value, TRIAL_STATES[row["state"]])
 
 
 def setting_at_share(method: SearchMethod, name: str, share: float) -> float:
@@ -392,7 +412,8 @@ class SearchedAlone(SearchMethod):
     def _fit(self, kind: type[SearchProblem], task: Task, name: str) -> FitResult:
         """Search for one foundation; the best trials make its corrector."""
         search, problem = Search(task, [name], self, again=self.CHAINED), kind(self, task, name)
-        points = self.points() if self.suggest is None else suggested_points(self, search, name, task.seed)
+        rounds = enumerate(suggested_points(self, search, task.seed)) if self.suggest else ()
+        points = (asked.get((name, number), {}) for number, asked in rounds) if self.suggest else self.points()
         for number, point in search.left(points):
             start = time.process_time()
             value, params, epochs = problem.judge(number, point)
