@@ -204,7 +204,7 @@ class MeanBlock(Strict):
     name: Annotated[str, Field(pattern=NAME)]
     mean_of: Annotated[list[str], Field(min_length=1, description="families with physics; * matches any text")]
     weights: Literal["equal", "left-out"] = Field(
-        default="equal", description="left-out: those that err least on runs left out, from 0 on, of sum 1"
+        default="left-out", description="left-out: those that err least on runs left out, from 0 on, of sum 1"
     )
 
 

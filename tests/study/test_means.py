@@ -20,7 +20,7 @@ from shipid.study.store import cell_file, finished_units
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import MIXED, run_here, tiny_plan
 
-EQUAL, WEIGHED = {"name": "equal", "mean_of": ["*"]}, {"name": "weighed", "mean_of": ["*"], "weights": "left-out"}
+EQUAL, WEIGHED = {"name": "equal", "mean_of": ["*"], "weights": "equal"}, {"name": "weighed", "mean_of": ["*"]}
 
 
 def plan_of(folder: Path, **changes: Any) -> Plan:
