@@ -247,18 +247,21 @@ def _limit_of_accuracy(case: AnswerCase, place: int, models: Sequence[str], lead
     limit = break_even(case.table, case.fixed_physics(), place)
     if limit is None or (limit.low <= limit.limits[0] and limit.high >= limit.limits[1]):
         return ""
-    bounds, A = _bounds(limit, _two_digits), "its own mean error over the horizon, A,"
+    odd_words, A = "", "its own mean error over the horizon, A,"
     known = {name: case.table.mean(name, PHYSICS_ONLY) for name in models if name in case.table.A}
     better, worse, _ = case.sides(models, lead)
     odd = {"better": [name for name in better if known.get(name, 0) > limit.value]}
     odd["worse"] = [name for name in worse if known.get(name, np.inf) < limit.value]
     for how, names in odd.items():
         named = join_few_names([f"{name} (A {metres_text(known[name])})" for name in names])
-        bounds += f"; yet {named} {plural_word(len(names), 'does', 'do')} {how}" if names else ""
+        odd_words += f"; yet {named} {plural_word(len(names), 'does', 'do')} {how}" if names else ""
+    bounds = _bounds(limit, _two_digits) + odd_words
     if limit.above:
         return f"physics pays even if {A} is {metres_text(limit.limits[1])}, the worst tried{bounds}"
     if limit.below:
         return f"physics does not pay even if {A} is {metres_text(limit.limits[0])}, the best tried{bounds}"
+    if not better and limit.low <= limit.limits[0]:
+        return f"physics is not shown to pay; where {A} is above {_two_digits(limit.high)} m, it does not{odd_words}"
     return f"physics pays if {A} is below about {_two_digits(limit.value)} m{bounds}"
 
 
@@ -361,13 +364,14 @@ def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Itera
     """Which models, and which physics alone, do not beat a regression on the same runs."""
     table, fixed = case.table, case.fixed_physics()
     for amount, place in case.ends.items():
-        known = [*((name, place) for name in models), *((name, PHYSICS_ONLY) for name in fixed)]
-        lead = table.compare([[(1.0, REGRESSION, place), (-1.0, *model)] for model in known])
-        _, worse, unknown = case.sides([*models, *(f"{name} alone" for name in fixed)], lead)
-        words = [f"beats {model_list(worse)}"] if worse else []
-        words += [f"is not shown to be beaten by {model_list(unknown)}"] if unknown else []
+        words = []
+        for names, column, how in ((models, place, "with the same runs"), (fixed, PHYSICS_ONLY, "as physics alone")):
+            lead = table.compare([[(1.0, REGRESSION, place), (-1.0, name, column)] for name in names])
+            _, worse, unknown = case.sides(names, lead) if names else ([], [], [])
+            words += [f"beats {model_list(worse)} {how}"] if worse else []
+            words += [f"is not shown to be beaten by {model_list(unknown)} {how}"] if unknown else []
         one = f"regression on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
-        yield f"A {one} {' and '.join(words)}." if words else f"All compared models, physics alone too, beat a {one}."
+        yield f"A {one} {'; it '.join(words)}." if words else f"All compared models, physics alone too, beat a {one}."
 
 
 def _sentences_on_sides(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:

@@ -15,7 +15,8 @@ from shipid.report.wording import CONSTANT_MOTION, REGRESSION, metres_text, numb
 def summary_text(content: ReportContent) -> str:
     """Answer, findings, errors of constant u, v, r and of regressions, models, cells and provenance as Markdown."""
     errors = {name: metres_text(value) for name, value in content.naive.items()}
-    known = content.frame("regression").map(number_text)
+    known = content.frame("regression")
+    known = known.map(number_text).assign(N_D=known["N_D"].map(str))
     headline, more = split_answer(content.answer)
     findings = [[f["id"], f["claim"], f["verdict"], f["evidence"]] for f in content.findings]
     parts = [
