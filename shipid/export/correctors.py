@@ -364,7 +364,7 @@ def regression_path(known: PredictorInputs, corrector: RegressionCorrector) -> M
         table, psi = feature_expressions(start.row, corrector.commands), start.row["psi"]
         water = ca.vertcat(turn_vectors(current, -psi), 0)
         through = table | {"u": table["u"] - water[0], "v": table["v"] - water[1]}
-        after = alone - water + h * ca.mtimes(weights, ca.vertcat(*law_terms(through, corrector.names)))
+        after = alone - water + h * ca.mtimes(weights, ca.vertcat(*law_terms(through, corrector.names, ca)))
         after = ca.fmin(ca.fmax(after, ca.DM(corrector.low)), ca.DM(corrector.high))
         later = psi + h / 2 * (table["r"] + after[2])
         return (after + ca.vertcat(turn_vectors(current, -later), 0) - alone) / h, kept

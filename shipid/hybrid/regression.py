@@ -33,8 +33,8 @@ LEARNED, OF_CURRENT = 100, 30  # windows at most, one after the other, that give
 MIRROR = np.array([1.0, -1.0, -1.0])
 
 
-def law_terms(table: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
-    """Terms (S,) of the law, of which the first is 1; also of symbols.
+def law_terms(table: Mapping[str, Any], names: Sequence[str], maths: Any = np) -> list[Any]:
+    """Terms (S,) of the law, of which the first is 1; of symbols where `maths` is CasADi.
 
     table : u, v, r through the water and every other input. names : inputs that vary; orders have a dot.
     """
@@ -46,12 +46,12 @@ def law_terms(table: Mapping[str, Any], names: Sequence[str]) -> list[Any]:
         terms += values + [a * b for a, b in combinations_with_replacement(values, 2)]
         terms += [a * abs(b) for a, b in product(values, values)]
     for name in orders:
-        value = np.sin(table[name]) if is_steering(name) else table[name]
+        value = maths.sin(table[name]) if is_steering(name) else table[name]
         terms += [value, value * u, value * (abs(u) * u if is_steering(name) else abs(value))]
         if is_steering(name):
             mine = [one for one in thrusts if one.partition(".")[0] == name.partition(".")[0]]
             pulls = [table[one] * abs(table[one]) for one in mine or thrusts]
-            terms += [pull * side for pull in pulls for side in (value, np.cos(table[name]))]
+            terms += [pull * side for pull in pulls for side in (value, maths.cos(table[name]))]
     return terms
 
 

@@ -259,10 +259,10 @@ def test_a_band_that_cannot_be_promised_is_refused(banded, predictor, tmp_path):
 
 
 def test_a_log_without_the_past_that_is_needed_is_one_line(tmp_path):
-    file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 3 s
+    file = drawn("path-drawn", 2, vessel="mariner").predictor.save(tmp_path / "cell.npz")  # a past of 4 s
     target = saved(log().assign(V_w=0.0, beta_w=0.0, phi=0.0), tmp_path)
     assert len(play_aboard(file, target, every=3.0).instants)
-    with pytest.raises(DataError, match="no instant has the past of 3 s that the predictor needs"):
+    with pytest.raises(DataError, match="no instant has the past of 4 s that the predictor needs"):
         play_aboard(file, target, every=1e4)
 
 
