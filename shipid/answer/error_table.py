@@ -51,6 +51,11 @@ class ErrorTable:
     pool: float = np.inf
 
     @property
+    def models(self) -> list[str]:
+        """Models with a result, without the regression: it is no model, and tells nothing of how they vary."""
+        return [name for name in self.H if name != REGRESSION]
+
+    @property
     def runs(self) -> int:
         """Number of test manoeuvres R."""
         return len(self.counts)
@@ -127,7 +132,7 @@ class ErrorTable:
 
     def _draw_variance(self, by_draw: Sequence[Array], place: int) -> tuple[Array | float, float]:
         """As of `draw_variance`; beyond what was drawn several times it falls as all models let one expect."""
-        fall = fall_beyond(self._curve([*self.H]), self.amounts, self.pool, place)
+        fall = fall_beyond(self._curve(self.models), self.amounts, self.pool, place)
         return draw_variance(by_draw, self.amounts, self.pool, place, fall)
 
     def _sum(self, terms: Sequence[ErrorTerm], place: int, value: Callable[[Array], Array]) -> Array:

@@ -146,7 +146,7 @@ def _lead_of_others(table: ErrorTable, pure: Array, others: list[Array]) -> Diff
     Other draws of runs count as for the model that they move most.
     """
     last = len(table.amounts) - 1
-    noise = [table.noise([[(1.0, NO_MODEL, last), (-1.0, model, last)]]) for model in table.H if model != NO_MODEL]
+    noise = [table.noise([[(1.0, NO_MODEL, last), (-1.0, model, last)]]) for model in table.models if model != NO_MODEL]
     ahead = np.concatenate([log_error(pure) - log_error(error) for error in others])
     return paired_difference(ahead, *max(noise, key=lambda known: float(known[0][0])))
 
