@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from shipid import read_plan
 from shipid.answer.error_table import ErrorTable, break_even, error_table, runs_without_physics
@@ -109,13 +110,36 @@ def measure_intervals(worlds: list[dict[str, ErrorTable]]) -> list[str]:
     return lines
 
 
+def compare_folders(worlds: list[tuple[dict[str, ErrorTable], dict[str, ErrorTable]]]) -> Iterator[str]:
+    """Rows of a table: by how much H differs from that of another folder in the same worlds, geometric mean over models.
+
+    A model counts where both have the same physics. The interval is Student's over worlds.
+    """
+    yield "| family | N_D | models | difference of H [%] | worlds in which it is lower |"
+    yield "| --- | ---: | ---: | ---: | ---: |"
+    ratios: dict[tuple[str, int], list[dict[str, float]]] = {}
+    for mine, other in ((one["H"], two["H"]) for one, two in worlds):
+        same = [m for m in mine.A if m in other.A and np.allclose(mine.A[m], other.A[m])]
+        for place, N_D in enumerate(mine.amounts):
+            ratio = {m: float(np.log(mine.mean(m, place) / other.mean(m, place))) for m in (*same, NO_MODEL)}
+            for family in ("all", *dict.fromkeys(m.split("-")[0] for m in ratio)):
+                taken = {m: value for m, value in ratio.items() if family in ("all", m.split("-")[0])}
+                ratios.setdefault((family, N_D), []).append(taken)
+    for (family, N_D), each in ratios.items():
+        means = np.array([np.mean(list(one.values())) for one in each])
+        half = student.ppf(0.975, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means))
+        low, value, high = (f"{100 * np.expm1(means.mean() + k * half):.0f}" for k in (-1, 0, 1))
+        yield f"| {family} | {N_D} | {len(each[0])} | {value} [{low}, {high}] | {(means < 0).sum()} of {len(means)} |"
+
+
 def main() -> None:
-    """Compute worlds, or measure the intervals of those that are there."""
+    """Compute worlds, measure the intervals of those that are there, or compare their errors with another folder's."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["compute", "measure"])
+    parser.add_argument("what", choices=["compute", "measure", "compare"])
     parser.add_argument("folder", type=Path)
     parser.add_argument("study", nargs="?", default="quick")
     parser.add_argument("--worlds", type=int, default=30)
+    parser.add_argument("--with", dest="other", type=Path, help="folder to compare with")
     given = parser.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
     seeds = np.random.default_rng(FIRST_SEED).choice(900_000, size=400, replace=False) + 1000
@@ -125,6 +149,11 @@ def main() -> None:
             compute_world(given.study, int(seed), given.folder)
     worlds = [pickle.loads(file.read_bytes()) for file in files if file.exists()]
     print(f"{given.folder.name}, {len(worlds)} worlds:\n")
+    if given.what == "compare":
+        pairs = [(one, given.other / one.name) for one in files if one.exists() and (given.other / one.name).exists()]
+        known = [(pickle.loads(one.read_bytes()), pickle.loads(two.read_bytes())) for one, two in pairs]
+        print("\n".join(compare_folders(known)))
+        return
     print("\n".join(measure_intervals(worlds)))
 
 
