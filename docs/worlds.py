@@ -111,7 +111,7 @@ def measure_intervals(worlds: list[dict[str, ErrorTable]]) -> list[str]:
 
 
 def compare_folders(worlds: list[tuple[dict[str, ErrorTable], dict[str, ErrorTable]]]) -> Iterator[str]:
-    """Rows of a table: by how much H differs from that of another folder in the same worlds, geometric mean over models.
+    """Rows of a table: by how much H differs from that of another folder in the same worlds, mean over models.
 
     A model counts where both have the same physics. The interval is Student's over worlds.
     """
