@@ -20,12 +20,18 @@ from pydantic import PositiveFloat, PositiveInt
 
 from shipid.hybrid.compensator import Normaliser, PathCorrector, unflatten_paths
 from shipid.hybrid.features import Memory, input_group
-from shipid.hybrid.method import Array, FitResult, Task
-from shipid.hybrid.search import Point, Scale, SearchedAlone, trial_points
+from shipid.hybrid.method import Array, Task
+from shipid.hybrid.search import Point, Scale, SearchedAlone, SearchProblem, trial_points
 from shipid.hybrid.stored import StoredData
 
-GROUPS = ("motion", "command", "wind", "history", "turned", "position", "error", "observer")
-"""Groups of inputs, with a length scale each."""
+GROUPS = {"motion": "", "command": "", "wind": ""} | {
+    "history": "history",
+    "turned": "turned",
+    "position": "positions",
+    "error": "error",
+    "observer": "observer",
+}
+"""Groups of inputs, with a length scale each -> the setting of the memory that gives them, where it is one."""
 
 
 def kernel_group(name: str) -> str:
@@ -84,7 +90,8 @@ class Kernel(SearchedAlone):
 
     Parameters
     ----------
-    trials : descents, each on its own part of the runs; their solutions are averaged.
+    trials : descents, each without its own part of the runs; their solutions are averaged. With fewer
+        than three runs for each trial, one more on all runs is the solution.
     steps : of a descent, at most.
     scale : range of the length scales, in standard deviations of the inputs.
     linear : range of the weight of the linear kernel. ridge : range of the variance of noise, that of the kernel is 1.
@@ -98,6 +105,7 @@ class Kernel(SearchedAlone):
     validation: ClassVar[str] = "runs"
     corrector: ClassVar[type[Any]] = KernelCompensator
 
+    budget: ClassVar[None] = None  # type: ignore[misc]
     trials: PositiveInt = 3
     steps: PositiveInt = 12
     scale: tuple[PositiveFloat, PositiveFloat] = (1.0, 400.0)
@@ -110,8 +118,9 @@ class Kernel(SearchedAlone):
     memory: Memory = Memory()
 
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Return what a descent chooses: name -> (low, high)."""
-        return {f"{group}_scale": self.scale for group in GROUPS} | super().ranges()
+        """Return what a descent chooses where the inputs have the group: name -> (low, high)."""
+        given = [group for group, setting in GROUPS.items() if not setting or getattr(self.memory, setting)]
+        return {f"{group}_scale": self.scale for group in given} | super().ranges()
 
     def num_chosen(self) -> int:
         """Return how many trials make the compensator: all."""
@@ -119,11 +128,10 @@ class Kernel(SearchedAlone):
 
     def points(self) -> Iterable[Point]:
         """Return where the descents begin: in the middle of all ranges."""
-        middle = next(iter(trial_points(self, frozenset())))
-        return repeat(middle) if self.budget else repeat(middle, self.trials)
+        return repeat(next(iter(trial_points(self, frozenset()))), self.trials)
 
-    def fit(self, task: Task) -> dict[str, FitResult]:
-        """Fit every foundation; the corrector is the mean of the solutions of all trials."""
+    def problem(self, task: Task, name: str) -> SearchProblem:
+        """Return a foundation as this method sees it."""
         from shipid.hybrid.kernel_ridge import KernelProblem  # a study is read without PyTorch
 
-        return self.fit_by(KernelProblem, task)
+        return KernelProblem(self, task, name)

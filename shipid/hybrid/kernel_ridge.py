@@ -14,43 +14,40 @@ import torch
 from scipy.optimize import minimize
 from torch import Tensor
 
-from shipid.hybrid.kernel import KernelCompensator, KernelMember, kernel_group, kernel_values
+from shipid.hybrid.kernel import GROUPS, KernelCompensator, KernelMember, kernel_group, kernel_values
 from shipid.hybrid.method import Array, Index, Row, Task
 from shipid.hybrid.ridge import part_of_runs
 from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_folds
 from shipid.hybrid.units import VaryingInputs
 
 PRIOR = 0.1  # weight of the squared distance from the start of a descent, in logarithms, where one run is seen
-FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, every trial sees all
+FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, what they choose is for errors left out alone
 
 
 class KernelProblem(PathProblem):
-    """One foundation. Each trial leaves every `trials`-th fold out of its choice of scales.
+    """One foundation. Each trial leaves every `parts`-th fold out of its choice of scales.
 
     The errors of the runs of these folds are those of this trial alone, so that no run has a part in what predicts it.
-    With few folds each trial sees all.
+    With few folds the solution is by a descent on all of them. With one part there are no errors left out.
     """
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
         super().__init__(method, task, name)
         self.windows = windows_of_folds(task)
         self.varying = VaryingInputs.of(self.rows(self.windows), method.mirror)
+        self.scales = [f"{kernel_group(name)}_scale" for name in self.varying.normaliser.names]
         self.values = self._tensor(self.varying.normaliser.apply(self.table))
         self.outputs = self._tensor(self.weights.T)  # (2, S, r)
         self.part = self.windows[part_of_runs(task.windows.run[self.windows], method.centres)]
-        self.parts = method.trials if len(task.folds) >= FOLDS_OF_PART * method.trials else 1
-        self.worth: dict[int, TrialWorth] = {}  # of each part
+        self.parts = min(method.trials, len(task.folds))
+        self.few = self.parts > 1 and len(task.folds) < FOLDS_OF_PART * method.trials
 
     def _tensor(self, values: Any) -> Tensor:
         return torch.as_tensor(values, dtype=torch.float64, device=self.task.device)
 
-    def _eye(self, count: int) -> Tensor:
-        return torch.eye(count, dtype=torch.float64, device=self.task.device)
-
     def kernels(self, points: Index, centres: Index, settings: Mapping[str, Any]) -> list[Tensor]:
         """Kernels (S, C) that make x and y, between windows, with the settings of a trial."""
-        each = [settings[f"{kernel_group(name)}_scale"] for name in self.varying.normaliser.names]
-        scales, seen = torch.stack([self._tensor(one) for one in each]), self.values[points]
+        scales, seen = torch.stack([self._tensor(settings[name]) for name in self.scales]), self.values[points]
         around = self.values[centres] / scales
         plain = kernel_values(seen / scales, around, settings["linear"], torch)
         if self.varying.reflection is None:
@@ -61,26 +58,30 @@ class KernelProblem(PathProblem):
 
     def folds_left_out(self, number: int) -> list[tuple[Index, Index]]:
         """Folds that a trial leaves out of its choice of scales."""
-        return list(self.task.folds)[number % self.parts :: self.parts]
+        return list(self.task.folds)[number % self.parts :: self.parts] if self.parts > 1 else []
 
     def judge(self, number: int, point: Point) -> TrialWorth:
-        """Descend from a point; return the mean error [m^2] at the end, the settings there, and the steps made."""
-        if number % self.parts in self.worth:
-            return self.worth[number % self.parts]
-        hidden, folds, seen = self.folds_left_out(number), self.task.folds, self.windows
-        if self.parts > 1:
-            folds = [fold for place, fold in enumerate(folds) if place % self.parts != number % self.parts]
-            seen = np.setdiff1d(seen, np.concatenate([np.setdiff1d(seen, training) for training, _ in hidden]))
+        """Descend without the folds of a trial."""
+        return self.descend(point, self.folds_left_out(number))
+
+    def descend(self, point: Point, hidden: Sequence[tuple[Index, Index]] = ()) -> TrialWorth:
+        """Descend from a point by the other folds; return the mean error [m^2] there, the settings, and the steps."""
+        seen, out = self.windows, {id(fold) for fold in hidden}
+        for training, _ in hidden:
+            seen = np.intersect1d(seen, training)
+        folds = [fold for fold in self.task.folds if id(fold) not in out]
         rows = seen[part_of_runs(self.task.windows.run[seen], self.method.search_windows)]
-        blocks, names = FoldBlocks(folds, rows, self.task.device), list(self.method.ranges())
+        idle = {f"{group}_scale" for group in GROUPS} - {*self.scales}
+        ranges, point = ({k: v for k, v in table.items() if k not in idle} for table in (self.method.ranges(), point))
+        blocks, names = FoldBlocks(folds, rows, self.task.device), list(ranges)
         prior = PRIOR / len(np.unique(self.task.windows.run[rows]))
-        start, ends = (np.log([table[name] for name in names]) for table in (point, self.method.ranges()))
+        start, ends = (np.log([table[name] for name in names]) for table in (point, ranges))
 
         def value_and_slope(logs: Array) -> tuple[float, Array]:
             x, value = self._tensor(logs).requires_grad_(), 0.0
-            settings = dict(zip(names, x.exp(), strict=True))
+            settings = {**point, **dict(zip(names, x.exp(), strict=True))}
             for kernel, outputs in zip(self.kernels(rows, rows, settings), self.outputs[:, rows], strict=True):
-                whole = kernel + settings["ridge"] * self._eye(len(rows))
+                whole = kernel + settings["ridge"] * torch.eye(len(rows)).to(kernel)
                 missed, slope = blocks.errors_and_slope(whole.detach(), outputs)
                 value += float((missed**2).sum())
                 whole.backward(slope, retain_graph=True)
@@ -92,9 +93,8 @@ class KernelProblem(PathProblem):
         best = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", bounds=ends, options=options)
         values = np.clip(np.exp(best.x), *np.exp(ends).T)
         squares = np.exp(best.fun - prior * np.square(best.x - start).sum())
-        chosen = dict(zip(names, map(float, values), strict=True))
-        worth = float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)
-        return self.worth.setdefault(number % self.parts, worth)
+        chosen = {**point, **dict(zip(names, map(float, values), strict=True))}
+        return float(squares) / (2 * len(self.basis) * blocks.count), chosen, int(best.nfev)
 
     def solve(self, settings: Mapping[str, Any]) -> list[tuple[Tensor, Tensor]]:
         """G (C, C) and weights (C, r) of x and of y."""
@@ -102,23 +102,27 @@ class KernelProblem(PathProblem):
         for kernel, outputs in zip(
             self.kernels(self.part, self.part, settings), self.outputs[:, self.part], strict=True
         ):
-            inverse = torch.cholesky_inverse(torch.linalg.cholesky(kernel + settings["ridge"] * self._eye(len(kernel))))
+            inverse = torch.cholesky_inverse(
+                torch.linalg.cholesky(kernel + settings["ridge"] * torch.eye(len(kernel)).to(kernel))
+            )
             solved.append((inverse, inverse @ outputs))
         return solved
 
     def corrector(self, best: Sequence[Row]) -> KernelCompensator:
-        """Return the mean of the solutions of all trials, and keep what they miss without each fold."""
+        """Return the mean of the solutions, and keep what those of the trials miss without each fold."""
         varying, centres, members = self.varying, self.values[self.part].cpu().numpy(), []
-        self.left_out = left_out = np.full_like(self.targets, np.nan)
-        for row in best if self.parts > 1 else best[:1]:
-            settings = row["params"]
-            scales = np.array([settings[f"{kernel_group(name)}_scale"] for name in varying.normaliser.names])
-            solved = self.solve(settings)
+        tried = [(row["params"], self.folds_left_out(row["number"])) for row in best if row["number"] < self.parts]
+        if self.few:
+            tried.append((self.descend(next(iter(self.method.points())))[1], []))
+        errors, first = np.full_like(self.targets, np.nan), -1 if self.few else 0
+        for settings, folds in tried:
+            solved, scales = self.solve(settings), np.array([settings[name] for name in self.scales])
             weights = torch.cat([weights for _, weights in solved], dim=1).cpu().numpy()
             members.append(KernelMember(scales, settings["linear"], weights))
-            self._leave_out(self.folds_left_out(row["number"]), settings, solved, left_out)
+            self._leave_out(folds, settings, solved, errors)
+        self.left_out, members = errors if self.parts > 1 else None, members[first:]
         return KernelCompensator(
-            self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), best[0]["params"]
+            self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[first][0]
         )
 
     def _leave_out(

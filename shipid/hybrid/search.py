@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import count, islice
 from math import exp, log
 from statistics import fmean
@@ -381,11 +381,12 @@ class PathProblem(SearchProblem):
 class SearchedAlone(SearchMethod):
     """A method that searches for one foundation after the other: its formula is its `problem`.
 
+    problem : a `SearchProblem`, or a method (task, name) that makes one.
     IDLE : settings that a trial chooses by itself, so that they differ in no point.
     CHAINED : whether a trial begins with what the one before left behind.
     """
 
-    problem: ClassVar[type[SearchProblem]]
+    problem: ClassVar[Callable[[Any, Task, str], SearchProblem]]
     IDLE: ClassVar[frozenset[str]] = frozenset()
     CHAINED: ClassVar[bool] = False
 
@@ -399,19 +400,15 @@ class SearchedAlone(SearchMethod):
 
     def fit(self, task: Task) -> dict[str, FitResult]:
         """Search for every foundation; where its physics is not finite on windows of a fold, all trials diverged."""
-        return self.fit_by(self.problem, task)
-
-    def fit_by(self, kind: type[SearchProblem], task: Task) -> dict[str, FitResult]:
-        """As `fit`, with a kind of problem."""
         every, fitted = windows_of_folds(task), {}
         for name, case in task.cases.items():
             finite = np.isfinite(case.paths[:, every]).all()
-            fitted[name] = self._fit(kind, task, name) if finite else diverged_result(self, self.points())
+            fitted[name] = self._fit(task, name) if finite else diverged_result(self, self.points())
         return fitted
 
-    def _fit(self, kind: type[SearchProblem], task: Task, name: str) -> FitResult:
+    def _fit(self, task: Task, name: str) -> FitResult:
         """Search for one foundation; the best trials make its corrector."""
-        search, problem = Search(task, [name], self, again=self.CHAINED), kind(self, task, name)
+        search, problem = Search(task, [name], self, again=self.CHAINED), type(self).problem(self, task, name)
         rounds = enumerate(suggested_points(self, search, task.seed)) if self.suggest else ()
         points = (asked.get((name, number), {}) for number, asked in rounds) if self.suggest else self.points()
         for number, point in search.left(points):

@@ -105,7 +105,7 @@ def fit_method(work: Work, way: StudyMethod, journal: TrialJournal | None = None
         )
         return fit_all(method, task)
     except DataError as error:
-        return {name: FitResult(None, [], 0.0, sentence=error.message) for name in mine}
+        return {name: FitResult(None, [], 0.0, sentence=str(error)) for name in mine}
 
 
 def errors_left_out(work: Work, fitted: Mapping[str, Mapping[str, FitResult]]) -> Errors:

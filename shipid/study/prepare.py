@@ -262,6 +262,13 @@ def prepare(plan: Plan, dataset: Dataset, device: str = "cpu") -> PreparedStudy:
         if foundation.base is not None:
             check_columns(foundation.base, test.columns, plan.file)
             notes += not_measured(foundation.base, test)
+    for way in plan.methods:
+        if absent := [name for name in way.method.traits.memory.states if name not in test.columns]:
+            raise DocumentError(
+                f"the runs have no {absent[0]!r}; there are {', '.join(sorted(test.columns))}",
+                file=plan.file,
+                path=f"method.{way.name}.memory.states",
+            )
     estimates: dict[str, Estimates] = {}
     with _name_study_file(plan):
         foundations, paths = _roll_out(plan, dataset, [rest, test], notes, device, estimates)

@@ -38,10 +38,12 @@ def by_hand(columns: dict, targets: np.ndarray, params: dict, seen: dict) -> np.
     return np.einsum("tk,skc->tsc", basis, (around @ weights).reshape(len(points), 4, 2))
 
 
-def test_it_is_the_kernel_ridge_regression_of_plain_numpy() -> None:
+@pytest.mark.parametrize("fixed", [{}, {"linear": 0.5}, {"ridge": 0.1}, {"linear": 0.5, "ridge": 0.1}])
+def test_it_is_the_kernel_ridge_regression_of_plain_numpy(fixed: dict) -> None:
     columns, fresh = drawn(), drawn(seed=5, count=9)
-    fit = tuned(columns, {"one": missed(columns)}, SMALL.model_copy(update={"mirror": False}))["one"]
+    fit = tuned(columns, {"one": missed(columns)}, SMALL.model_copy(update={"mirror": False} | fixed))["one"]
     assert isinstance(fit.corrector, KernelCompensator)
+    assert fixed.items() <= fit.corrector.hyperparameters.items()
     expected = by_hand(columns, missed(columns), dict(fit.corrector.hyperparameters), fresh)
     np.testing.assert_allclose(compensation(fit.corrector, fresh), expected, rtol=0, atol=1e-9)
 
@@ -73,6 +75,12 @@ def test_a_descent_ends_below_its_start_and_is_made_again_to_the_digit() -> None
     assert longer["value"] < 0.97 * first["value"]
     assert longer["params"] == again["params"]
     assert longer["epochs"] > first["epochs"]
+
+
+def test_only_scales_of_inputs_that_there_are_are_searched() -> None:
+    columns = {name: values for name, values in drawn().items() if name not in ("V_w", "beta_w")}
+    fit = tuned(columns, {"one": missed(columns)}, SMALL)["one"]
+    assert {*fit.trials[0]["params"]} == {*SMALL.ranges()} - {"wind_scale"}
 
 
 def test_groups_and_values_by_hand() -> None:

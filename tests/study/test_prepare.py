@@ -343,6 +343,15 @@ def test_what_is_not_measured_is_reported(recorded: Callable[..., tuple[Plan, Da
         ({"split": {"test": 4}}, "split.test", "only 4 runs"),
         ({"split": {"test": 2}, "grid": {"N_D": [3]}}, "grid.N_D", "only 2 runs are left"),
         ({"split": {"test": 1}, "prediction": {"ahead": 40.0}}, "prediction.ahead", "as long as the horizon of 40 s"),
+        (
+            {
+                "split": {"test": 1},
+                "method": [{"name": "rolling", "kind": "kernel", "memory": {"states": ["phi"]}}],
+                "grid": {"N_D": [3]},
+            },
+            "method.rolling.memory.states",
+            "the runs have no 'phi'; there are .*north, .*psi, r",
+        ),
     ],
 )
 def test_a_study_that_asks_too_much_of_its_log(
