@@ -246,7 +246,8 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
     told = np.where(results.cells["family"].eq("fitted"), "physics diverges on 3 % of the test windows", "")
     advice = text(replace(results, cells=results.cells.assign(sentence=told)))
     assert (
-        "\nFitted to the runs, that of fitted diverges on test windows of 2 cells; paths go on in the same way." in advice
+        "\nFitted to the runs, that of fitted diverges on test windows of 2 cells; paths go on in the same way."
+        in advice
     )
 
 
