@@ -45,7 +45,7 @@ from shipid.simulation.log import state_column
 from shipid.units import percent_text
 from shipid.users import error_location, locate_errors
 from shipid.vessel.dynamics import vessel_dynamics
-from shipid.vessel.load import check_document
+from shipid.vessel.load import Vessel, check_document
 
 Array = np.ndarray
 Part = TypeVar("Part", bound=StoredData)
@@ -168,8 +168,27 @@ class Predictor(DeployedMethod):
         return check_bands(self.bands, self.no_band, level, kind)
 
     def alone(self, instants: Instants) -> Array:
-        """Return the paths (T, S, 2) [m] of the physics alone in the frame (11); zeros for no physics."""
-        return self.physics.paths(self._known(instants))
+        """Return the paths (T, S, 2) [m] of the physics alone in the frame (11), see `roll_out`."""
+        return self.roll_out(instants)[0]
+
+    def roll_out(self, instants: Instants) -> tuple[Array, Array]:
+        """Return the paths (T, S, 2) [m] of the physics alone in the frame (11), and whether it diverges (S,).
+
+        Where it diverges a path keeps its last velocity. Paths are zeros for no physics, and not numbers for a mean,
+        which diverges where a foundation of it does.
+        """
+        instants, moved = self._known(instants), self.physics_with_force
+        if isinstance(self.corrector, MeanCorrector):
+            each = [one.physics_with_force.variant_paths(at)[1][0] for one, at in self.corrector.at_parts(instants)]
+            return np.full((self.physics.horizon, len(instants), 2), np.nan), np.any(each, axis=0)
+        paths, lost = self.physics.variant_paths(instants)
+        return paths[:, 0], (lost if moved is self.physics else moved.variant_paths(instants)[1])[0]
+
+    @property
+    def vessels(self) -> tuple[Vessel, ...]:
+        """Vessels of the physics: of a mean those of all its foundations, none without physics."""
+        parts = self.corrector.parts if isinstance(self.corrector, MeanCorrector) else (self,)
+        return tuple(part.vessel for part in parts if part.vessel is not None)
 
     def _lost(self, instants: Instants) -> Array:
         """Instants (S,) with an input that is no number, now, in the past that the method looks at, or in the plan.
@@ -177,17 +196,15 @@ class Predictor(DeployedMethod):
         Else a tree, an input that stands for two, or an error of the physics in the past would hide it.
         """
         taken, before = set(self.limits), {"x", "y", "psi", *self.limits}
-        if self.vessel is not None:
-            model = vessel_dynamics(self.vessel)
+        for vessel in self.vessels:
+            model = vessel_dynamics(vessel)
             taken |= {*model.commands, *model.environment}
             before |= {*map(state_column, model.state), *taken}
-        given = [values[None] for name, values in instants.columns.items() if name in taken]
+        given = [np.zeros((1, len(instants)))]
+        given += [values[None] for name, values in instants.columns.items() if name in taken]
         given += [values[-self.past :] for name, values in instants.past.items() if name in before and self.past]
         given += [values for name, values in (instants.planned or {}).items() if name in taken]
-        lost = np.zeros(len(instants), dtype=bool)
-        for values in given:
-            lost |= ~np.isfinite(values).all(axis=0)
-        return lost
+        return np.asarray(~np.isfinite(np.concatenate(given)).all(axis=0))
 
     def _paths(self, paths: Array, instants: Instants, what: str = "paths") -> Array:
         """The paths as numbers; DataError unless they are (T, S, 2), of this horizon and these instants."""
@@ -224,26 +241,23 @@ class Predictor(DeployedMethod):
             return replace(instants, planned=None)
         if instants.planned is None:
             raise DataError("this predictor was made for known commands: it needs those planned over the horizon")
-        needed = () if self.vessel is None else vessel_dynamics(self.vessel).commands
+        needed = [name for vessel in self.vessels for name in vessel_dynamics(vessel).commands]
         _check_names_held(instants.planned, needed, "this command of the vessel is not among those planned")
         return instants
 
-    def raise_alarm(self, instants: Instants) -> Array:
+    def raise_alarm(self, instants: Instants, diverged: Array | None = None) -> Array:
         """Return whether each instant (S,) is unlike those of training in any input of the method, also in its past.
 
-        Without a calibrated alarm, whether it is `outside` the limits. Also where the physics diverges. DataError as of
-        `predict`.
+        Without a calibrated alarm, whether it is `outside` the limits. Also where the physics diverges: `diverged`
+        (S,) of `roll_out`, if it is known already. DataError as of `predict`.
         """
         instants = self._known(instants)
-        known, lost = {**instants.columns, **instants.estimates}, self.diverges(instants)
+        known = {**instants.columns, **instants.estimates}
+        lost = self.roll_out(instants)[1] if diverged is None else diverged
         if self.alarm is None:
             return np.asarray(lost | self.outside(known))
         raised = lost | self.alarm.is_raised(alarm_inputs(self.alarm.inputs, self.alarm.past, self.physics, instants))
         return np.asarray(raised | self._is_unsettled(known, raised.shape))
-
-    def diverges(self, instants: Instants) -> Array:
-        """Return whether the physics diverges from each instant (S,): its path keeps its last velocity."""
-        return np.asarray(self.physics_with_force.variant_paths(self._known(instants))[1][0])
 
     def outside(self, columns: Mapping[str, Array]) -> Array:
         """Return whether each instant (S,) is outside what training has seen, in any column; all are without limits.

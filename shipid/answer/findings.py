@@ -175,8 +175,8 @@ def full_scale_findings(results: Results, families: Iterable[str | None]) -> lis
 
 
 def _errors_by_step(results: Results, N_D: int) -> dict[str, Array]:
-    """(T, R) errors by step of every predictor at an amount of data, mean over seeds, and of physics alone."""
-    aside = {one.name for one in results.plan.foundations if one.family in results.aside}
+    """(T, R) errors by step of predictors but means over foundations at an amount of data, mean over seeds."""
+    aside = {one.name for one in results.plan.foundations if one.family in results.aside or one.mean_of}
     run, cells = results.test.run, results.judged_cells
     cells = cells[cells["N_D"].eq(N_D) & cells["cell"].isin(list(results.paths)) & ~cells["foundation"].isin(aside)]
     paths = {

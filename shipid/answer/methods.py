@@ -20,7 +20,7 @@ from shipid.study.plan import Plan, learns_from_runs, uncounted_families, verdic
 from shipid.study.results import Results, read_results
 from shipid.study.score import RivalPrediction, keep_predictions, kept_predictions, read_predictions
 
-WITH_PHYSICS = "with physics"  # all families but `none` and those that saw the test runs
+WITH_PHYSICS = "with physics"  # all families but `none`, means, and those that saw the test runs
 METHOD_COLUMNS = [
     *("condition", "family", "N_D", "method", "cells", "failed", "missing"),
     *PREDICTION_ERRORS,
@@ -34,9 +34,9 @@ ErrorsByCell = Mapping[tuple[str, str, int], CellErrors]  # by world, foundation
 def compare_methods(results: Results) -> pd.DataFrame:
     """Compare the methods of a run: a row per family, N_D and method, in the columns of `method_table`.
 
-    The family `with physics` is all but `none` and those that saw the test runs. The difference is to the method by
-    which the study judges. No rows where fewer than two methods learn from data. Raises ShipidError for results that
-    are none.
+    The family `with physics` is all but `none`, means, and those that saw the test runs. The difference is to the
+    method by which the study judges. No rows where fewer than two methods learn from data. Raises ShipidError for
+    results that are none.
     """
     check_class("results", results, Results, "as of `read_results`")
     cells, learning = method_cells(results), {way.name for way in results.plan.methods if way.method.compensates}
@@ -77,9 +77,9 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
     """A row per cell, as `method_table` takes it.
 
     Columns: condition, world, foundation, family, method, N_D, seed, status, H_end, H_end_90, H, H_90 [m], seconds
-    (core-seconds), trials, saw_test (numbers of the family rest on test runs), errors (`CellErrors` or None).
+    (core-seconds), trials, apart (a mean, or numbers that rest on test runs), errors (`CellErrors` or None).
     """
-    saw, rows = results.saw_test, []
+    apart, rows = {*results.saw_test, *(block.name for block in results.plan.study.model)}, []
     for row in results.rows:
         names = ("foundation", "family", "method", "N_D", "seed", "status", *PREDICTION_ERRORS)
         kept = {
@@ -89,7 +89,7 @@ def method_cells(results: Results, condition: str = "", world: str = "") -> pd.D
             "errors": None,
             "seconds": row["seconds"],
             "trials": len(row["trials"]),
-            "saw_test": row["family"] in saw,
+            "apart": row["family"] in apart,
         }
         if (cell := row["cell"]) in results.paths:
             learns = learns_from_runs(results.plan, row["family"], row["method"])
@@ -129,7 +129,7 @@ def method_table(cells: pd.DataFrame, reference: str) -> pd.DataFrame:
     (`compare_cells`); `better` counts test runs with a lower error. `least`, `greatest`, `world_low`, `world_high`: the
     difference over worlds, with Student's interval.
     """
-    frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["saw_test"]].assign(family=WITH_PHYSICS)]
+    frames = [cells, cells[cells["family"].ne(NO_MODEL) & ~cells["apart"]].assign(family=WITH_PHYSICS)]
     every = pd.concat([frame for frame in frames if len(frame)], ignore_index=True)
     rows = []
     for (condition, family, N_D), group in every.groupby(["condition", "family", "N_D"], sort=False):
@@ -167,15 +167,16 @@ def sentences_on_worlds(plan: Plan, cells: pd.DataFrame) -> list[str]:
     mine = mine[mine["status"].eq("ok") & mine["N_D"].isin([cells["N_D"].min(), cells["N_D"].max()])]
     mine = mine.astype({"H_end": float}).sort_values("N_D", ascending=False, kind="stable")  # the largest comes first
     by_world = np.log(mine.groupby(["condition", "N_D", "family", "world"], sort=False)["H_end"].mean())
-    sentences = []
+    sentences, means = [], {block.name for block in plan.study.model}
     for (condition, N_D, family), logs in by_world.groupby(level=[0, 1, 2], sort=False):
         pure, count = (
             by_world[by_world.index.isin([(condition, N_D, NO_MODEL, world) for *_, world in logs.index])],
             len(logs),
         )
         error = length_with_interval(*np.exp([logs.mean(), *world_interval(logs.to_numpy())]))
+        kind = "the mean" if family in means else "physics of"
         text = f"With {counted_text(N_D, 'run')}, in the mean of {count} worlds, "
-        text += f"{'no physics' if family == NO_MODEL else f'physics of {family!r}'} errs by {error} at the horizon"
+        text += f"{'no physics' if family == NO_MODEL else f'{kind} {family!r}'} errs by {error} at the horizon"
         if family != NO_MODEL and len(pure) == count:
             apart = logs.to_numpy() - pure.to_numpy()
             more, low, high = (percent_above(one) for one in (apart.mean(), *world_interval(apart)))

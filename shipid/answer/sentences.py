@@ -364,14 +364,14 @@ def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Itera
     """Which models, and which physics alone, do not beat a regression on the same runs."""
     table, fixed = case.table, case.fixed_physics()
     for amount, place in case.ends.items():
-        words = []
+        words, too = [], ", physics alone too," if fixed else ""
         for names, column, how in ((models, place, "with the same runs"), (fixed, PHYSICS_ONLY, "as physics alone")):
             lead = table.compare([[(1.0, REGRESSION, place), (-1.0, name, column)] for name in names])
             _, worse, unknown = case.sides(names, lead) if names else ([], [], [])
             words += [f"beats {model_list(worse)} {how}"] if worse else []
             words += [f"is not shown to be beaten by {model_list(unknown)} {how}"] if unknown else []
         one = f"regression on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
-        yield f"A {one} {'; it '.join(words)}." if words else f"All compared models, physics alone too, beat a {one}."
+        yield f"A {one} {'; it '.join(words)}." if words else f"All compared models{too} beat a {one}."
 
 
 def _sentences_on_sides(sides: Sequence[Sequence[str]], worse: str, unknown: str) -> Iterator[str]:

@@ -16,6 +16,7 @@ from shipid.export.equations import function_by_names, symbols_of
 from shipid.export.known import POSITION_ENTRIES, InputLayout, PredictorInputs
 from shipid.hybrid.deployed import DeployedMethod
 from shipid.hybrid.features import MOTIONS
+from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.method import widen_range
 from shipid.hybrid.methods import METHODS
 from shipid.hybrid.physics import Physics
@@ -53,7 +54,7 @@ class ExportModel:
         ShipidError for a method that has no counterpart, whose parts do not fit together, or are too large.
         """
         corrector, bands = self.predictor.corrector, self.predictor.bands
-        if hasattr(corrector, "parts"):
+        if isinstance(corrector, MeanCorrector):
             raise ShipidError("a mean over foundations cannot be exported: export the cells of its foundations")
         if type(corrector) not in CORRECTORS:
             kinds = [kind for kind, method in METHODS.items() if method.corrector in CORRECTORS]

@@ -48,16 +48,16 @@ class MeanCorrector:
 
     def predict(self, physics: Physics, instants: Instants, paths: Array) -> Array:  # noqa: ARG002
         """Return paths (T, S, 2) [m] in the frame (11); each part rolls out its physics, from its own actuators."""
-        known = instants.hidden or {}
-        every = [
-            replace(instants, hidden={name.removeprefix(f"{k}:"): values for name, values in known.items()} or None)
-            for k in range(len(self.parts))
-        ]
         each = [
-            part.corrector.predict(part.physics, at, part.physics.paths(at))
-            for part, at in zip(self.parts, every, strict=True)
+            part.corrector.predict(part.physics, at, part.physics.paths(at)) for part, at in self.at_parts(instants)
         ]
         return sum_paths(each, self.weights)
+
+    def at_parts(self, instants: Instants) -> list[tuple[DeployedMethod, Instants]]:
+        """Return each part with the instants as it takes them: the hidden states are those of its own actuators."""
+        known = instants.hidden or {}
+        own = [{name.removeprefix(f"{k}:"): values for name, values in known.items()} for k in range(len(self.parts))]
+        return [(part, replace(instants, hidden=one or None)) for part, one in zip(self.parts, own, strict=True)]
 
     def header(self) -> dict[str, Any]:
         """Return all that is not an array."""
@@ -104,7 +104,7 @@ def weigh_errors(errors: Array, run: NDArray[np.str_], *, by_left_out: bool) -> 
     errors : (K, T, S, 2) [m] on runs left out, not numbers where there are none. run : (S,) of each window.
 
     With `by_left_out` weights are those, from 0 on and of sum 1, that leave the least squared error; errors on a run
-    are by the weights that the others give. Of one run weights are equal.
+    are by the weights that the others give. Weights are equal of one run, and where no errors are known.
     """
     count, runs = len(errors), np.unique(run)
     equal = np.full(count, 1 / count)
@@ -121,7 +121,9 @@ def weigh_errors(errors: Array, run: NDArray[np.str_], *, by_left_out: bool) -> 
 
 
 def _least_weights(squares: Array) -> Array:
-    """Weights (K,) from 0 on and of sum 1 with the least w' S w, S (K, K)."""
+    """Weights (K,) from 0 on and of sum 1 with the least w' S w, S (K, K); equal where S says nothing."""
+    if not squares.any():
+        return np.full(len(squares), 1 / len(squares))
     values, axes = np.linalg.eigh(squares)
     size = float(np.sqrt(max(values.max(), 1e-300)))
     rows = np.sqrt(np.maximum(values, 0.0))[:, None] * axes.T / size

@@ -215,7 +215,8 @@ class Regression(Method):
         if not np.isfinite(case.paths[:, every]).all():
             points = [{"current": 0.0, "ridge": ridge} for ridge in self.ridge]
             return FitResult(None, [trial_row(i, point, np.nan, begun) for i, point in enumerate(points)], 0.0)
-        problem, folds = RegressionProblem(self, task, name), task.folds[:: -(-len(task.folds) // MOST_FOLDS)]
+        places = choose_evenly(np.arange(len(task.folds)), MOST_FOLDS)
+        problem, folds = RegressionProblem(self, task, name), [task.folds[place] for place in places]
         currents = np.repeat(problem.currents, len(self.ridge), axis=0)
         points = [
             {"current": float(np.hypot(*current)), "ridge": ridge}

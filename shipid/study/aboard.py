@@ -16,7 +16,7 @@ from shipid.errors import DataError
 from shipid.evidence import share_interval
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region
-from shipid.hybrid.physics import check_columns, missing_columns
+from shipid.hybrid.physics import missing_columns
 from shipid.predictor import Predictor
 from shipid.report.content import SummaryLine
 from shipid.study.apply import (
@@ -83,11 +83,9 @@ def play_aboard(
     if level is not None:
         predictor.check_level(level, kind)
     band = None if level is None else BandSettings(level, kind, rate)
-    dataset = read_or_import(log, mapping)
-    vessel, step = predictor.vessel, predictor.physics.step
+    dataset = read_or_import(log, mapping, predictor.vessels)
+    step = predictor.physics.step
     names = list(map(str, dataset.frame.columns))
-    if vessel is not None:
-        check_columns(vessel, names, str(log))
     if every is not None and not every > 0:
         raise DataError(f"{every:g}: must be above 0", path="--every")
     instants, points, skipped = [], [], 0
@@ -103,7 +101,7 @@ def play_aboard(
         past = f"the past of {predictor.past * step:g} s that the predictor needs"
         raise DataError(f"no instant has {past}: runs are shorter, or --every is longer", file=log)
     seen = pd.concat(instants, ignore_index=True)
-    assumed = () if vessel is None else missing_columns(vessel, names)
+    assumed = dict.fromkeys(name for vessel in predictor.vessels for name in missing_columns(vessel, names))
     gaps, plan = gaps_in_words(dataset, step), predictor.commands == "known"
     limits = (
         f"not in the log, taken as 0: {', '.join(assumed)}" if assumed else "",

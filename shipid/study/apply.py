@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from shipid.data.windows import (
 from shipid.errors import DataError, ResultError, suggest_name
 from shipid.files import check_table, write_table
 from shipid.hybrid.bands import Region, adapt_band, adaptive_factor, start_adaptation
+from shipid.hybrid.mean import MeanCorrector
 from shipid.hybrid.physics import check_columns
 from shipid.logs.importing import import_log
 from shipid.logs.mapping import read_mapping
@@ -39,6 +41,7 @@ from shipid.predictor import Predictor
 from shipid.study.prepare import states_along
 from shipid.study.store import cell_file, read_predictor
 from shipid.units import length_text, percent_text, plural_word
+from shipid.vessel.load import Vessel
 
 Array = np.ndarray
 COOPERATIVE_COLUMNS = ("cooperative_north", "cooperative_east")
@@ -57,7 +60,7 @@ class BandSettings:
 class Forecast:
     """Predictions from S instants of one stretch, in the frame (11).
 
-    predicted, alone : paths (T, S, 2) [m], compensated and of the physics alone, NaN without physics.
+    predicted, alone : paths (T, S, 2) [m], compensated and of the physics alone, NaN without physics and of a mean.
     region : of the band, where one was asked for. outside, diverged : the alarm, and where the physics diverges, (S,).
     columns : of the log at the instants.
     """
@@ -94,8 +97,8 @@ def predict_log(
     Returns the frame (run, t, ahead [s], physics_north, physics_east, cooperative_north, cooperative_east [m], outside;
     with a level also band_along, band_across [m], band_course [rad], half axes and direction, clockwise from north, of
     the ellipse that holds the true place, and band_factor where it adapts) and the share of instants outside the
-    training's limits. Cells without physics have NaN for physics. `attrs["gaps"]` of the frame says how many times
-    without rows the log has, and the longest; `attrs["coarse"]` that its rows are farther apart than the step;
+    training's limits. Cells without physics, and means, have NaN for physics. `attrs["gaps"]` of the frame says how
+    many times without rows the log has, and the longest; `attrs["coarse"]` that rows are farther apart than the step;
     `attrs["errors"]` how far off the paths are that end before the log does; `attrs["limits"]` lists why these errors
     may mislead.
     """
@@ -103,9 +106,7 @@ def predict_log(
     predictor = read_predictor(_find_cell_file(folder, cell))
     if level is not None:
         predictor.check_level(level, kind)
-    dataset = read_or_import(log, mapping)
-    if predictor.vessel is not None:
-        check_columns(predictor.vessel, dataset.frame.columns, str(log))
+    dataset = read_or_import(log, mapping, predictor.vessels)
     band = None if level is None else BandSettings(level, kind, rate)
     tables = [table_of_stretch(predictor, dataset, run, rows, band) for run, rows in stretches_of_runs(dataset)]
     parts = [table for table in tables if len(table)]
@@ -164,12 +165,14 @@ def _errors_in_words(error: Array, step: float) -> str:
     )
 
 
-def read_or_import(log: Path, mapping: str | None) -> Dataset:
-    """A dataset, or a raw log with its mapping; DataError for what is neither, and for a heading in degrees."""
+def read_or_import(log: Path, mapping: str | None, vessels: Sequence[Vessel]) -> Dataset:
+    """A dataset, or a raw log with its mapping, with what vessels need; DataError, also for a heading in degrees."""
     if mapping is None:
         dataset = read_dataset(log, remedy=", or give the log itself with --mapping")
     else:
         dataset = import_log(read_mapping(mapping), log)
+    for vessel in vessels:
+        check_columns(vessel, dataset.frame.columns, str(log))
     for run, rows in stretches_of_runs(dataset):
         t, psi, r = (rows[name].to_numpy() for name in ("t", "psi", "r"))
         changed, turned = np.ptp(psi), cumulative_integral(t, np.abs(r))[-1]
@@ -215,8 +218,8 @@ def instants_along(predictor: Predictor, dataset: Dataset, rows: pd.DataFrame, s
         planned = {name: np.tile(columns[name], (physics.horizon, 1)) for name in dataset.commands}
     hidden, estimates = None, {}
     if predictor.vessel is not None:
-        vessels = {"": predictor.vessel}
-        vessels |= {f"{k}:": one.physics.ship for k, one in enumerate(getattr(predictor.corrector, "parts", ()))}
+        of_mean = predictor.vessels if isinstance(predictor.corrector, MeanCorrector) else ()
+        vessels = {"": predictor.vessel, **{f"{k}:": vessel for k, vessel in enumerate(of_mean)}}
         along = {
             prefix + name: values[some]
             for prefix, vessel in vessels.items()
@@ -238,10 +241,10 @@ def is_kind_new(predictor: Predictor, dataset: Dataset, run: str) -> bool:
 
 def predict_instants(predictor: Predictor, instants: Instants, band: BandSettings | None, new: bool) -> Forecast:
     """Paths, band and alarm at some instants; new : whether the alarm is raised at all, for the kind of the run."""
-    alone = predictor.alone(instants)
+    alone, diverged = predictor.roll_out(instants)
     predicted = predictor.predict(instants, alone)
     region = None if band is None else predictor.band(predicted, instants, band.level, kind=band.kind)
-    outside, diverged = predictor.raise_alarm(instants) | new, predictor.diverges(instants)
+    outside = predictor.raise_alarm(instants, diverged) | new
     columns = {name: instants.columns[name] for name in ("t", "north", "east", "psi")}
     alone = alone if predictor.vessel else np.full_like(alone, np.nan)
     return Forecast(predicted, alone, region, outside, diverged, columns)

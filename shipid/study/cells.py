@@ -244,13 +244,13 @@ def evaluate_mean(
     if len(predictors) < len(parts):
         lost = next(part.row["foundation"] for part in parts if part.predictor is None or part.paths is None)
         return Cell(row | _failed_columns("failed", f"{lost}, of which it is the mean, has no result"))
-    known = [_fair_errors(work, one, fitted, left_out) for one in pairs]
-    errors = [one for one in known if one is not None]
-    weights, mean_errors, sentence = np.full(len(parts), 1 / len(parts)), None, ""
+    errors = [one for pair in pairs if (one := _fair_errors(work, pair, fitted, left_out)) is not None]
+    weights, mean_errors = np.full(len(parts), 1 / len(parts)), None
+    notes = [f"{part.row['foundation']}: {part.row['sentence']}" for part in parts if part.row["sentence"]]
     if len(errors) == len(parts):
         weights, mean_errors = weigh_errors(np.stack(errors), work.windows.run, by_left_out=foundation.by_left_out)
     elif foundation.by_left_out:
-        sentence = "weights are equal: errors on runs left out need `bands.refits`, such as 5"
+        notes.append("weights are equal: errors on runs left out need `bands.refits`, such as 5")
     first = predictors[0]
     predictor = replace(
         first,
@@ -264,7 +264,8 @@ def evaluate_mean(
     test = instants_of(prepared.study, first.vessel, prepared.data, prepared.test)
     words = ", ".join(f"{part} {weight:.2g}" for part, weight in zip(foundation.mean_of, weights, strict=True))
     outcome = _errors_of_paths(prepared, predictor, test, paths)
-    return Cell({**row, **outcome, "status": "ok", "sentence": sentence, "hyperparameters": words}, predictor, paths)
+    outcome |= {"status": "ok", "sentence": "; ".join(notes), "hyperparameters": words}
+    return Cell({**row, **outcome}, predictor, paths)
 
 
 def accuracy_of(paths: Array, test: Windows) -> dict[str, float]:

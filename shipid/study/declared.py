@@ -115,6 +115,8 @@ def foundations_of(study: Study, file: Path, known: dict[str, Vessel]) -> tuple[
 def _mean_of_foundations(block: MeanBlock, path: str, foundations: Sequence[Foundation]) -> Foundation:
     """The mean that a block declares; DocumentError where it has no parts, or such as it cannot take."""
     families = list(dict.fromkeys(one.family for one in foundations if one.base is not None))
+    if block.name.lower() in {NO_MODEL, *map(str.lower, families)}:
+        raise DocumentError(f"{block.name!r} is a family, or no physics: rename the mean", path=f"{path}.name")
     matched = {pattern: documents.match_paths(pattern, families) for pattern in block.mean_of}
     for pattern, found in matched.items():
         if not found:

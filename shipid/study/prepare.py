@@ -44,7 +44,7 @@ from shipid.engine.casadi import memory_along
 from shipid.errors import DataError, DivergenceError, DocumentError, suggest_name
 from shipid.hybrid.method import Case, Task
 from shipid.hybrid.physics import Physics, check_columns, missing_columns
-from shipid.hybrid.regression import MOST_FOLDS, Regression
+from shipid.hybrid.regression import Regression
 from shipid.logs.catalogue import fetch_log
 from shipid.logs.importing import import_log
 from shipid.logs.kinds import kind_in_name
@@ -548,8 +548,7 @@ def constant_motion(windows: Windows) -> Array:
     half = r * time / 2
     chord = time * np.sinc(half / np.pi)  # integral of cos and sin over a turn of 2 half
     along, across = chord * np.cos(half), chord * np.sin(half)
-    path: Array = np.stack([u * along - v * across, u * across + v * along], axis=-1)
-    return path
+    return np.asarray(np.stack([u * along - v * across, u * across + v * along], axis=-1))
 
 
 def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> dict[str, Array]:
@@ -559,23 +558,27 @@ def regression_paths(prepared: PreparedStudy, batches: Iterable[Batch]) -> dict[
     """
     study, paths, method = prepared.study, dict[str, Array](), Regression()
     physics, known = physics_of(study, None), study.prediction.known
+    test = prepared.test.instants(known=known)
     for batch in batches:
         windows = prepared.pool.select(np.isin(prepared.pool.run, prepared.runs(batch)))
         cases = {batch.key: Case(physics, np.zeros_like(windows.future))}
         with suppress(DataError):
-            folds = run_folds(windows, method.validation, batch.seed, MOST_FOLDS)
+            folds = prepared.folds(batch, windows, method.validation)
             fitted = method.fit(Task(cases, windows, folds, prepared.commands, known, batch.seed))[batch.key]
             if fitted.corrector is not None:
-                instants = prepared.test.instants(known=known)
-                paths[batch.key] = fitted.corrector.predict(physics, instants, np.empty(0))
+                paths[batch.key] = fitted.corrector.predict(physics, test, np.empty(0))
     return paths
 
 
 def foundation_record(foundation: Foundation) -> dict[str, Any]:
     """A foundation as plain data: what it is, where it comes from, its factors."""
     variant = foundation.variant
-    row: dict[str, Any] = {"foundation": foundation.name, "family": foundation.family, "member": foundation.member}
-    row["description"] = foundation.description
+    row: dict[str, Any] = {
+        "foundation": foundation.name,
+        "family": foundation.family,
+        "member": foundation.member,
+        "description": foundation.description,
+    }
     if variant is not None:
         row |= {"base": variant.base, "base_digest": variant.base_digest, "counter": variant.counter}
         row |= {"seed": variant.seed, "factors": dict(variant.factors), "values": dict(variant.values)}

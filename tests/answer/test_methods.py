@@ -36,7 +36,7 @@ def cells(
                         {"condition": "", "world": str(world), "foundation": one.model, "family": family,
                          "method": method, "N_D": 10, "seed": world, "status": "ok", "H": one.mean,
                          "H_90": 2 * one.mean, "H_end": 1.5 * one.mean, "H_end_90": 3 * one.mean, "seconds": 3.0,
-                         "trials": 4, "saw_test": False, "errors": one}
+                         "trials": 4, "apart": False, "errors": one}
                     )  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -66,7 +66,7 @@ def test_the_difference_is_that_of_the_means() -> None:
 
 def test_a_family_that_saw_the_test_is_shown_and_not_in_the_mean() -> None:
     made = cells(np.random.default_rng(0), 0.5)
-    tuned = made[made.family.eq("moderate")].assign(family="tuned", H=lambda rows: 0.1 * rows.H, saw_test=True)
+    tuned = made[made.family.eq("moderate")].assign(family="tuned", H=lambda rows: 0.1 * rows.H, apart=True)
     table = method_table(pd.concat([made, tuned], ignore_index=True), "drawn")
     for key in ("H", "difference", "cells", "missing"):
         assert getattr(row(table), key) == getattr(row(method_table(made, "drawn")), key)
@@ -116,7 +116,9 @@ def test_a_study_of_several_worlds_has_an_interval_over_them(worlds: int, condit
             for family, share in (("moderate", 0.5), ("none", 1.0)):
                 row = {"condition": condition, "world": f"{condition}-{world}", "family": family, "method": "drawn"}
                 rows += [{**row, "N_D": N, "status": "ok", "H_end": share * 2.0**world / N} for N in (1, 2, 3)]
-    study = SimpleNamespace(repeat={"seed": [*range(worlds)]}, claims=SimpleNamespace(method="drawn", not_judged=set()))
+    study = SimpleNamespace(
+        repeat={"seed": [*range(worlds)]}, claims=SimpleNamespace(method="drawn", not_judged=set()), model=[]
+    )
     plan: Any = SimpleNamespace(study=study, methods=[])
     told = sentences_on_worlds(plan, pd.DataFrame(rows))
     assert len(told) == (0 if worlds < 3 else 4 * conditions), "of the least and the largest N_D"

@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 import tomlkit
+from pandas.testing import assert_frame_equal
 
+from shipid.answer.findings import _errors_by_step
+from shipid.answer.methods import WITH_PHYSICS, method_cells, method_table
 from shipid.answer.pages import write_pages
 from shipid.data.windows import to_frame
 from shipid.errors import DocumentError
 from shipid.predictor import Predictor
 from shipid.study.apply import predict_log
-from shipid.study.plan import Plan, build_plan
+from shipid.study.plan import Batch, Plan, build_plan
 from shipid.study.results import read_results
-from shipid.study.store import cell_file, finished_units
+from shipid.study.store import cell_file
 from shipid.vessel.load import load_vessel
 from tests.study.tiny import MIXED, run_here, tiny_plan
 
@@ -25,8 +28,8 @@ EQUAL, WEIGHED = {"name": "equal", "mean_of": ["*"], "weights": "equal"}, {"name
 
 def plan_of(folder: Path, **changes: Any) -> Plan:
     document = tiny_plan(folder).document | {
-        "method": MIXED,
-        "grid": {"N_D": [2, 4], "seeds": [0]},
+        "method": [*MIXED, {"name": "rival", "kind": "regression", "families": ["none"]}],
+        "grid": {"N_D": [2, 6], "seeds": [0]},
         "model": [EQUAL, WEIGHED],
     }
     return build_plan(document | changes, folder / "tiny.toml")
@@ -68,6 +71,8 @@ def test_paths_are_the_mean_and_the_error_is_no_greater_than_the_mean_of_errors(
         if name == "equal":
             np.testing.assert_array_equal(weights, np.full(len(parts), 1 / len(parts)))
     assert not {"equal", "weighed"} & {*results.physics}
+    for row in (one for one in results.rows if one["method"] == "rival"):  # of more runs than it leaves out, too
+        np.testing.assert_array_equal(results.paths[row["cell"]], results.regression[Batch(row["N_D"], 0).key])
 
 
 def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path]) -> None:
@@ -80,6 +85,10 @@ def test_a_mean_is_shown_and_counted_among_no_physics(finished: tuple[Plan, Path
     counted = [line for line in answer.splitlines() if "physics models do" in line]
     assert all("equal" not in line and "weighed" not in line for line in counted)
     assert results.complete
+    assert not {"equal", "weighed"} & {*_errors_by_step(results, 6)}
+    cells = method_cells(results)
+    tables = [method_table(one, "drawn") for one in (cells, cells[~cells["family"].isin(["equal", "weighed"])])]
+    assert_frame_equal(*(one[one["family"] == WITH_PHYSICS].reset_index(drop=True) for one in tables))
 
 
 def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
@@ -89,11 +98,16 @@ def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
     vessel["thruster"] = {name: {**one, "actuator": actuator} for name, one in vessel["thruster"].items()}
     (tmp_path / "lazy.toml").write_text(tomlkit.dumps(vessel))
     lazy = {"name": "lazy", "base": "./lazy.toml"}
-    plan = plan_of(tmp_path, family=[*document["family"], lazy], model=[EQUAL], method=MIXED[:1], grid={"N_D": [4]})
+    wrong = {"parameters": ["hull.derivatives.X_u|u|"], "factor": [-100.0, -90.0], "change_sign": True}
+    families = [*document["family"], lazy, {"name": "mad", "base": "gunnerus-28.9", "perturb": [wrong]}]
+    plan = plan_of(tmp_path, family=families, model=[EQUAL], method=MIXED[:1], grid={"N_D": [4]})
     run_here(plan, tmp_path / "run")
     results = read_results(tmp_path / "run")
-    cell = next(row["cell"] for row in results.rows if row["foundation"] == "equal")
+    cell, said = next((row["cell"], row["sentence"]) for row in results.rows if row["foundation"] == "equal")
     frame, _ = predict_log(tmp_path / "run", cell, tmp_path / "run" / "dataset.parquet", None, tmp_path / "out.parquet")
+    assert said.startswith("mad: physics diverges on ")
+    assert any(text.startswith("physics diverges on ") for text in frame.attrs["limits"])
+    assert frame["physics_north"].isna().all()
     test, steps = results.test, results.test.horizon
     for place in range(0, len(test), 3):
         rows = frame[(frame["run"] == test.run[place]) & np.isclose(frame["t"], test.t[place])]
@@ -103,24 +117,14 @@ def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
         assert len(rows) == steps
 
 
-def test_what_was_interrupted_ends_alike(finished: tuple[Plan, Path], tmp_path: Path) -> None:
-    plan, folder = finished
-    again = plan_of(tmp_path)
-    events = run_here(again, tmp_path / "run")
-    assert events[-1].done == plan.cells
-    assert len(finished_units(folder, plan.units)) == len(plan.units)
-    one, other = read_results(folder), read_results(tmp_path / "run")
-    for cell in one.errors:
-        np.testing.assert_array_equal(one.errors[cell], other.errors[cell])
-
-
 @pytest.mark.parametrize(
     ("model", "words"),
     [
         ({"name": "m", "mean_of": ["nothing"]}, "'nothing' is no family with physics"),
         ({"name": "m", "mean_of": ["none"]}, "'none' is no family with physics"),
         ({"name": "m", "mean_of": ["right"]}, "right: a mean takes two foundations or more"),
-        ({"name": "right", "mean_of": ["*"]}, "two models are called 'right'"),
+        ({"name": "Right", "mean_of": ["*"]}, "model.Right.name: 'Right' is a family, or no physics: rename the mean"),
+        ({"name": "None", "mean_of": ["*"]}, "model.None.name: 'None' is a family, or no physics: rename the mean"),
         ({"name": "m", "mean_of": ["*"], "weights": "heavy"}, "weights"),
     ],
 )
