@@ -25,7 +25,7 @@ from shipid.hybrid.compensator import Compensator, Layers, Normaliser
 from shipid.hybrid.features import MOTIONS
 from shipid.hybrid.forest import ForestCorrector, Trees
 from shipid.hybrid.hankel_dmd import MISSED_NAMES, HankelCorrector
-from shipid.hybrid.kernel import KernelCompensator
+from shipid.hybrid.kernel_compensator import KernelCompensator
 from shipid.hybrid.learned_force import ForceCorrector
 from shipid.hybrid.modules import ModulesCorrector, physics_without_modules
 from shipid.hybrid.one_step import OneStepCorrector
