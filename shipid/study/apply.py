@@ -244,10 +244,9 @@ def predict_instants(predictor: Predictor, instants: Instants, band: BandSetting
     alone, diverged = predictor.roll_out(instants)
     predicted = predictor.predict(instants, alone)
     region = None if band is None else predictor.band(predicted, instants, band.level, kind=band.kind)
-    outside = predictor.raise_alarm(instants, diverged) | new
     columns = {name: instants.columns[name] for name in ("t", "north", "east", "psi")}
     alone = alone if predictor.vessel else np.full_like(alone, np.nan)
-    return Forecast(predicted, alone, region, outside, diverged, columns)
+    return Forecast(predicted, alone, region, predictor.raise_alarm(instants, diverged) | new, diverged, columns)
 
 
 def tables_along(
