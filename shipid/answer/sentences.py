@@ -178,7 +178,9 @@ def _caveats_of_families(results: Results) -> Iterator[str]:
             f"The physics of {model_list(lost['model'])} diverges on {training:.0f} training and {test:.0f} test "
             "windows: a path then keeps its last velocity, no farther than the present speed takes the ship."
         )
-    cells = results.cells[results.cells["family"].isin(fitted_families(results.plan)) & (results.cells["diverged"] > 0)]
+    cells = results.cells[
+        results.cells["family"].isin(fitted_families(results.plan)) & (results.cells["physics_diverged"] > 0)
+    ]
     if len(cells):
         where = f"on test windows of {counted_text(len(cells), 'cell')}"
         yield f"Fitted to the runs, the physics of {model_list(cells['model'].unique())} diverges {where}."
@@ -288,7 +290,7 @@ def _runs_that_physics_saves(case: AnswerCase) -> Iterator[str]:
     bounds, runs = _bounds(estimate, "{:.0f}".format), counted_text(fewest, "run")
     text = f"Without physics the same error takes about {estimate.value:.0f} runs{bounds}, interpolated between amounts"
     if estimate.above:
-        text = f"Without physics {counted_text(largest, 'run')} are not enough for that{bounds}. They give "
+        text = f"Without physics {counted_text(largest, 'run')} are not shown to be enough for that{bounds}. They give "
         text += case.error(NO_MODEL, largest)
     elif estimate.below:
         do = plural_word(fewest, "does", "do")
@@ -370,7 +372,7 @@ def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Itera
             _, worse, unknown = case.sides(names, lead) if names else ([], [], [])
             words += [f"beats {model_list(worse)} {how}"] if worse else []
             words += [f"is not shown to be beaten by {model_list(unknown)} {how}"] if unknown else []
-        one = f"regression on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
+        one = f"regression without physics on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"
         yield f"A {one} {'; it '.join(words)}." if words else f"All compared models{too} beat a {one}."
 
 

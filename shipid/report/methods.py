@@ -52,7 +52,7 @@ METHOD_COLUMNS = {
     "trials [1]": "trials",
     "no result": "without",
     "difference of H [%]": "difference",
-    "95 % interval, runs [m]": "over_runs",
+    "95 % interval, runs [%]": "over_runs",
     "better runs": "better_runs",
     "by world [m]": "by_world",
 }

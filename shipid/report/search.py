@@ -64,7 +64,7 @@ def search_figure(content: ReportContent) -> PageFigure | None:
         how="Each dot is a trial: the root of its validation error over the best of its cell; "
         + (thinned if len(frame) > MOST_DOTS else "")
         + (early if frame.state.eq("stopped").any() else "")
-        + "diamonds are those whose networks the cell uses; those beyond "
+        + "diamonds are those that the cell uses; those beyond "
         f"{HIGHEST_RATIO:g} times lie at the upper edge, those that diverged above it. The line joins the medians. "
         "Rank correlation (Spearman) is taken within each cell, then averaged over cells: it sees "
         f"what rises or falls throughout, not an optimum in the middle.{memories}",

@@ -16,7 +16,7 @@ def summary_text(content: ReportContent) -> str:
     """Answer, findings, errors of constant u, v, r and of regressions, models, cells and provenance as Markdown."""
     errors = {name: metres_text(value) for name, value in content.naive.items()}
     known = content.frame("regression")
-    known = known.map(number_text).assign(N_D=known["N_D"].map(str))
+    regressed = [[str(N_D), *map(number_text, numbers)] for N_D, *numbers in known.to_numpy(object).tolist()]
     headline, more = split_answer(content.answer)
     findings = [[f["id"], f["claim"], f["verdict"], f["evidence"]] for f in content.findings]
     parts = [
@@ -28,11 +28,7 @@ def summary_text(content: ReportContent) -> str:
         "At the horizon {end}, nine in ten below {end_90}; mean over it {mean}, 90th percentile {p90}.".format(
             **errors
         ),
-        *(
-            [f"## {REGRESSION.capitalize()}", _markdown_table([*map(str, known)], known.to_numpy().tolist())]
-            if len(known)
-            else []
-        ),
+        *([f"## {REGRESSION.capitalize()}", _markdown_table([*map(str, known)], regressed)] if regressed else []),
     ]
     by_kind = [error_by_kind(content)] if len(content.frame("kinds")) else []
     for table in (*by_kind, models_table(content), cells_table(content)):

@@ -195,7 +195,7 @@ def _described_cell(work: Work, pair: tuple[str, str], seconds: float, trials: l
         "minutes": covered_time(work.windows) / 60,
         "seconds": seconds,
         "trials": trials,
-        "diverged": 0.0,
+        "physics_diverged": 0.0,
     }
 
 
@@ -305,7 +305,7 @@ def _test_errors(
         sentence = "; ".join(
             filter(None, [sentence, f"{share}: paths there go no farther than the present speed takes the ship"])
         )
-    return {**outcome, "status": "ok", "sentence": sentence, "diverged": float(lost.mean())}, paths
+    return {**outcome, "status": "ok", "sentence": sentence, "physics_diverged": float(lost.mean())}, paths
 
 
 def _errors_of_paths(prepared: PreparedStudy, predictor: Predictor, instants: Instants, paths: Array) -> dict[str, Any]:

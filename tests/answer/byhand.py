@@ -76,7 +76,7 @@ def by_hand(
         row |= {"runs": N_D, "minutes": 1.0, **dict.fromkeys(("A_end", "A_end_90", "A", "A_90", "A_rms"), A)}
         row |= dict.fromkeys(("H_end", "H_end_90", "H", "H_90"), np.nan)
         row["trials"] = [{"value": (losses or {}).get(model, H), "state": "complete"}]
-        row |= {"rms": np.nan, "diverged": 0.0, "status": "failed", "sentence": "no training converged"}
+        row |= {"rms": np.nan, "physics_diverged": 0.0, "status": "failed", "sentence": "no training converged"}
         if H is not None:
             row |= {"H": H, "rms": 1.1 * H, "status": "ok", "sentence": ""}
             row["H_90"] = (H_90 or {}).get((model, N_D, seed), 1.5 * H)

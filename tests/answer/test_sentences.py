@@ -206,7 +206,9 @@ def test_runs_that_are_not_enough_may_still_be_too_many(made: Any) -> None:
     """`none` with 30 runs has about what `good` has with 10: the test cannot tell which has less."""
     H = grid({"good": (2.0, 1.0), "bad": (3.0, 2.0), "none": (2.1, 2.05)})
     advice = text(made(H, runs=8))
-    assert "Without physics 30 runs are not enough for that [at most 10, over 30]. They give 2.05 m" in advice
+    assert (
+        "Without physics 30 runs are not shown to be enough for that [at most 10, over 30]. They give 2.05 m" in advice
+    )
 
 
 def test_names_are_those_that_the_test_can_tell(made: Any) -> None:
@@ -244,7 +246,7 @@ def test_identified_models_are_not_best_in_validation(made: Any) -> None:
     assert "Compensation harms good." in said, "2 m alone, but `fitted` has less"
     assert "Identified models were fitted to the runs that validate them" in advice
     told = np.where(results.cells["family"].eq("fitted"), 0.03, 0.0)
-    advice = text(replace(results, cells=results.cells.assign(diverged=told)))
+    advice = text(replace(results, cells=results.cells.assign(physics_diverged=told)))
     assert "\nFitted to the runs, the physics of fitted diverges on test windows of 2 cells." in advice
 
 

@@ -70,7 +70,7 @@ def _cells(models: list[Model], sizes: list[int], seeds: int, generator: np.rand
                         "rms": 1.2 * H,
                         "status": "diverged" if bad else "ok",
                         "sentence": "4 % of the test windows left the sea" if bad else "",
-                        "diverged": 0.0,
+                        "physics_diverged": 0.0,
                         "seconds": 41.5,
                         "hyperparameters": "2 layers of 120, drop-out 0.1, rate 2e-3",
                     }
