@@ -103,6 +103,7 @@ def test_each_fault_is_named(tmp_path: Path, results: Results, fault: str) -> No
     [
         (lambda t: t.drop(columns="north"), "north: lacks this column; it has run, instant"),
         (lambda t: t.drop(index=7), "1 of .* steps are missing; the first: run"),
+        (lambda t: t.assign(run="Z"), "640 of 640 steps are none of the test"),
         (lambda t: pd.concat([t, t[3:5]]), "2 of .* steps are there twice"),
         (lambda t: t.assign(run="other"), "are none of the test"),
         (lambda t: t.assign(ahead=t["ahead"] - 1.0), "ahead 0 s"),
