@@ -26,18 +26,18 @@ def write_onnx(model: ExportModel, name: str, file: Path, *, single: bool = Fals
     `compensation` (S, T, 2) [m], of `one-step` `acceleration` (S, 3) [m/s^2, rad/s^2]. A network of a user has the
     inputs `past` (P + 1, S, d), the oldest first, and `now` (S, e), in single precision.
     """
+    trace, provenance = getattr(model.predictor.corrector, "trace_onnx", None), dict(model.predictor.provenance)
+    networks, result, shape = _networks_to_write(model) if trace is None else ([], "", [])
     try:
         from onnx import TensorProto, checker, helper, load, numpy_helper, save
     except ImportError:
         raise ShipidError("an ONNX file needs the package onnx: pip install 'shipid[export]'") from None
-    trace, provenance = getattr(model.predictor.corrector, "trace_onnx", None), dict(model.predictor.provenance)
     if trace is not None:
         with replace_whole(file) as temporary:
             inputs, traced = json.dumps(trace(temporary)), load(str(temporary))
             helper.set_model_props(traced, {"inputs": inputs, "provenance": json.dumps(provenance, default=str)})
             save(traced, str(temporary))
         return file
-    networks, result, shape = _networks_to_write(model)
     kind = np.dtype(np.float32 if single else np.float64)
     names = list(dict.fromkeys(each for normaliser, _ in networks for each in normaliser.names))
     nodes: list[Any] = []
@@ -85,7 +85,7 @@ def _networks_to_write(model: ExportModel) -> tuple[list[tuple[Normaliser, Layer
     if not isinstance(corrector, Compensator):
         raise ShipidError(
             f"the method {model.predictor.method} has no networks of its inputs alone: ONNX takes path-drawn, "
-            "path-trained, calibrator and one-step; export this one to c, fmu or casadi"
+            "path-refined, path-trained, calibrator and one-step; export this one to c, fmu or casadi"
         )
     networks = []
     for network in corrector.networks:

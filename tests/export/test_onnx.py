@@ -36,7 +36,7 @@ def test_networks_run_elsewhere(kind, tmp_path):
 
 
 def test_what_has_no_networks_is_refused_in_one_line(tmp_path):
-    pytest.importorskip("onnx")
+    """Before the package onnx is asked for."""
     with pytest.raises(ShipidError, match="ONNX takes path-drawn"):
         export_predictor(drawn("alone", 5, vessel="mariner").predictor, "onnx", tmp_path / "a.onnx")
     assert build_model(drawn("alone", 5, vessel="mariner").predictor).layout.now
