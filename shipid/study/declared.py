@@ -122,6 +122,8 @@ def _mean_of_foundations(block: MeanBlock, path: str, foundations: Sequence[Foun
         if not found:
             words = f"{pattern!r} is no family with physics: {suggest_name(pattern, families)}"
             raise DocumentError(words, path=f"{path}.mean_of")
+    if len(matched) < len(block.mean_of):
+        raise DocumentError("a family stands there twice: name each once", path=f"{path}.mean_of")
     parts = [one for one in foundations if any(one.family in found for found in matched.values())]
     names = tuple(one.name for one in parts)
     if len(parts) < 2 or any(one.observer is not None for one in parts):

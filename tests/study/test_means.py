@@ -122,6 +122,7 @@ def test_along_a_log_each_part_has_its_own_actuators(tmp_path: Path) -> None:
     [
         ({"name": "m", "mean_of": ["nothing"]}, "'nothing' is no family with physics"),
         ({"name": "m", "mean_of": ["none"]}, "'none' is no family with physics"),
+        ({"name": "m", "mean_of": ["right", "right"]}, "a family stands there twice"),
         ({"name": "m", "mean_of": ["right"]}, "right: a mean takes two foundations or more"),
         ({"name": "Right", "mean_of": ["*"]}, "model.Right.name: 'Right' is a family, or no physics: rename the mean"),
         ({"name": "None", "mean_of": ["*"]}, "model.None.name: 'None' is a family, or no physics: rename the mean"),
