@@ -1057,7 +1057,7 @@ def write_clock(writer: Writer, pick: dict[str, Any], t: Array, begin: datetime,
         whole = np.floor(np.round(t, 3)).astype(int)
         writer.add(writer.names["secs"], [str(int(epoch) + int(s)) for s in whole])
         writer.add(writer.names["nsecs"], [str(int(1e6) * int(v)) for v in np.round((np.round(t, 3) - whole) * 1000)])
-        return (epoch,)
+        return tuple(epoch + shift / 10 for shift in range(-9, 10))  # whole seconds alone are late by a part of one
     name = writer.name("time", unit)
     boot = 9_000_000
     text = {
