@@ -535,21 +535,22 @@ def diagnose_log(log: FaultyLog, folder: Path) -> tuple[list[str], list[str]]:
 
 
 def judge_causes(log: FaultyLog, causes: list[str], equals: list[str]) -> str:
-    """How a diagnosis ended; of two faults the one of the greater factor must be named, and none that is not there."""
+    """How a diagnosis ended; of two faults the greater must be named (`part`: only the other one is)."""
     if not log.causes or not causes:
         return "missed" if log.causes else "alarm" if causes else "quiet"
     main = max(zip(log.factors, log.causes, strict=True))[1]
     if causes[0] == "cannot tell":
         return "cannot tell"
-    if not any(names_cause(key, main) for key in causes):
-        return "cannot tell" if any(names_cause(key, main) for key in equals) else "wrong"
     known = [key for key in causes if key == "cannot tell" or any(names_cause(key, cause) for cause in log.causes)]
+    if not any(names_cause(key, main) for key in causes):
+        told = any(names_cause(key, main) for key in equals)
+        return "part" if known == causes else "cannot tell" if told else "wrong"
     return "right" if known == causes else "extra"
 
 
 def print_scores(scores: list[tuple[FaultyLog, str, str]]) -> None:
     """Print shares by fault and factor, by noise and by size of the ship, and the confusions."""
-    words = ("right", "extra", "cannot tell", "missed", "wrong", "quiet", "alarm")
+    words = ("right", "part", "extra", "cannot tell", "missed", "wrong", "quiet", "alarm")
     size = lambda log: min(FACTORS, key=lambda f: abs(math.log(f / max(log.factors))))  # noqa: E731
     groups: dict[str, Counter[str]] = {}
     for log, word, _ in scores:

@@ -117,6 +117,7 @@ def test_a_diagnosis_is_judged_by_its_key(ship: FieldShip) -> None:
     faulty = replace(log, causes=("antenna", "current"), factors=(4.0, 1.3))
     assert judge_causes(faulty, ["lever arm position"], []) == "right"
     assert judge_causes(faulty, ["lever arm position", "current"], []) == "right"
+    assert judge_causes(faulty, ["current"], []) == "part"
     assert judge_causes(faulty, ["lever arm position", "wind scale"], []) == "extra"
     assert judge_causes(faulty, ["lever arm position and velocity"], []) == "wrong"
     assert judge_causes(faulty, ["wind scale"], ["lever arm position"]) == "cannot tell"

@@ -1194,8 +1194,9 @@ def vessel_text(craft: Craft) -> str:
         side = {"port": -0.15, "starboard": 0.15}.get(name, 0.0) * L
         text += f"[thruster.{name}]\nx = {-0.45 * L:.3f}\ny = {side:.3f}\n"
         if craft.drive in ("azimuth", "outboard"):
-            text += f'kind = "azimuth"\nz = {0.02 * L:.3f}\nD_p = {0.06 * L:.4f}\nk_T = 1.0\n'
-            text += f'[thruster.{name}.K_x]\n"1" = 0.45\nJ = -0.3\n'
+            text += f'kind = "azimuth"\nz = {0.02 * L:.3f}\nD_p = {0.06 * L:.4f}\nk_T = 1.0\nk_astern = 0.65\n'
+            text += "J_t = 0.06\nJ_min = -0.3\nJ_max = 1.4\nJy_max = 0.6\nk_over = 0.5\nk_over2 = 0.12\nk_under = 0.1\n"
+            text += f'k_side = 0.6\nk_sideJ = 0.4\n[thruster.{name}.K_x]\n"1" = 0.45\nJ = -0.3\n'
             text += f"[thruster.{name}.K_y]\ny = -0.3\n"
         else:
             text += f'kind = "quadratic"\nT_nn = {drag * craft.U**2 / craft.n_max**2 / (1 if single else 2):.4g}\n'

@@ -17,6 +17,7 @@ from tests.logs.raw_folders import (
     rates,
     run_command,
     simulate_day,
+    vessel_text,
     wrong_signals,
 )
 
@@ -70,7 +71,18 @@ def test_the_true_mapping_gives_the_motion_back_and_wrong_ones_do_not(seed: int,
         assert name in import_with(folder, folder.mapping | {"columns": columns | {name: wrong}}, tmp_path)
 
 
-@pytest.mark.parametrize("drive", ["single", "twin", "twinrudder", "azimuth", "outboard"])
+DRIVES = ["single", "twin", "twinrudder", "azimuth", "outboard"]
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_the_vessel_document_has_the_commands_of_the_log(drive: str, tmp_path: Path) -> None:
+    file = tmp_path / "ship.toml"
+    file.write_text(vessel_text(draw_craft(np.random.default_rng(2), drive, small=False)))
+    status, text, _ = run_command("vessel", "show", file)
+    assert status == 0, text
+
+
+@pytest.mark.parametrize("drive", DRIVES)
 def test_a_helm_to_starboard_turns_to_starboard_and_the_mirror_image_to_port(drive: str) -> None:
     random = np.random.default_rng(3)
     craft = draw_craft(random, drive, small=True)
