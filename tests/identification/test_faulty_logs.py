@@ -82,6 +82,7 @@ def test_the_motion_of_a_log_is_one_motion(ship: FieldShip) -> None:
     assert not np.allclose(image, true_rates(ship, state, zero, zero), rtol=1e-3)  # not alike on both sides
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", ALL_CAUSES)
 def test_a_fault_has_the_factor_that_was_asked_for(ship: FieldShip, cause: str) -> None:
     log = simulate_runs(ship, np.random.default_rng(4), 8, 2.0, 0.5)

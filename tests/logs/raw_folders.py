@@ -555,17 +555,14 @@ def dress(random: np.random.Generator, name: str, unit: str, style: dict[str, An
     bare = style["units"] in ("none", "row") or not unit
     label = "" if bare else style.setdefault(unit, str(random.choice(LABELS[unit])))
     parts = re.split(r"[\s.]+", name)
-    match style["case"]:
-        case "caps":
-            name = name.upper()
-        case "camel":
-            name = parts[0].lower() + "".join(p.capitalize() for p in parts[1:])
-        case "snake":
-            name = "_".join(p.lower() for p in parts)
-        case "hungarian":
-            name = "f" + "".join(p[:1].upper() + p[1:] for p in parts)
-        case "prefix":
-            name = "NAV_" + "_".join(parts)
+    cases = {
+        "caps": name.upper(),
+        "camel": parts[0].lower() + "".join(p.capitalize() for p in parts[1:]),
+        "snake": "_".join(p.lower() for p in parts),
+        "hungarian": "f" + "".join(p[:1].upper() + p[1:] for p in parts),
+        "prefix": "NAV_" + "_".join(parts),
+    }
+    name = cases.get(style["case"], name)
     if not label:
         return name
     word = label.replace("/", "p").replace("°", "deg").replace("%", "pct")
@@ -830,24 +827,18 @@ def draw_commands(
         writer.words = writer.words | {"n": ["rps", "prop_rev_per_s"]}
     pick["unsigned"] = unit == "rpm" and not robot and random.random() < 0.06
     newton = float(random.uniform(0.3, 2) * craft.L**2.5)
+    forms = {"us": ("rev/s", span / 400, -3.75 * span), "share": ("rev/s", span, 0.0), "%": ("rev/s", span / 100, 0.0)}
+    forms["N"] = ("N", newton, 0.0)
     for position, (component, side) in enumerate(screws):
         extra = str(random.choice(writer.words[side])) if side else ""
         column = writer.name("n", {"share": ""}.get(unit, unit), extra)
-        if unit == "us":
-            signal = Signal((column,), "rev/s", factor=span / 400, offset=-1500 * span / 400, free_scale=True)
-        elif unit == "share":
-            signal = Signal((column,), "rev/s", factor=span, free_scale=True)
-        elif unit == "%":
-            signal = Signal((column,), "rev/s", factor=span / 100, free_scale=True)
-        elif unit == "N":
-            signal = Signal((column,), "N", factor=newton, free_scale=True)
-        else:
-            signal = Signal((column,), unit)
+        said, factor, zero = forms.get(unit, (unit, 1.0, 0.0))
+        signal = Signal((column,), said, 1, factor, zero, free_scale=unit in forms)
         folder.signals[f"{component}.n"] = signal
         commands[f"{component}.n"] = (column, unit, 6 + position)
     if pick["unsigned"]:
         cannot.append("sense of the shaft")
-    if unit in ("us", "share", "%", "N"):
+    if unit in forms:
         cannot.append("scale of the thrust")
     if craft.drive == "twin":
         return
@@ -857,19 +848,12 @@ def draw_commands(
     sense = int(random.choice([1, 1, -1]))
     for component, side in screws if craft.drive == "azimuth" else [("outboard" if azimuth else "rudder", "")]:
         key = "alpha" if azimuth else "delta"
-        extra = writer.names.get("n" + side, "") and next(
-            (w for w in writer.words.get(side, []) if f"n{w}" in writer.names), ""
-        )
-        extra = next((w for w in writer.words.get(side, []) if "n" + w in writer.names), extra or "")
+        extra = next((w for w in writer.words.get(side, []) if "n" + w in writer.names), "")
         column = writer.name(key, {"share": ""}.get(unit, unit), extra)
         sign = sense if not azimuth else -sense  # alpha > 0 turns to port, helm > 0 to starboard
-        if unit == "us":
-            factor = craft.d_max / 400
-            signal = Signal((column,), "rad", sign, factor, -1500 * factor * sign, free_scale=True)
-        elif unit in ("share", "%"):
-            signal = Signal((column,), "rad", sign, craft.d_max / (100 if unit == "%" else 1), free_scale=True)
-        else:
-            signal = Signal((column,), unit, sign)
+        factor = craft.d_max / {"us": 400, "share": 1, "%": 100}.get(unit, craft.d_max)
+        free, zero = unit in ("us", "share", "%"), -1500 * factor * sign if unit == "us" else 0.0
+        signal = Signal((column,), "rad" if free else unit, sign, factor, zero, free_scale=free)
         folder.signals[f"{component}.{key}"] = signal
         commands[f"{component}.{key}"] = (column, unit, 8)
     pick["sense"] = sense
