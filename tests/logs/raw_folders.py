@@ -6,8 +6,8 @@ The motion is from the integrator of this file; nothing here is taken from the c
 A folder is *right*: the imported table has the motion, commands and wind of the truth in SI. *asked*: what is wrong or
 missing stands in a question that names its true column, or the question is that of the hand of x and y and the true
 answer by `--frame` makes it right. *refused* in one line. *marked*: wrong, but its line says UNSURE, a warning names
-it, or a question doubts the column that was taken without naming the true one. *missing*: a command or the wind is left
-out without a question. *crash*. *SILENT*: another motion or command without any of these.
+it, a question doubts the column that was taken without naming the true one, or the true answer is refused. *missing*:
+a command or the wind is left out without a question. *crash*. *SILENT*: another motion or command without any of these.
 """
 
 from __future__ import annotations
@@ -1382,19 +1382,18 @@ def judge_folder(folder: RawFolder, place: Path) -> Verdict:
         reason += (
             f"; with --frame {folder.frame}: {refusal or '; '.join(f'{k}: {v}' for k, v in again.items()) or 'right'}"
         )
-        if not refusal and not again:
-            return Verdict("asked", reason, count)
+        if refusal.startswith("crash") or not (refusal or again):
+            return Verdict("crash" if refusal else "asked", reason, count)
         faults = faults if refusal else again
     if not faults:
         return Verdict("right", "", count)
     roots = [key for key in ("clock", "position", "psi") if key in faults and question_answers(folder, key, told)]
+    follows = {key for key, value in faults.items() if roots and ("." not in key or "sense" in value)}
     left = {
-        key: value
-        for key, value in faults.items()
-        if not (question_answers(folder, key, told) or (roots and "." not in key))
+        key: value for key, value in faults.items() if key not in follows and not question_answers(folder, key, told)
     }
     if not left:
-        return Verdict("asked", reason, count)
+        return Verdict("marked" if refusal else "asked", reason, count)
     silent = [key for key, value in left.items() if value != "missing"]
     silent = [key for key in silent if not (key in ("u", "v", "r") and {"position", "psi"} & set(silent))] or silent
     warned = "\n".join(line for line in words.splitlines() if line.startswith("# !"))
