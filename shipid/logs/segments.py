@@ -11,7 +11,7 @@ import pandas as pd
 
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
 from shipid.logs.mapping import Segment
-from shipid.physics.signals import is_shaft, is_steering
+from shipid.physics.signals import drive_scale, is_steering
 
 HELM = np.radians(3.0)  # rad: less is steering a course
 TURN = np.radians(120.0)  # rad of heading over one helm: a turning, not a leg of a zigzag
@@ -131,7 +131,7 @@ def _between_manoeuvres(rows: pd.DataFrame, first: int, last: int) -> Iterator[t
     if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):
         return
     part = rows.iloc[first : last + 1]
-    shafts = [name for name in map(str, rows.columns) if is_shaft(name)]
+    shafts = [name for name in map(str, rows.columns) if drive_scale(name)]
     # The speed through the water is no sign where shafts are logged: it changes after every turn, too.
     watched = part[shafts or ["u"]].to_numpy()
     low, high = np.quantile(watched, (0.02, 0.98), axis=0)

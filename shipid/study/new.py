@@ -21,7 +21,7 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
 from shipid.hybrid.physics import check_columns
-from shipid.physics.signals import SIGNALS, is_shaft, is_steering, signal_of
+from shipid.physics.signals import SIGNALS, drive_scale, is_steering, signal_of
 from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
@@ -467,9 +467,9 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
     orders: dict[str, Any] = {}
     for name in controls.commands:
         (single, common), row = order_keys(name), SIGNALS[signal_of(name)]
-        if is_shaft(name) and name not in drives:
+        if drive_scale(name) and name not in drives:
             orders[single] = 0.0
-        elif is_shaft(name):
+        elif drive_scale(name):
             orders[single if controls.differential else common] = [0.0 if controls.differential else low, high]
         elif is_steering(name):
             both_ends = {(signal_of(name), 1), (signal_of(name), -1)} <= signs  # one angle for all drives it aside
@@ -478,8 +478,8 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
             orders[common] = [value / row.factor for value in row.usual]
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     why = (
-        f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the "
-        "ship ahead rests"
+        f"constant orders: up to {high:g} {controls.drive_unit}, which hold {service:.3g} m/s in calm water; what does "
+        "not drive the ship ahead rests"
     )
     return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 

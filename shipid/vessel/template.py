@@ -16,7 +16,7 @@ from typing import Any
 from shipid.arguments import check_choice
 from shipid.document import bundled_documents, read_document, value_at_path
 from shipid.errors import ShipidError
-from shipid.physics.signals import is_shaft, neutral_value
+from shipid.physics.signals import drive_scale, neutral_value
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
@@ -620,7 +620,10 @@ def _quote_toml(text: str) -> str:
 
 def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
-    return {name: n if is_shaft(name) else neutral_value(name) for name in vessel_dynamics(vessel).commands}
+    return {
+        name: n * drive_scale(name) if drive_scale(name) else neutral_value(name)
+        for name in vessel_dynamics(vessel).commands
+    }
 
 
 def _service_shaft(vessel: Vessel, speed: float) -> float:

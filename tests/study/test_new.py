@@ -312,7 +312,7 @@ def test_a_service_speed_that_no_shaft_gives_is_a_fault_of_the_vessel(tmp_path: 
     lame = tmp_path / "lame.toml"
     stops = 'actuator.n.kind = "rate_limit"\nactuator.n.rate = 1.0\nactuator.n.high = 0.5\n'
     lame.write_text(f'extends = "gunnerus-28.9"\nname = "lame"\n[thruster.port]\n{stops}[thruster.starboard]\n{stops}')
-    with pytest.raises(DocumentError, match=r"lame.toml: particulars.U_0: no shaft speed drives"):
+    with pytest.raises(DocumentError, match=r"lame.toml: particulars.U_0: no shaft speed or force drives"):
         draft_study([str(lame)], None, tmp_path / "study.toml")
 
 
