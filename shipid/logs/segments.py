@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
+from shipid.logs.kinds import MIXED
 from shipid.logs.mapping import Segment
 from shipid.physics.signals import drive_scale, is_steering
 
@@ -30,30 +32,32 @@ class Leg:
     last: int
 
 
-def find_manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
+def find_manoeuvres(dataset: Dataset, unit: float = 1.0, *, files: bool = False) -> list[Segment]:
     """Manoeuvres of every run in the order of time, with names that are unique; a draft for a person to correct.
 
-    unit : of the log's clock [s], in which starts and ends are given.
+    unit : of the log's clock [s], in which starts and ends are given. files : whether each run is a file of several.
     """
     cuts = []
-    for _, rows in stretches_of_runs(dataset):
-        t = rows["t"].to_numpy() / unit
-        cuts += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
+    for run, rows in stretches_of_runs(dataset):
+        t, file = rows["t"].to_numpy() / unit, run if files else None
+        cuts += [(kind, file, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
     counts: dict[str, int] = {}
     segments = []
-    for kind, start, end in cuts:
+    for kind, file, start, end in cuts:
         counts[kind] = counts.get(kind, 0) + 1
-        segments.append(Segment(run=f"{kind} {counts[kind]}", start=start, end=end, manoeuvre=kind))  # type: ignore[arg-type]
+        named: Any = {"run": f"{kind} {counts[kind]}", "file": file, "manoeuvre": kind}
+        segments.append(Segment(start=start, end=end, **named))
     return segments
 
 
 def run_kind(rows: pd.DataFrame) -> str:
-    """The kind of manoeuvre that takes most of a run."""
+    """The kind of manoeuvre that takes half of a run or more; mixed where none does."""
     t = rows["t"].to_numpy()
     spans: dict[str, float] = {}
     for kind, (first, last) in _of_stretch(rows):
         spans[kind] = spans.get(kind, 0.0) + float(t[last] - t[first])
-    return max(spans, key=lambda kind: spans[kind], default="transit")
+    kind = max(spans, key=lambda kind: spans[kind], default=MIXED)
+    return kind if spans and spans[kind] >= (t[-1] - t[0]) / 2 else MIXED
 
 
 def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
