@@ -544,12 +544,9 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
                 path=f"{path}.direction",
             )
         if column.curve is not None:
-            ends = [number for number, _ in column.curve]
-            if not (is_command(name) or is_output(name)) or not isinstance(column.source, str) or column.wrap:
-                fault = "belongs to a command or output from one column that does not wrap: remove curve"
-                raise DocumentError(fault, file=file, path=f"{path}.curve")
-            if any(second <= first for first, second in pairwise(ends)):
-                fault = f"the numbers of the log must rise, not {', '.join(f'{end:g}' for end in ends)}"
+            rises = all(first[0] < second[0] for first, second in pairwise(column.curve))
+            if not (is_command(name) or is_output(name)) or column.wrap or not rises:
+                fault = "belongs to a command or output that does not wrap, and the numbers of the log rise in it"
                 raise DocumentError(fault, file=file, path=f"{path}.curve")
         if column.wrap and unit != "rad":
             raise DocumentError("only a column in rad or deg can wrap: remove wrap", file=file, path=f"{path}.wrap")

@@ -333,7 +333,11 @@ def test_a_curve_reads_pulses_with_a_dead_band_both_directions_and_stops(tmp_pat
 @pytest.mark.parametrize(
     ("command", "path", "message"),
     [
-        ('[columns."left.n"]\nfrom = "pwm"\nunit = "rpm"\ncurve = [[2, 0], [1, 5]]\n', "left.n.curve", "must rise"),
+        (
+            '[columns."left.n"]\nfrom = "pwm"\nunit = "rpm"\ncurve = [[2,0], [1,5]]\n',
+            "left.n.curve",
+            "numbers of the log rise",
+        ),
         ('[columns.phi]\nfrom = "pwm"\nunit = "deg"\ncurve = [[1, 0], [2, 5]]\n', "phi.curve", "belongs to a command"),
     ],
 )
