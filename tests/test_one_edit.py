@@ -151,7 +151,7 @@ def test_a_guess_names_the_commands_of_a_vessel_without_a_shaft(
 
 @pytest.mark.usefixtures("jet")
 def test_a_manoeuvre_by_shaft_and_helm_names_those_that_a_vessel_without_a_shaft_takes() -> None:
-    with pytest.raises(DocumentError, match=r"needs a shaft speed `n`, the kinds `turning` and `steps` .* order"):
+    with pytest.raises(DocumentError, match=r"needs a shaft speed `n`, or a `force`, the kinds .* order"):
         _ = Controls(with_jets("main")).helm
     assert Controls(with_jets("main")).effects == ((), {})
     truth = Truth(**SHALLOWS, manoeuvre=[{"kind": "steps", "throttle": (0.2, 0.8)}])

@@ -131,7 +131,7 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
     seen = [(text, "models") for text in _caveats_of_families(results)]
     learns = any(way.method.compensates for way in plan.methods if way.name == verdict_method(plan))
     top = rows[rows["family"].ne(NO_MODEL) & rows["N_D"].eq(rows["N_D"].max())]
-    if top.empty or not learns:
+    if rows.empty or not learns or (top.empty and plan.families):
         cells = results.cells[results.cells["status"] == "ok"]
         cells = cells[cells["N_D"] == cells["N_D"].max()]
         words = "No result joins physics and data, so there is no conclusion."
@@ -142,13 +142,16 @@ def answer_sentences(results: Results, methods: Sequence[str] = ()) -> list[tupl
     case, learning = AnswerCase(results, rows, table, at_horizon, best_model(results)), learning_methods(plan)
     chart = "map" if len(case.ends) > 1 and top["model"].nunique() > 1 else "gain"
     several = f"Of {len(learning)} methods that learn from data the other sentences speak of {verdict_method(plan)!r}."
-    parts: list[tuple[str, Iterable[str]]] = [
-        ("gain", _headline(case)),
-        ("methods", methods if len(learning) > 1 else ()),
+    of_physics: list[tuple[str, Iterable[str]]] = [
         (chart, _physics_that_pays(case)),
         ("gain", _mean_over_horizon(case)),
         ("gain", _means_over_foundations(case)),
         (chart, _runs_that_physics_saves(case)),
+    ]
+    parts: list[tuple[str, Iterable[str]]] = [
+        ("gain", _headline(case)),
+        ("methods", methods if len(learning) > 1 else ()),
+        *(of_physics if plan.families else ()),
         ("cells", [several] if len(learning) > 1 else ()),
         ("gain", _reservations(case)),
         ("cells", _how_to_read(case)),
@@ -302,6 +305,10 @@ def _headline(case: AnswerCase) -> Iterator[str]:
     """Error at the horizon of the best model at the largest amount of data; of all where none is known as best."""
     best, largest = case.best, case.table.amounts[-1]
     rows, runs = case.rows[case.rows["N_D"] == largest].set_index("model"), counted_text(largest, "run")
+    if best is None and not case.results.plan.families:
+        error, most = case.error(NO_MODEL, largest, "H_end"), metres_text(float(rows["H_end_90"][NO_MODEL]))
+        yield f"{case.ahead} ahead, data alone with {runs} err by {error} on average, nine in ten below {most}."
+        return
     if best is None:
         yield f"With {runs}, no model is {BEST}. {_mean_errors(case.results, rows['H_end'])}"
         return
@@ -367,9 +374,10 @@ def _no_better_than_regression(case: AnswerCase, models: Sequence[str]) -> Itera
     table, fixed = case.table, case.fixed_physics()
     for amount, place in case.ends.items():
         words, too = [], ", physics alone too," if fixed else ""
-        for names, column, how in ((models, place, "with the same runs"), (fixed, PHYSICS_ONLY, "as physics alone")):
+        rivals = [(models, place, "with the same runs"), (fixed, PHYSICS_ONLY, "as physics alone")]
+        for names, column, how in rivals[: 2 if fixed else 1]:
             lead = table.compare([[(1.0, REGRESSION, place), (-1.0, name, column)] for name in names])
-            _, worse, unknown = case.sides(names, lead) if names else ([], [], [])
+            _, worse, unknown = case.sides(names, lead)
             words += [f"beats {model_list(worse)} {how}"] if worse else []
             words += [f"is not shown to be beaten by {model_list(unknown)} {how}"] if unknown else []
         one = f"regression without physics on {counted_text(amount, 'run')} (H {table.metres(REGRESSION, place)})"

@@ -141,14 +141,15 @@ def data_segment(
     from shipid.logs.guess.draft import clock_moment, segment_log, segments_text
 
     declared = shipid.read_mapping(mapping)
-    if declared.source.runs is not None or declared.parts is not None:
-        raise ShipidError("says where runs begin ([source] runs or [parts]): nothing is to be cut", file=mapping)
+    if declared.parts is not None:
+        raise ShipidError("says where runs begin ([parts]): nothing is to be cut", file=mapping)
     file = check_output(out or Path(f"{Path(mapping).stem}-segments.toml"), endings=(".toml",))
     unit = declared.clock.unit
     segments = segment_log(declared, log or fetch_log(mapping))
     write_new(segments_text(segments, unit), file)
     with open_answer(as_json) as answer:
-        rows = [{"run": one.run, "start": one.start, "end": one.end} for one in segments]
+        of_file = {"file"} if declared.source.runs is None else set[str]()
+        rows = [one.model_dump(exclude={"manoeuvre", *of_file}) for one in segments]
         answer.records("segments", rows, formats=dict.fromkeys(("start", "end"), lambda time: clock_moment(time, unit)))
         answer.say(f"{len(segments)} segments -> {file}", file=file)
 

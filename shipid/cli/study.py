@@ -17,7 +17,7 @@ from shipid.cli.outputs import check_output
 from shipid.cli.terminal import end_on_interrupt, share_text, show_steps
 from shipid.errors import DocumentError, ShipidError, escape_unprintable
 from shipid.files import TABLES
-from shipid.units import level_text
+from shipid.units import level_text, plural_word
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -48,9 +48,9 @@ def study_list(as_json: Json = False) -> None:
 @app.command("new")
 def study_new(
     vessel: Annotated[
-        list[str],
-        typer.Option(help="bundled name, or path of a vessel or patch; may be repeated"),
-    ],
+        list[str] | None,
+        typer.Option(help="bundled name, or path of a vessel or patch; may be repeated; default: data alone"),
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(help="dataset (Parquet) of recorded runs; without it the vessel is simulated")
     ] = None,
@@ -63,8 +63,10 @@ def study_new(
     from shipid.files import quote_argument, write_new
     from shipid.study.new import draft_study
 
-    file = check_output(out or Path(f"{document_stem(data or vessel[0])}-study.toml"), endings=(".toml",))
-    draft = draft_study(vessel, data, file)
+    if not vessel and data is None:
+        raise ShipidError("missing: give a vessel, or recorded runs as --data, or both", path="--vessel")
+    file = check_output(out or Path(f"{document_stem(data or (vessel or [''])[0])}-study.toml"), endings=(".toml",))
+    draft = draft_study(vessel or [], data, file)
     write_new(draft.text, file)
     with open_answer(as_json) as answer:
         choices = [{"path": choice.path, "value": str(choice.value), "why": choice.why} for choice in draft.choices]
@@ -73,7 +75,8 @@ def study_new(
         answer.warn(draft.warnings)
         answer.say("\n".join(look.sentence for look in draft.looks.values() if not look.wrong))
         models = [model.name for model in draft.plan.foundations]
-        sentence = f"{draft.plan.cells} cells of {len(models)} foundations ({', '.join(models)}) -> {file}"
+        named = f"{len(models)} {plural_word(len(models), 'foundation')} ({', '.join(models)})"
+        sentence = f"{draft.plan.cells} cells of {named} -> {file}"
         answer.say(sentence, file=file, cells=draft.plan.cells, foundations=models)
         answer.say(f"run it with: shipid study run {quote_argument(file)}")
 

@@ -9,10 +9,12 @@ from typing import Annotated, Any
 import typer
 
 import shipid
+from shipid.arguments import check_choice
 from shipid.cli.answer import Json, open_answer
 from shipid.cli.options import VesselName
 from shipid.cli.outputs import check_output
 from shipid.cli.terminal import CRITERIA
+from shipid.errors import ShipidError
 
 app = typer.Typer(no_args_is_help=True, help="Vessels: declared ships, bundled or in a file.")
 
@@ -59,10 +61,22 @@ def vessel_show(
 def vessel_new(
     length: Annotated[float, typer.Option(help="m, between perpendiculars")],
     beam: Annotated[float, typer.Option(help="m")],
-    draught: Annotated[float, typer.Option(help="m")],
-    block: Annotated[float, typer.Option(help="block coefficient")],
     out: Annotated[Path, typer.Option(help="TOML file to write; an existing file is not overwritten")],
-    speed: Annotated[float | None, typer.Option(help="m/s, in service; default: a Froude number of 0.2")] = None,
+    kind: Annotated[str, typer.Option(help="ship, or usv: a small craft driven by forces")] = "ship",
+    draught: Annotated[float | None, typer.Option(help="m, of a ship")] = None,
+    block: Annotated[float | None, typer.Option(help="block coefficient of a ship")] = None,
+    mass: Annotated[float | None, typer.Option(help="kg, of a usv")] = None,
+    thruster: Annotated[
+        list[str] | None, typer.Option(help="X,Y in m forward and to starboard of the middle of a usv; one for each")
+    ] = None,
+    thrust: Annotated[
+        float | None, typer.Option(help="N, greatest of each thruster of a usv; default: a guess")
+    ] = None,
+    swivel: Annotated[float, typer.Option(help="deg to either side that thrusters of a usv turn; 0: fixed")] = 0.0,
+    hulls: Annotated[int | None, typer.Option(min=1, max=2, help="of a usv; default: a guess")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="m/s: of a ship in service, default a Froude number of 0.2; of a usv the top")
+    ] = None,
     rpm: Annotated[float | None, typer.Option(help="of the screw at that speed; default: a guess")] = None,
     propulsor: Annotated[
         str, typer.Option(help="propeller-rudder, azimuth, or differential: two screws")
@@ -86,22 +100,48 @@ def vessel_new(
     from shipid.files import write_text
     from shipid.simulation.measured import measure_trials
     from shipid.vessel.template import Particulars, first_guess
+    from shipid.vessel.usv import SmallCraft, guess_craft
 
     check_output(out, endings=(".toml",))
     check_values({"name": name or ""}, "vessel new")
-    given = Particulars(
-        length, beam, draught, block, speed, propulsor, ship_type, rpm, shafts, propeller_diameter, rudder_area,
-        tunnel_thruster, scale,
-    )  # fmt: skip
-    guessed = first_guess(given, name or f"First guess, {length:g} m", str(out))
+    check_choice("kind", kind, ("ship", "usv"))
+    called, of_usv = name or f"First guess, {length:g} m", kind == "usv"
+    of_ships = {"draught": draught, "block": block, "rpm": rpm, "shafts": shafts, "scale": scale}
+    of_ships |= {"propeller-diameter": propeller_diameter, "rudder-area": rudder_area}
+    of_usvs = {"mass": mass, "thruster": thruster, "thrust": thrust, "hulls": hulls, "swivel": swivel or None}
+    needed = {"mass": mass, "speed": speed, "thruster": thruster} if of_usv else {"draught": draught, "block": block}
+    if lacking := next((option for option, value in needed.items() if value is None), None):
+        raise ShipidError(f"missing: a {kind} needs it", path=f"--{lacking}")
+    other = of_ships if of_usv else of_usvs
+    if foreign := next((option for option, value in other.items() if value is not None), None):
+        raise ShipidError(f"is of a {'ship' if of_usv else 'usv'}: leave it out", path=f"--{foreign}")
+    if mass is not None and speed is not None:
+        places = tuple(_parse_place(text) for text in thruster or ())
+        guessed = guess_craft(SmallCraft(length, beam, mass, speed, places, thrust, swivel, hulls), called, str(out))
+    else:
+        given = Particulars(
+            length, beam, draught or 0.0, block or 0.0, speed, propulsor, ship_type, rpm, shafts, propeller_diameter,
+            rudder_area, tunnel_thruster, scale,
+        )  # fmt: skip
+        guessed = first_guess(given, called, str(out))
     write_text(out, guessed.text)
     with open_answer(as_json) as answer:
         count = len(guessed.vessel.parameters)
         answer.say(f"{count} parameters by formula, none of them measured -> {out}", file=out, parameters=count)
-        answer.say(f"{60 * guessed.n:.4g} rpm hold {given.service:.3g} m/s", n=guessed.n, speed=given.service)
+        held = f"{60 * guessed.n:.4g} {guessed.unit} hold {guessed.speed:.3g} m/s"
+        answer.say(held, n=guessed.n, speed=guessed.speed)
         grows = "" if guessed.growth < 0 else f": a small yaw grows e-fold in {1 / guessed.growth:.3g} s"
         answer.say(f"course-{'UNSTABLE' if grows else 'stable'} by these formulae{grows}", growth=guessed.growth)
-        judged, notes = measure_trials(guessed.vessel, given.service)
+        judged, notes = measure_trials(guessed.vessel, guessed.speed)
         answer.say("\n".join(guessed.remarks), remarks=guessed.remarks)
         answer.records("criteria", judged, CRITERIA)
         answer.say("\n".join(notes), notes=notes)
+
+
+def _parse_place(text: str) -> tuple[float, float]:
+    """The place X,Y [m] of a thruster; ShipidError for another text."""
+    try:
+        x, y = map(float, text.split(","))
+    except ValueError:
+        raise ShipidError(f"{text!r}: write the place as X,Y in m, such as -0.8,0.4", path="--thruster") from None
+    return x, y

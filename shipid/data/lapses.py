@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipid.data.dataset import Array
-from shipid.physics.signals import is_all_round, is_shaft, is_steering
+from shipid.physics.signals import drive_scale, is_all_round, is_steering
 
 RowMask = NDArray[np.bool_]
 
@@ -206,7 +206,7 @@ def _find_still_values(name: str, values: Array, psi: Array, follows: RowMask) -
     ends = float(values.min()), float(values.max())
     for first, count in zip(edges[:-1][long], lengths[long], strict=True):
         value = float(values[first])
-        stopped = value in ends or (value == 0.0 and is_shaft(name))
+        stopped = value in ends or (value == 0.0 and drive_scale(name) > 0)
         if count > STILL_RATIO * usual and not stopped and _turns_both_ways(psi[first : first + count]):
             yield CommandFault(int(first), int(first + count), "still", 0.0)
 

@@ -300,9 +300,12 @@ def check_columns(vessel: Vessel, columns: Collection[str], file: str) -> None:
     missing = [name for name in vessel_dynamics(vessel).commands if name not in columns]
     if missing:
         commands = sorted(name for name in columns if "." in name)
+        have = (
+            f"{', '.join(commands)}. `shipid data import --guess LOG --vessel VESSEL` drafts a mapping with the names"
+        )
+        have = f"{have} of the vessel" if commands else "no commands: `shipid study new` without --vessel needs none"
         raise DataError(
-            f"{vessel.name} needs this command; the data have {', '.join(commands) or 'no commands'}. "
-            f"`shipid data import --guess LOG --vessel VESSEL` drafts a mapping with the names of the vessel",
+            f"{vessel.name} needs this command; the data have {have}",
             file=file,
             path=missing[0],
         )

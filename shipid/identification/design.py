@@ -24,7 +24,7 @@ from shipid.data.dataset import Array, Dataset
 from shipid.errors import ShipidError
 from shipid.identification.residuals import build_problem, predict_residuals
 from shipid.identification.settings import Identify, free_factors
-from shipid.physics.signals import ACTUAL
+from shipid.physics.signals import ACTUAL, drive_scale
 from shipid.simulation.approach import FROUDE, Controls, NotStraight
 from shipid.simulation.manoeuvre import ApproachedManoeuvre, Excitation
 from shipid.simulation.perform import perform_manoeuvres
@@ -47,7 +47,7 @@ ANGLES: dict[str, tuple[tuple[float, ...], ...]] = {
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the orders: helm angle [deg], shaft speed [rpm], their rates [deg/s, rpm/s]; None: no limit."""
+    """Limits of the orders: helm angle [deg], shaft speed [rpm], or force [N], their rates; None: no limit."""
 
     angle_deg: float = 35.0
     n_rpm: float = float("inf")
@@ -80,7 +80,8 @@ def recorded_limits(vessel: Vessel, dataset: Dataset, runs: Iterable[str]) -> tu
     """Median speed [m/s] of some runs, and as limits the greatest speed of the shafts that drive the ship ahead."""
     rows = dataset.frame[dataset.frame["run"].isin(list(runs))]
     shafts = Controls(vessel).effects[0]
-    limits = Limits(n_rpm=max(float(rows[name].abs().max()) for name in shafts) / RPM) if shafts else Limits()
+    greatest = [float(rows[name].abs().max()) / drive_scale(name) for name in shafts]
+    limits = Limits(n_rpm=max(greatest) / RPM) if shafts else Limits()
     return float(np.median(np.hypot(rows["u"], rows["v"]))), limits
 
 
@@ -105,17 +106,18 @@ def candidate_manoeuvres(vessel: Vessel, speeds: Sequence[float] = (), limits: L
 
 
 def _excitation_candidates(vessel: Vessel, speed: float, length: float, limits: Limits) -> Iterator[Candidate]:
-    n_rpm, passing = shaft_speed(Controls(vessel), speed) / RPM, length / speed
+    controls, passing = Controls(vessel), length / speed
+    n_rpm, unit = shaft_speed(controls, speed) / RPM, controls.drive_unit
     swing = min(SWING * n_rpm, limits.n_rpm - n_rpm)
     if swing <= 0:
         return
     rates = {"angle_rate_deg": limits.angle_rate_deg, "shaft_rate_rpm": limits.shaft_rate_rpm}
     how: dict[str, Any] = {"n_rpm": n_rpm, "amplitude_rpm": swing, "duration": RUN * passing, **rates}
     steps = Excitation(signal="aprbs", hold=(2 * passing, 5 * passing), **how)
-    yield Candidate(f"speed run, {n_rpm:.3g} +- {swing:.2g} rpm, {speed:.2g} m/s", steps)
+    yield Candidate(f"speed run, {n_rpm:.3g} +- {swing:.2g} {unit}, {speed:.2g} m/s", steps)
     angle = min(20.0, limits.angle_deg)
     waves = Excitation(signal="multisine", angle_deg=angle, period=RUN * passing, harmonics=(1, 12), **how)
-    yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} rpm, {speed:.2g} m/s", waves)
+    yield Candidate(f"multisine, {angle:g} deg and {swing:.2g} {unit}, {speed:.2g} m/s", waves)
 
 
 def within_limits(manoeuvre: ApproachedManoeuvre, limits: Limits) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,18 @@ def of_ais(numbers: NDArray[np.float64], log: pd.DataFrame, file: Path, path: st
     why = " is none of -128 to 127, as AIS has: is the unit deg/min?"
     _refuse_value((numbers < -128) | (numbers > 127), numbers, log, file, path, behind=why)
     return rate_of_ais(numbers)
+
+
+def of_curve(
+    numbers: NDArray[np.float64], curve: Sequence[tuple[float, float]], log: pd.DataFrame, file: Path, path: str
+) -> NDArray[np.float64]:
+    """Numbers (N,) of a log as a curve of pairs (number, value) has them, linear between; none may lie outside it."""
+    ends, values = np.array(curve).T
+    why = (
+        f" is outside the curve, {ends[0]:g} to {ends[-1]:g}: give it another end, flat where the drive stays as it is"
+    )
+    _refuse_value((numbers < ends[0]) | (numbers > ends[-1]), numbers, log, file, path, behind=why)
+    return np.asarray(np.interp(numbers, ends, values), dtype=np.float64)
 
 
 def of_parts(

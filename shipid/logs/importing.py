@@ -31,7 +31,7 @@ from shipid.data.dataset import (
 )
 from shipid.data.kinematics import Noise, smooth_motion
 from shipid.errors import DataError, is_utf_8, suggest_name
-from shipid.logs.cells import log_column, of_ais, of_minutes, of_parts, of_quaternion, parse_numbers
+from shipid.logs.cells import log_column, of_ais, of_curve, of_minutes, of_parts, of_quaternion, parse_numbers
 from shipid.logs.channels import (
     Channel,
     close_gaps,
@@ -151,7 +151,8 @@ def import_log(
         frame, outside = _cut_into_runs(rows, mapping.segment or (whole,), unit, source)
         repairs += outside
     else:
-        frame = pd.concat([_name_run(part.rows, run) for run, part in each], ignore_index=True)
+        frame, outside = _cut_files(mapping, each, logs)
+        repairs += outside
     kinds |= {run: kind for run, kind in mapping.source.manoeuvres.items() if run in set(frame["run"])}
     metadata |= {"manoeuvres": kinds} if kinds else {}
     dataset = Dataset(frame, metadata)
@@ -369,7 +370,10 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
     for name, column in mapping.columns.items():
         table, times, form, other = files[column.file or ""]
         sides = side_letters(name) if column.unit == "deg" and isinstance(column.source, str) else ""
-        place, units = f"columns.{name}.from", (column.unit, *(["%"] if "factor" in column.model_fields_set else []))
+        place, units = (
+            f"columns.{name}.from",
+            (column.unit, *(["%"] if {"factor", "curve"} & column.model_fields_set else [])),
+        )
         parts = [parse_numbers(table, one, form, other, place, sides, units) for one in source_columns(column.source)]
         numbers = parts[0]
         if column.unit == "ddmm":
@@ -380,6 +384,8 @@ def _mapped_columns(mapping: Mapping, file: Path, log: pd.DataFrame) -> tuple[pd
             numbers = of_quaternion(parts, source_columns(column.source), table, other, f"columns.{name}.from")
         elif len(parts) > 1:
             numbers = of_parts(parts, source_columns(column.source), table, other, f"columns.{name}.from")
+        if column.curve is not None:
+            numbers = of_curve(numbers, column.curve, table, other, f"columns.{name}.curve")
         size = to_si(column.unit, name)
         factor = column.sign * column.factor * size
         values = numbers * factor if factor != 1.0 else numbers
@@ -474,6 +480,29 @@ def _cut_into_runs(
     record = {"kind": "left out", "column": "", "count": int(outside.sum()), "note": f"of {len(t)} rows: in no segment"}
     frame = runs[0] if len(runs) == 1 else pd.concat(runs, ignore_index=True)
     return frame, [record] if outside.any() else []
+
+
+def _cut_files(
+    mapping: Mapping, each: list[tuple[str, ImportedLog]], logs: PlainMapping[str, Path]
+) -> tuple[pd.DataFrame, Records]:
+    """The runs of several files: the segments of each, the whole file where it has none; rows in none are counted."""
+    unit, frames, records = to_si(mapping.clock.unit, "t"), list[pd.DataFrame](), list[Records]()
+    for index, one in enumerate(mapping.segment):
+        if one.file not in logs or one.run in logs.keys() - {one.file}:
+            file, path = next(iter(logs.values())).parent, f"segment.{index}"
+            if one.file in logs:
+                raise DataError(f"a run {one.run!r} exists, a whole file: take another name", file=file, path=path)
+            raise DataError(
+                f"no file {one.file!r}: {suggest_name(str(one.file), logs)}", file=file, path=f"{path}.file"
+            )
+    for run, part in each:
+        inside = [one for one in mapping.segment if one.file == run]
+        frame, outside = (
+            _cut_into_runs(part.rows, inside, unit, logs[run]) if inside else (_name_run(part.rows, run), [])
+        )
+        frames.append(frame)
+        records.append(outside)
+    return pd.concat(frames, ignore_index=True), _add_records(records)
 
 
 def _split_runs(log: ImportedLog, name: str) -> Iterator[pd.DataFrame]:

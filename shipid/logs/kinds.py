@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-RANDOM, LOW_SPEED, COASTING = "random", "manoeuvring at low speed", "coasting"
+RANDOM, LOW_SPEED, COASTING, MIXED = "random", "manoeuvring at low speed", "coasting", "mixed"
 WORDS = {
     "zigzag": r"zz|zig\W?zag\w*|zig|zag|z|z\W?\d+\W\d+|zickzack|sikksakk|siksak",
     "turning": r"tc[sp]?|turn\w*|circles?|drehkreis|svingsirkel|williamson",
@@ -15,6 +15,7 @@ WORDS = {
     "spiral": r"spiral\w*|dieudonne|bech",
     "pull-out": r"pull\W?out\w*",
     "speed run": r"speed\W?runs?|speed\W?trials?|speed|accel\w*|decel\w*|mile",
+    MIXED: r"mixed|mix|free\W?(?:drive|driving|run)",
     "transit": r"transits?|straight\w*|course\w*",
 }
 """Kind -> regular expression of the words in a run's name that say it; the first kind that fits counts."""

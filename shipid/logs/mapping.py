@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from pydantic import Field, SerializeAsAny
+from pydantic import Field, FiniteFloat, SerializeAsAny
 
 from shipid import document
 from shipid.data.dataset import (
@@ -105,6 +106,7 @@ Manoeuvre = Literal[
     "transit",
     "random",
     "manoeuvring at low speed",
+    "mixed",
 ]
 
 
@@ -188,6 +190,9 @@ class PlaneOrigin(StrictPart):
 class Column(StrictPart):
     """One column of the dataset: value = sign * factor * (source column) + offset, in `unit`, then turned as declared.
 
+    curve : of a command or output, pairs (number in the log, value in `unit`), linear between them, in place of the
+    source column: dead band, neutral and stops of a servo, or a throttle.
+
     The source of a latitude or longitude may be two or three columns: degrees, minutes and seconds; of a heading the
     four of a quaternion. `latency` [s]: how late samples are stamped; `interpolation`: the rule between samples.
     """
@@ -197,6 +202,7 @@ class Column(StrictPart):
     file: str | None = None
     factor: float = 1.0
     offset: float = 0.0
+    curve: Annotated[tuple[tuple[FiniteFloat, FiniteFloat], ...], Field(min_length=2)] | None = None
     sign: Literal[-1, 1] = 1
     frame: Literal["body", "earth"] = "body"
     direction: Literal["towards", "from"] | None = None
@@ -218,9 +224,10 @@ class VelocityEstimate(StrictPart):
 
 
 class Segment(StrictPart):
-    """One run: its unique name, start and end on the log's clock, and what it is."""
+    """One run: its unique name, start and end on the log's clock, and what it is; `file` names one of `source.runs`."""
 
     run: str = Field(min_length=1)
+    file: str | None = None
     start: float
     end: float
     manoeuvre: Manoeuvre | None = None
@@ -536,6 +543,11 @@ def _check_mapped_columns(mapping: Mapping, file: Path) -> None:
                 file=file,
                 path=f"{path}.direction",
             )
+        if column.curve is not None:
+            rises = all(first[0] < second[0] for first, second in pairwise(column.curve))
+            if not (is_command(name) or is_output(name)) or column.wrap or not rises:
+                fault = "belongs to a command or output that does not wrap, and the numbers of the log rise in it"
+                raise DocumentError(fault, file=file, path=f"{path}.curve")
         if column.wrap and unit != "rad":
             raise DocumentError("only a column in rad or deg can wrap: remove wrap", file=file, path=f"{path}.wrap")
         if column.relative and name != "beta_w":
@@ -649,12 +661,6 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
             file=file,
             path="source.runs",
         )
-    if mapping.source.runs is not None and mapping.segment:
-        raise DocumentError(
-            "source.runs reads one run from each file: remove the segments, or remove source.runs",
-            file=file,
-            path="segment",
-        )
     if mapping.parts is not None and mapping.parts.source is None and mapping.parts.pause is None:
         raise DocumentError(
             "says nothing: give `from`, a column that says the run, or `pause`, a time between two runs [s]",
@@ -676,6 +682,7 @@ def _check_instants(mapping: Mapping, file: Path) -> None:
 
 def _check_segments(mapping: Mapping, file: Path) -> None:
     seen: set[str] = set()
+    ends: dict[str | None, float] = {}
     for index, segment in enumerate(mapping.segment):
         path = f"segment.{index}"
         if segment.run in seen:
@@ -683,6 +690,13 @@ def _check_segments(mapping: Mapping, file: Path) -> None:
         if not segment.start < segment.end:
             raise DocumentError(f"start {segment.start:g} must lie before end {segment.end:g}", file=file, path=path)
         seen.add(segment.run)
+        if (segment.file is None) != (mapping.source.runs is None):
+            fault = "names the file of a segment where source.runs reads several, and only there"
+            raise DocumentError(fault, file=file, path=f"{path}.file")
+        if segment.file is not None and segment.start < ends.get(segment.file, -np.inf):
+            fault = f"begins before the last segment of {segment.file!r} ends: write them in order, without overlap"
+            raise DocumentError(fault, file=file, path=f"{path}.start")
+        ends[segment.file] = segment.end
 
 
 def _in_si(repair: Repair, clock: float, file: Path, path: str) -> Repair:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from shipid.data.dataset import Array, Dataset, stretches_of_runs
+from shipid.logs.kinds import MIXED
 from shipid.logs.mapping import Segment
-from shipid.physics.signals import is_shaft, is_steering
+from shipid.physics.signals import drive_scale, is_steering
 
 HELM = np.radians(3.0)  # rad: less is steering a course
 TURN = np.radians(120.0)  # rad of heading over one helm: a turning, not a leg of a zigzag
@@ -30,30 +32,32 @@ class Leg:
     last: int
 
 
-def find_manoeuvres(dataset: Dataset, unit: float = 1.0) -> list[Segment]:
+def find_manoeuvres(dataset: Dataset, unit: float = 1.0, *, files: bool = False) -> list[Segment]:
     """Manoeuvres of every run in the order of time, with names that are unique; a draft for a person to correct.
 
-    unit : of the log's clock [s], in which starts and ends are given.
+    unit : of the log's clock [s], in which starts and ends are given. files : whether each run is a file of several.
     """
     cuts = []
-    for _, rows in stretches_of_runs(dataset):
-        t = rows["t"].to_numpy() / unit
-        cuts += [(kind, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
+    for run, rows in stretches_of_runs(dataset):
+        t, file = rows["t"].to_numpy() / unit, run if files else None
+        cuts += [(kind, file, float(t[first]), float(t[last])) for kind, (first, last) in _of_stretch(rows)]
     counts: dict[str, int] = {}
     segments = []
-    for kind, start, end in cuts:
+    for kind, file, start, end in cuts:
         counts[kind] = counts.get(kind, 0) + 1
-        segments.append(Segment(run=f"{kind} {counts[kind]}", start=start, end=end, manoeuvre=kind))  # type: ignore[arg-type]
+        named: Any = {"run": f"{kind} {counts[kind]}", "file": file, "manoeuvre": kind}
+        segments.append(Segment(start=start, end=end, **named))
     return segments
 
 
 def run_kind(rows: pd.DataFrame) -> str:
-    """The kind of manoeuvre that takes most of a run."""
+    """The kind of manoeuvre that takes half of a run or more; mixed where none does."""
     t = rows["t"].to_numpy()
     spans: dict[str, float] = {}
     for kind, (first, last) in _of_stretch(rows):
         spans[kind] = spans.get(kind, 0.0) + float(t[last] - t[first])
-    return max(spans, key=lambda kind: spans[kind], default="transit")
+    kind = max(spans, key=lambda kind: spans[kind], default=MIXED)
+    return kind if spans and spans[kind] >= (t[-1] - t[0]) / 2 else MIXED
 
 
 def _of_stretch(rows: pd.DataFrame) -> Iterator[tuple[str, tuple[int, int]]]:
@@ -131,7 +135,7 @@ def _between_manoeuvres(rows: pd.DataFrame, first: int, last: int) -> Iterator[t
     if t[last] - t[first] < min(STRAIGHT, 0.5 * (t[-1] - t[0])):
         return
     part = rows.iloc[first : last + 1]
-    shafts = [name for name in map(str, rows.columns) if is_shaft(name)]
+    shafts = [name for name in map(str, rows.columns) if drive_scale(name)]
     # The speed through the water is no sign where shafts are logged: it changes after every turn, too.
     watched = part[shafts or ["u"]].to_numpy()
     low, high = np.quantile(watched, (0.02, 0.98), axis=0)

@@ -10,7 +10,7 @@ from shipid.errors import DataError
 from shipid.measures.record import Array, Record, find_plateaus, first_execute, row_of_release
 from shipid.measures.turning import MIDSHIPS
 from shipid.measures.zigzag import last_row_of_zigzag
-from shipid.physics.signals import is_all_round, is_command, is_shaft, is_steering, is_thrust_order
+from shipid.physics.signals import drive_scale, is_all_round, is_command, is_steering, is_thrust_order
 from shipid.units import DEGREE, percent_text
 
 RECORD_STATES = ("t", "north", "east", "psi", "u", "v", "r")
@@ -54,9 +54,10 @@ def record_of(columns: Mapping[str, Array], helm: Mapping[str, float] | None = N
 
 
 def _driving_shafts(columns: Mapping[str, Array]) -> list[Array]:
-    """Shaft speed of each screw, > 0 where it drives ahead, as `record_of` says; the pitch alone where it has none."""
-    shafts = _commands_that(columns, is_shaft)
-    for name, pitch in _commands_that(columns, lambda name: is_thrust_order(name) and not is_shaft(name)).items():
+    """Shaft speed of each screw (`drive_scale`), > 0 where it drives ahead, as `record_of` says; else the pitch."""
+    driven = _commands_that(columns, lambda name: drive_scale(name) > 0)
+    shafts = {f"{name.rpartition('.')[0]}.n": values / drive_scale(name) for name, values in driven.items()}
+    for name, pitch in _commands_that(columns, lambda name: is_thrust_order(name) and not drive_scale(name)).items():
         shaft = f"{name.rpartition('.')[0]}.n"
         shafts[shaft] = shafts.get(shaft, np.ones(len(pitch))) * pitch / (np.abs(pitch).max() or 1.0)
     for name, angle in _commands_that(columns, is_all_round).items():

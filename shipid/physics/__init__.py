@@ -86,6 +86,8 @@ TERMS: dict[str, Term] = {
     "wind.blendermann": Term(wind.blendermann_wrench),
     "thruster.azimuth": Term(thruster.azimuth_wrench, gives={"thrust": thruster.azimuth_thrust}),
     "thruster.tunnel": Term(thruster.tunnel_wrench, gives={"side_force": thruster.tunnel_side_force}),
+    "thruster.force": Term(thruster.force_wrench, gives={"thrust": thruster.swivel_thrust}),
+    "thruster.swivel_force": Term(thruster.swivel_force_wrench, gives={"thrust": thruster.swivel_thrust}),
     "thruster.propeller": Term(
         propeller.propeller_wrench,
         gives={

@@ -205,6 +205,7 @@ SIGNALS: dict[str, Signal] = {
         usual=(50 * RPM, 200 * RPM),
         component="propeller",
     ),
+    "force": Signal("command", "N", "thrust order", reach=(-300.0, 300.0), usual=(0.0, 100.0)),
     "alpha": Signal(
         "command",
         "rad",
@@ -336,6 +337,15 @@ def is_shaft(command: str) -> bool:
     return _row_or_unknown(command).shaft
 
 
+def drive_scale(command: str) -> float:
+    """What 1 rev/s of the ship's drives is in the unit of this one: 1 of a shaft speed, 60 N of a force, else 0.
+
+    So `n_rpm` of a manoeuvre is in newtons where forces drive the ship.
+    """
+    row = _row_or_unknown(command)
+    return row.factor / RPM if row.role == "command" and row.unit in ("rev/s", "N") else 0.0
+
+
 def is_steering(command: str) -> bool:
     """Whether a command is an angle that turns the ship, such as `port.alpha` or `rudder.delta`."""
     return _row_or_unknown(command).turns != 0
@@ -353,7 +363,7 @@ def is_wrapped_angle(name: str) -> bool:
 
 
 def is_thrust_order(name: str) -> bool:
-    """Whether the last part of a name is a command that does not steer: a shaft speed or a pitch."""
+    """Whether the last part of a name is a command that does not steer: a shaft speed, a force or a pitch."""
     return _row_or_unknown(name).role == "command" and _row_or_unknown(name).turns == 0
 
 

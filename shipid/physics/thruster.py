@@ -1,4 +1,4 @@
-"""Thrusters and their actuators: azimuth units from K_x, K_y polynomials, tunnel units; lags, rates and limits."""
+"""Thrusters and their actuators: azimuth and tunnel units, thrusters ordered by force; lags, rates and limits."""
 
 from __future__ import annotations
 
@@ -101,6 +101,48 @@ def tunnel_side_force(
 ) -> SX:
     """Force [N] of `tunnel_wrench`, > 0 to starboard."""
     return n * (F_1 + ca.fabs(n) * (F_2 + ca.fabs(n) * F_3))
+
+
+def force_wrench(
+    force: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    k_T: Annotated[SX | float, "-"] = 1.0,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+) -> SX:
+    """Wrench (6) of a thruster whose order is a force [N], > 0 ahead: k_T times it, astern k_T k_astern times it.
+
+    Limits of the order, another one astern, are those of its actuator. The thrust does not depend on the speed.
+    """
+    return swivel_force_wrench(force, ca.SX(1, 1), x=x, y=y, z=z, k_T=k_T, k_astern=k_astern)
+
+
+def swivel_force_wrench(
+    force: SX,
+    alpha: SX,
+    *,
+    x: Annotated[SX, "m"],
+    y: Annotated[SX | float, "m"] = 0.0,
+    z: Annotated[SX | float, "m"] = 0.0,
+    k_T: Annotated[SX | float, "-"] = 1.0,
+    k_astern: Annotated[SX | float, "-"] = 1.0,
+) -> SX:
+    """Wrench (6) of an outboard or pod ordered by force [N], turned by alpha [rad, > 0 turns the thrust to starboard].
+
+    See `force_wrench`.
+    """
+    thrust = swivel_thrust(force, k_T=k_T, k_astern=k_astern)
+    return wrench_of_force(ca.SX(x), ca.SX(y), ca.SX(z), ca.cos(alpha) * thrust, ca.sin(alpha) * thrust)
+
+
+def swivel_thrust(
+    force: SX, *, k_T: Annotated[SX | float, "-"] = 1.0, k_astern: Annotated[SX | float, "-"] = 1.0
+) -> SX:
+    """Thrust [N] of `force_wrench` and `swivel_force_wrench` along their axis."""
+    thrust = k_T * force
+    return ca.if_else(force >= 0, thrust, k_astern * thrust) if differs_from_default(k_astern, 1.0) else thrust
 
 
 def bounded_output(

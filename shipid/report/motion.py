@@ -70,13 +70,13 @@ CRITERION_COLUMNS = {
     "verdict": "verdict",
     "note": "note",
 }
-MANOEUVRE_LINES = {  # key -> name, unit, whether it is held from order to order
-    "heading": ("heading", "deg", False),
-    "helm": ("helm", "deg", True),
-    "u": ("ahead, u", "m/s", False),
-    "v": ("to starboard, v", "m/s", False),
-    "r": ("yaw rate, r", "deg/s", False),
-    "shaft": ("shaft", "rpm", True),
+MANOEUVRE_LINES = {  # key -> name, whether it is held from order to order
+    "heading": ("heading", False),
+    "helm": ("helm", True),
+    "u": ("ahead, u", False),
+    "v": ("to starboard, v", False),
+    "r": ("yaw rate, r", False),
+    "shaft": ("shaft", True),
 }
 
 
@@ -186,6 +186,7 @@ class ManoeuvreContent(PageContent):
     first : names of the measures that the answer says. measures, criteria : rows from `shipid.measures.criteria`.
     log : t [s], north, east [m], psi, helm [rad], u, v [m/s], r [rad/s], shaft [rev/s].
     levels : helm [rad], rate [rad/s] of a spiral in the order performed. outline : (k, 2) of the ship [m].
+    drive_unit : of 60 times the shaft.
     """
 
     first: Sequence[str]
@@ -193,6 +194,7 @@ class ManoeuvreContent(PageContent):
     measures: pd.DataFrame
     criteria: pd.DataFrame
     outline: Floats
+    drive_unit: str
     levels: pd.DataFrame = field(default_factory=empty_frame("helm", "rate"))
 
     @property
@@ -268,7 +270,7 @@ def histories_figure(content: ManoeuvreContent) -> PageFigure:
     values = degrees.assign(heading=degrees["psi"] - degrees["psi"].iloc[0], shaft=60 * log["shaft"])
     values = values.assign(u=log["u"], v=log["v"]).round(6)  # an axis is no picture of the rounding of a constant
     panels = {"heading, helm [deg]": ["heading", "helm"], "speed [m/s]": ["u", "v"], "yaw rate [deg/s]": ["r"]}
-    panels |= {"shaft [rpm]": ["shaft"]} if np.ptp(values["shaft"]) > 0 else {}
+    panels |= {f"shaft [{content.drive_unit}]": ["shaft"]} if np.ptp(values["shaft"]) > 0 else {}
     return PageFigure(
         id="histories",
         title="Over time",
@@ -336,13 +338,14 @@ def _line_colour(key: str) -> str:
 
 
 def _draw_history(t: pd.Series[float], values: pd.DataFrame, title: str, executed: float) -> Panel:
-    """Some quantities over time; execute headings are drawn with the heading."""
+    """Some quantities over time, of the unit at the end of the title; execute headings are drawn with the heading."""
     traces: list[Trace] = []
+    unit = title.rpartition("[")[2].rstrip("]")
     for level in (executed, -executed) if "heading" in values and np.isfinite(executed) else ():
         rule = {"color": MUTED, "width": 1, "dash": "dot"}
         traces.append(make_line(f"{level:g} deg", [t.iloc[0], t.iloc[-1]], [level] * 2, ["heading"], "deg", line=rule))
     for key in values:
-        name, unit, held = MANOEUVRE_LINES[str(key)]
+        name, held = MANOEUVRE_LINES[str(key)]
         ink = {"color": _line_colour(str(key)), "shape": "hv" if held else "linear"}
         traces.append(make_line(name, t, values[key], [str(key)], unit, line=ink))
     return make_plot(traces, make_axis("time [s]", nticks=4), zero_axis(title, nticks=6))

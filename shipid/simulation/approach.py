@@ -17,11 +17,11 @@ from shipid.engine.integrate import Array, Method
 from shipid.engine.rollout import rollout
 from shipid.errors import DocumentError, ShipidError
 from shipid.physics.helm import course_helmsman
-from shipid.physics.signals import ACTUAL, is_shaft, is_steering, neutral_value
+from shipid.physics.signals import ACTUAL, SIGNALS, drive_scale, is_shaft, is_steering, neutral_value, signal_of
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import HELM, Dynamics, vessel_dynamics
 from shipid.vessel.load import Vessel
-from shipid.vessel.stability import balanced_shaft_speed, bisect_root, straight_acceleration
+from shipid.vessel.stability import MOST_FORCE, MOST_SHAFT, balanced_shaft_speed, bisect_root, straight_acceleration
 
 PROBE_SHAFT, PROBE_HELM = 1.0, 0.1  # rev/s, rad: values at which the effect of commands is tested
 FROUDE = 0.2  # of the service speed of a ship whose document gives none
@@ -41,7 +41,7 @@ REMEDY = 'let a helmsman hold the course (approach = "helmsman"), or start from 
 class Controls:
     """The effect of a vessel's commands; computed from the equations at first use.
 
-    drives : shaft speed commands that push the vessel ahead; DocumentError where there is none.
+    drives : shaft speeds and forces that push the vessel ahead; DocumentError where there is none.
     helm : angle command -> +1 or -1, the sign that turns the ship to starboard; angles without effect are left out;
         DocumentError where no angle turns the vessel.
     effects : the same two, empty where there is none: a ship under sail or water jets, one without a rudder.
@@ -57,9 +57,9 @@ class Controls:
 
     @property
     def drives(self) -> tuple[str, ...]:
-        """Shaft speeds that push the vessel ahead."""
+        """Shaft speeds and forces that push the vessel ahead."""
         if not self._driving[0]:
-            message = f"no command drives {self.vessel.name} ahead: a manoeuvre needs a shaft speed `n`"
+            message = f"no command drives {self.vessel.name} ahead: a manoeuvre needs a shaft speed `n`, or a `force`"
             if self.commands:
                 message += ", the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each command by itself"
             raise DocumentError(message, file=self.vessel.file, path="thruster")
@@ -78,7 +78,7 @@ class Controls:
             if self.differential:
                 what = (
                     ", it steers by its shafts: the kinds `turning` and `steps` of a [[truth.manoeuvre]] order each "
-                    f"one ({self.drives[0]}_rpm)"
+                    f"one ({self.drives[0]}{'_rpm' if self.drive_unit == 'rpm' else ''})"
                 )
             raise DocumentError(
                 f"no angle command turns {self.vessel.name}{what}", file=self.vessel.file, path="thruster"
@@ -90,9 +90,14 @@ class Controls:
         """Whether no angle turns the vessel, but the difference of two shafts that drive it ahead does."""
         return not self.effects[1] and {1.0, -1.0} <= set(self._driving[1])
 
+    @property
+    def drive_unit(self) -> str:
+        """Unit in which a manoeuvre orders the drives: rpm, or N where all of them are forces."""
+        return "rpm" if any(map(is_shaft, self.drives)) else SIGNALS[signal_of(self.drives[0])].read_in
+
     @cached_property
     def _driving(self) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Shaft speeds that push the vessel ahead, if any, and the sides to which some of them turn her, too."""
+        """Shaft speeds and forces that push the vessel ahead, if any, and the sides to which some turn her."""
         vessel = self.vessel
         idle = straight_acceleration(vessel, 0.0, {})  # at rest: at speed a slow shaft holds the ship back
         if not np.isfinite(idle).all():
@@ -101,7 +106,9 @@ class Controls:
             message = f"the forces on {vessel.name} are not finite at rest, with commands neutral{zeros}"
             raise DocumentError(f"{message}: mend its terms or their numbers", file=vessel.file)
         ahead = {
-            name: straight_acceleration(vessel, 0.0, {name: PROBE_SHAFT}) for name in self.commands if is_shaft(name)
+            name: straight_acceleration(vessel, 0.0, {name: PROBE_SHAFT * drive_scale(name)})
+            for name in self.commands
+            if drive_scale(name)
         }
         drives = tuple(name for name, rates in ahead.items() if rates[0] - idle[0] > NOTHING)
         yaw = [ahead[name][2] - idle[2] for name in drives]
@@ -128,19 +135,17 @@ class Controls:
         return {name: float(np.sign(change)) for name, change in turned.items() if abs(change) > NOTHING}
 
     def ahead(self, n: float) -> dict[str, float]:
-        """Every command on a straight course: the shafts that drive her at n [rev/s], all else neutral."""
-        return {name: n if name in self.drives else neutral_value(name) for name in self.commands}
+        """Every command on a straight course: what drives her at n (`drive_scale`), all else neutral."""
+        return {name: n * drive_scale(name) if name in self.drives else neutral_value(name) for name in self.commands}
 
     def orders(self, n: Array, helm: Array) -> dict[str, Array]:
-        """Every command (T,) from shaft speed [rev/s] and helm angle [rad, > 0 to starboard], each (T,).
+        """Every command (T,) from n [rev/s] (`drive_scale`) and helm angle [rad, > 0 to starboard], each (T,).
 
         With the helm amidships no angle need turn the ship: two screws that steer by their difference can stop her.
         """
-        angles = {name: sign * helm for name, sign in self.helm.items()} if helm.any() else {}
-        return {
-            name: angles.get(name, n if name in self.drives else np.full(len(n), neutral_value(name)))
-            for name in self.commands
-        }
+        ordered = {name: n * drive_scale(name) for name in self.drives}
+        ordered |= {name: sign * helm for name, sign in self.helm.items()} if helm.any() else {}
+        return {name: ordered.get(name, np.full(len(n), neutral_value(name))) for name in self.commands}
 
 
 def helm_effect(controls: Controls, n: float, u: float) -> float:
@@ -166,7 +171,7 @@ def balanced_shaft(controls: Controls, speed: float) -> float | None:
     def surplus(n: float) -> float:
         return float(straight_acceleration(controls.vessel, speed, controls.ahead(n))[0])
 
-    return balanced_shaft_speed(surplus)
+    return balanced_shaft_speed(surplus, MOST_SHAFT if controls.drive_unit == "rpm" else MOST_FORCE)
 
 
 class NotStraight(ShipidError):
@@ -228,7 +233,7 @@ def steady_approach(
         )
         if path.diverged.any():
             raise ShipidError(
-                f"the approach of {vessel.name} at {_rpm_words(n[moving], path.diverged[0])} rpm diverges: "
+                f"the approach of {vessel.name} at {_order_words(controls, n[moving], path.diverged[0])} diverges: "
                 f"take a smaller step than {step:g} s"
             )
         velocities = model.state[model.num_dof :]
@@ -247,15 +252,15 @@ def steady_approach(
                 turning = np.abs(state["r"]) >= straight
                 if turning.any():
                     raise NotStraight(
-                        f"{vessel.name} turns with the helm amidships at {_rpm_words(n, turning)} rpm, so it has no "
-                        f"straight approach: {REMEDY}"
+                        f"{vessel.name} turns with the helm amidships at {_order_words(controls, n, turning)}, so it "
+                        f"has no straight approach: {REMEDY}"
                     )
             helm = _held_helm(controls, model, state, memory, orders) if held else {}
             anew = ("north", "east", "psi", *(name for name in model.hidden if name.startswith("waves.")))
             kept = {name: values for name, values in memory.items() if not name.startswith(f"{HELM}.")}
             return Approach(state | {name: np.zeros(count) for name in anew}, kept, helm)
     remedy = 'start from rest (approach = "rest")' if held else REMEDY
-    ahead = f"straight ahead at {_rpm_words(n[moving], moving >= 0)} rpm"
+    ahead = f"straight ahead at {_order_words(controls, n[moving], moving >= 0)}"
     raise NotStraight(f"{vessel.name} is not steady after {longest:.0f} s {ahead}: {remedy}")
 
 
@@ -264,7 +269,9 @@ def _course_inputs(controls: Controls, n: Array) -> dict[str, Array]:
     speeds = np.array([_steady_speed(controls, shaft) for shaft in n])
     effects = [KEEPING * helm_effect(controls, shaft, speed) for shaft, speed in zip(n, speeds, strict=True)]
     if min(effects) <= 0:
-        raise ShipidError(f"the helm of {controls.vessel.name} does not turn it at {60 * n.min():g} rpm")
+        raise ShipidError(
+            f"the helm of {controls.vessel.name} does not turn it at {60 * n.min():g} {controls.drive_unit}"
+        )
     return {
         "course": np.zeros(len(n)),
         "omega": 2 * speeds / _length_or_usual(controls.vessel),
@@ -315,5 +322,5 @@ def _held_helm(
     return {name: given[name] for name in controls.helm}
 
 
-def _rpm_words(n: Array, faulty: NDArray[np.bool_]) -> str:
-    return f"{60 * n[int(np.argmax(faulty))]:g}"
+def _order_words(controls: Controls, n: Array, faulty: NDArray[np.bool_]) -> str:
+    return f"{60 * n[int(np.argmax(faulty))]:g} {controls.drive_unit}"

@@ -181,7 +181,7 @@ class StepManoeuvre(OrderedManoeuvre):
 class ApproachedManoeuvre(Manoeuvre):
     """A manoeuvre by helm and shaft speed after an approach; t = 0 is the end of it, straight until the first order."""
 
-    n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead")]
+    n_rpm: Annotated[FiniteFloat, Field(description="rpm ordered of all that drive the ship ahead; of forces N")]
     approach: Annotated[
         Literal["steady", "helmsman", "rest"],
         Field(description="in calm water at n_rpm until steady, helm amidships or by a helmsman; or at rest"),

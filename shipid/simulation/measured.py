@@ -152,7 +152,12 @@ def approach_words(measured: MeasuredManoeuvre) -> str:
     """The approach in words."""
     chosen = measured.standard
     pitches = {neutral_value(name) for name in vessel_dynamics(measured.vessel).commands if signal_of(name) == "pitch"}
-    shaft = ", ".join([f"{chosen.manoeuvre.n_rpm:.4g} rpm", *(f"P/D {pitch:g} ordered" for pitch in pitches)])
+    shaft = ", ".join(
+        [
+            f"{chosen.manoeuvre.n_rpm:.4g} {Controls(measured.vessel).drive_unit}",
+            *(f"P/D {pitch:g} ordered" for pitch in pitches),
+        ]
+    )
     if chosen.manoeuvre.approach == "rest":
         return f"from rest, {shaft}"
     held = ", held on course by a helmsman" if chosen.manoeuvre.approach == "helmsman" else ""
@@ -192,6 +197,7 @@ def manoeuvre_content(measured: MeasuredManoeuvre, command: str = "") -> Manoeuv
         title=f"{ship.name}: {chosen.title}",
         name=chosen.kind,
         first=chosen.manoeuvre.first,
+        drive_unit=Controls(ship).drive_unit,
         log=_cut_at_end(pd.DataFrame({**columns, "shaft": shaft}), measured),
         measures=pd.DataFrame(measured.measures),
         criteria=pd.DataFrame(measured.criteria),

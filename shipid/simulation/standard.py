@@ -138,7 +138,8 @@ def shaft_speed(controls: Controls, speed: float) -> float:
     n = balanced_shaft(controls, speed)
     if n is None:
         raise ShipidError(
-            f"no shaft speed drives {controls.vessel.name} at {speed:g} m/s: give a lower speed", path="--speed"
+            f"no shaft speed or force drives {controls.vessel.name} at {speed:g} m/s: give a lower speed",
+            path="--speed",
         )
     return n
 

@@ -21,7 +21,7 @@ from shipid.data.dataset import Dataset, read_dataset
 from shipid.data.windows import cut_windows
 from shipid.errors import DataError, DivergenceError, DocumentError, ShipidError
 from shipid.hybrid.physics import check_columns
-from shipid.physics.signals import SIGNALS, is_shaft, is_steering, signal_of
+from shipid.physics.signals import SIGNALS, drive_scale, is_steering, signal_of
 from shipid.simulation.approach import Controls, vessel_service_speed
 from shipid.simulation.manoeuvre import order_keys
 from shipid.simulation.standard import shaft_speed
@@ -91,7 +91,8 @@ class Draft:
 def draft_study(vessels: Sequence[str], data: Path | None, out: Path) -> Draft:
     """Draft a study of vessels on recorded runs, or on simulated ones where `data` is None, to be written to `out`.
 
-    vessels : bundled names or paths; the first one is made inaccurate, too, and gives the ship length.
+    vessels : bundled names or paths; the first one is made inaccurate, too, and gives the ship length. Without any the
+        runs are studied without physics, as those of a log without commands must be.
 
     Raises ShipidError for a vessel or dataset that cannot be read or do not fit each other, or too few runs.
     """
@@ -130,9 +131,13 @@ def horizon_of(length: float | None, speed: float, durations: Sequence[float]) -
     return chosen, why + short
 
 
-def proposed_horizon(vessel: Vessel, seen: Survey) -> tuple[float, float, str]:
+def proposed_horizon(vessel: Vessel | None, seen: Survey) -> tuple[float, float, str]:
     """Horizon in whole steps, step [s], and why the horizon, of a new study of a vessel and its runs."""
-    horizon, why = horizon_of(vessel.length, seen.speed, seen.runs["duration"].tolist())
+    durations = seen.runs["duration"].tolist()
+    horizon, why = horizon_of(vessel.length if vessel else None, seen.speed, durations)
+    if vessel is None:
+        most = STEPS_AHEAD_OF_LOG * seen.step
+        horizon, why = min(horizon, most), f"{most:g} s, {STEPS_AHEAD_OF_LOG} rows of the log: no vessel gives a length"
     step = step_of(horizon, seen.step)
     return max(round(horizon / step), 2) * step, step, why
 
@@ -156,11 +161,11 @@ def amounts_of_data(total: int) -> list[int]:
 
 def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path, out: Path) -> Draft:
     """A study of all vessels on recorded runs; the first one is made inaccurate, too (method, section 5)."""
-    every, first = survey_dataset(dataset), next(iter(vessels.values()))
+    every, first = survey_dataset(dataset), next(iter(vessels.values()), None)
     ahead, step, why = proposed_horizon(first, every)
-    passing = (first.length or 0.0) / every.speed if every.speed > 0 else 0.0
+    passing = (first.length or 0.0) / every.speed if first and every.speed > 0 else ahead / LENGTHS_AHEAD
     for spare in (float(every.runs["duration"].median()) - ahead, 0.0):
-        method = _proposed_method(passing, step, spare)
+        method = _proposed_method(passing, step, spare, "L/U" if first else f"of {passing:.3g} s")
         usable = _runs_that_hold(dataset, ahead, step, _past_of_method(method))
         if len(usable) > LEAST_AMOUNT:
             break
@@ -176,7 +181,10 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
     interval = max(step, seen.step, _round_number_below(2.5 * float(seen.runs["duration"].sum()) / MOST_STUDY_WINDOWS))
     families = _families_of_vessels(vessels, dataset.runs)
     fixed = [
-        Choice("question", f"How well can the path of {first.name} be predicted, with how many runs?"),
+        Choice(
+            "question",
+            f"How well can the path of {first.name if first else data.stem} be predicted, with how many runs?",
+        ),
         Choice("description", _log_in_words(seen, dataset), "what the log holds"),
         Choice("data.dataset", _path_from_study(str(data), out), f"commands {', '.join(dataset.commands) or 'none'}"),
         true_path,
@@ -186,7 +194,7 @@ def _recorded_study(vessels: Mapping[str, Vessel], dataset: Dataset, data: Path,
         method,
     ]
     steps = Choice("prediction.step", step, f"s; rows of the log come every {seen.step:.3g} s")
-    least = [Choice("grid.N_D", [LEAST_AMOUNT]), Choice("family", families[:1])]
+    least = [Choice("grid.N_D", [LEAST_AMOUNT]), *([Choice("family", families[:1])] if families else [])]
     plan = build_plan(tomllib.loads(_study_text([*fixed, steps, *least])), out, vessels)
     fixed += _folds_and_grid(amounts_of_data(len(partition(plan, dataset)[0].spans)))
     failed = _warn_of_failed_checks(seen, data)
@@ -242,8 +250,9 @@ def _first_that_runs(
             Choice(step.path, step.value / parts, step.why + shorter),
             Choice("prediction.integrator", "rk4", "euler, the paper's, takes a quarter of the time; steps show then"),
             *_claims_of_families([family["name"] for family in chosen]),
-            Choice("family", chosen, "models, each improved by data; `none` is no physics, beside constant u, v, r"),
         ]
+        words = "models, each improved by data; `none` is no physics, beside constant u, v, r"
+        choices += [Choice("family", chosen, words)] if chosen else []
         plan = build_plan(tomllib.loads(_study_text(choices)), out, vessels)
         try:
             return choices, plan, prepare(plan, obtain_runs(plan) if dataset is None else dataset).notes
@@ -311,7 +320,7 @@ def _families_of_vessels(vessels: Mapping[str, Vessel], runs: Sequence[str]) -> 
         name = name if name[:1].isalpha() else f"ship-{name}"
         family = {"name": name, "description": f"{vessel.name}, as it is", "base": named}
         families.append({**family, "seen": seen} if seen else family)
-    if blocks := _inaccurate_blocks(next(iter(vessels.values()))):
+    if families and (blocks := _inaccurate_blocks(next(iter(vessels.values())))):
         words = f"{families[0]['name']} made wrong on purpose: what does it cost to know the ship less well?"
         families.append({**families[0], "name": INACCURATE, "description": words, "perturb": blocks})
     return families
@@ -379,11 +388,11 @@ def _simulated_study(vessels: Mapping[str, Vessel], out: Path) -> Draft:
     return Draft(_study_text(choices), choices, plan)
 
 
-def _proposed_method(passing: float, step: float, spare: float) -> Choice:
+def _proposed_method(passing: float, step: float, spare: float, of: str = "L/U") -> Choice:
     """Compensation of the path with a memory, which validation may refuse; without one where runs are too short.
 
-    passing : time [s] in which the ship runs its length; 0: not known. spare : time [s] of the median run beyond the
-        horizon; a third of it may be past.
+    passing : time [s] in which the ship runs its length; 0: not known. of : what it is, behind a number.
+    spare : time [s] of the median run beyond the horizon; a third of it may be past.
     """
     past = min(PAST_LENGTHS * passing, spare / 3)
     if past < LEAST_PAST_STEPS * step:
@@ -397,7 +406,7 @@ def _proposed_method(passing: float, step: float, spare: float) -> Choice:
     ]
     memory = {"history": lags[:-2], "turned": lags[-2:], "error": [lags[-3]]}
     why = (
-        f"inputs of the last {lags[-1]:g} s, {past / passing:.2g} L/U: what ship and orders did, and what the physics "
+        f"inputs of the last {lags[-1]:g} s, {past / passing:.2g} {of}: what ship and orders did, and what the physics "
         "got wrong; validation chooses how much of it is taken. The first instants of a run are left out: they have no "
         "past"
     )
@@ -467,9 +476,9 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
     orders: dict[str, Any] = {}
     for name in controls.commands:
         (single, common), row = order_keys(name), SIGNALS[signal_of(name)]
-        if is_shaft(name) and name not in drives:
+        if drive_scale(name) and name not in drives:
             orders[single] = 0.0
-        elif is_shaft(name):
+        elif drive_scale(name):
             orders[single if controls.differential else common] = [0.0 if controls.differential else low, high]
         elif is_steering(name):
             both_ends = {(signal_of(name), 1), (signal_of(name), -1)} <= signs  # one angle for all drives it aside
@@ -478,8 +487,8 @@ def _turning_orders(controls: Controls, service: float, rpm: float) -> Choice:
             orders[common] = [value / row.factor for value in row.usual]
     speeds = [float(f"{service / 2:.3g}"), float(f"{service:.3g}")]
     why = (
-        f"constant orders: up to {high:g} rpm, which hold {service:.3g} m/s in calm water; what does not drive the "
-        "ship ahead rests"
+        f"constant orders: up to {high:g} {controls.drive_unit}, which hold {service:.3g} m/s in calm water; what does "
+        "not drive the ship ahead rests"
     )
     return Choice("truth.manoeuvre", [{"kind": "turning", **orders, "start_speed": speeds}], why)
 

@@ -523,6 +523,7 @@ RANGES: dict[str, tuple[float, float, str]] = {
     "truth.waves.T_p": (0.1, 60.0, "s"),
     "truth.manoeuvre.*_deg*": (-360.0, 360.0, "deg"),
     "truth.manoeuvre.*n_rpm*": (-1e5, 1e5, "rpm"),
+    "truth.manoeuvre.*force*": (-1e8, 1e8, "N"),
     "truth.manoeuvre.*start_speed*": (-60.0, 60.0, "m/s"),
     "truth.manoeuvre.*_time": (0.0, LONGEST, "s"),
     "prediction.ahead": (0.0, 1e5, "s"),

@@ -227,7 +227,7 @@ class Study(Strict):
     bands: BandsBlock = BandsBlock()
     unusual: list[str] = Field(default=[], description="dotted paths of numbers that may lie outside their range")
     families: str | None = Field(default=None, description="a document of families that come first: a path, or a study")
-    family: Annotated[list[Family], Field(min_length=1)]
+    family: Annotated[list[Family], Field(description="at least one with [truth]; else data alone, as `none`")] = []
     model: list[MeanBlock] = []
     repeat: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(
         default={}, description="dotted path -> values: the study is done for each; the comparison pools them"
@@ -238,6 +238,8 @@ class Study(Strict):
     def _one_world(self) -> Study:
         if (self.truth is None) == (self.data is None):
             raise ValueError("give either [truth] (simulation) or [data] (recorded runs)")
+        if self.truth is not None and not self.family:
+            raise ValueError("missing [[family]]: only recorded runs can be studied without physics")
         return self
 
     def in_its_world(self) -> Study:

@@ -14,6 +14,7 @@ HELD = ("north", "east", "psi", "u")  # states that no transverse force depends 
 WATER = "waves."  # prefix of states of the water, which no motion changes: time, and where the current carries it
 STEP, FINE = 1e-4, 1e-2  # size of a small yaw over the speed; of differences about it over that size
 MOST_SHAFT = 1000.0  # rev/s: no screw turns so fast
+MOST_FORCE = 1e6  # the same of a force, which is then 60 MN: no ship has so much thrust
 SHARE = 0.1  # of sway or yaw in a motion: a motion with less, such as roll or heave, is no yaw
 TURNS = 2  # of the search for the motion that grows most to one side
 
@@ -26,13 +27,13 @@ def bisect_root(function: Callable[[float], float], low: float, high: float, hal
     return high
 
 
-def balanced_shaft_speed(surplus: Callable[[float], float]) -> float | None:
-    """Shaft speed [rev/s] at which a surplus of thrust, which grows with it, is 0; None if there is none."""
+def balanced_shaft_speed(surplus: Callable[[float], float], most: float = MOST_SHAFT) -> float | None:
+    """Shaft speed [rev/s] up to a greatest one where a surplus of thrust, which grows with it, is 0; else None."""
     low, high = 0.0, 1.0
     while surplus(high) < 0:
-        if high >= MOST_SHAFT:
+        if high >= most:
             return None
-        low, high = high, min(2 * high, MOST_SHAFT)
+        low, high = high, min(2 * high, most)
     return bisect_root(surplus, low, high)
 
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import json
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from shipid.arguments import check_choice
 from shipid.document import bundled_documents, read_document, value_at_path
 from shipid.errors import ShipidError
-from shipid.physics.signals import is_shaft, neutral_value
+from shipid.physics.signals import drive_scale, neutral_value
 from shipid.units import GRAVITY
 from shipid.vessel.dynamics import vessel_dynamics
 from shipid.vessel.load import Vessel, check_document
@@ -146,7 +146,8 @@ Values = dict[str, TemplateValue]
 class FirstGuess:
     """A template filled in.
 
-    text : TOML.  vessel : the same, checked.  n : shaft speed [rev/s] that holds the service speed.
+    text : TOML.  vessel : the same, checked.  n : shaft speed [rev/s] that holds the service speed [m/s].
+    unit : of 60 n, rpm, or N where forces drive the vessel.
     remarks : what the numbers given imply and a reader should know, one sentence each.
     growth : the largest growth rate [1/s] of a small yaw at that speed, helm amidships; negative: course-stable.
     """
@@ -154,26 +155,35 @@ class FirstGuess:
     text: str
     vessel: Vessel
     n: float
+    speed: float
     growth: float
     remarks: tuple[str, ...] = ()
+    unit: str = "rpm"
 
 
 def first_guess(given: Particulars, name: str, file: str) -> FirstGuess:
     """Fill a vessel document from main particulars; ShipidError for a ship that the formulae do not know."""
     _check_particulars(given)
-    body = "\n".join(_document_lines(given, name))
+    return finish_guess(_document_lines(given, name), file, given.service, tuple(_guess_remarks(given)))
+
+
+def finish_guess(
+    lines: Iterable[str], file: str, speed: float, remarks: tuple[str, ...], unit: str = "rpm"
+) -> FirstGuess:
+    """Check a document, line by line, and put above it what it needs for a speed [m/s] and whether it is stable."""
+    body = "\n".join(lines)
     vessel = check_document(tomllib.loads(body), file)
-    n = _service_shaft(vessel, given.service)
-    rate = yaw_growth(vessel, given.service, _straight_orders(vessel, n))
+    n = _service_shaft(vessel, speed)
+    rate = yaw_growth(vessel, speed, _straight_orders(vessel, n))
     verdict = (
         f"course-{'stable' if rate < 0 else 'UNSTABLE'} by these formulae (a small yaw goes as exp({rate:+.4f} t))"
     )
     head = [
         "# A FIRST GUESS from main particulars by regression formulae: nothing is measured. Replace what you know.",
-        f"# At {given.service:.3g} m/s the ship needs {60 * n:.4g} rpm and is {verdict}.",
+        f"# At {speed:.3g} m/s the ship needs {60 * n:.4g} {unit} and is {verdict}.",
         "# SI units; x forward, y starboard, z down, from amidships, where the centre of gravity is assumed to be.",
     ]
-    return FirstGuess("\n".join([*head, body]), vessel, n, rate, tuple(_guess_remarks(given)))
+    return FirstGuess("\n".join([*head, body]), vessel, n, speed, rate, remarks, unit)
 
 
 def _guess_remarks(given: Particulars) -> Iterator[str]:
@@ -569,21 +579,26 @@ def _document_lines(given: Particulars, name: str) -> Iterator[str]:
         "C_b": TemplateValue(given.block, "-", "given"),
         "U_0": TemplateValue(given.service, "m s^-1", known),
     }
+    yield from head_lines(name, main, given.rho)
+    yield from block_lines("inertia", inertia_values(given))
+    yield from block_lines("added_mass", added_mass_values(given), coriolis="mmg")
+    yield from block_lines("hull.mmg", hull_values(given))
+    yield from block_lines("hull.resistance", wave_resistance_values(given))
+    yield from block_lines("wind", wind_values(given), kind="blendermann")
+    yield from _thruster_lines(given)
+    if given.tunnel_thruster:
+        yield from block_lines("thruster.bow", tunnel_values(given), kind="tunnel")
+
+
+def head_lines(name: str, particulars: Values, rho: float) -> Iterator[str]:
+    """What every first guess begins with: its name, particulars, and the densities of water and air [kg/m^3]."""
     yield f"name = {_quote_toml(name)}"
     yield 'description = "A first guess from main particulars by regression formulae: no number of it is measured"'
     yield 'source = "shipid vessel new: the formula of each number is beside it"\ndof = 3\n'
-    yield from _block_lines("particulars", main)
-    water = "sea" if given.rho == RHO_SEA else "fresh water of a tank"
-    densities = {"rho": TemplateValue(given.rho, "kg m^-3", water), "rho_a": TemplateValue(RHO_AIR, "kg m^-3", "air")}
-    yield from _block_lines("constants", densities)
-    yield from _block_lines("inertia", inertia_values(given))
-    yield from _block_lines("added_mass", added_mass_values(given), coriolis="mmg")
-    yield from _block_lines("hull.mmg", hull_values(given))
-    yield from _block_lines("hull.resistance", wave_resistance_values(given))
-    yield from _block_lines("wind", wind_values(given), kind="blendermann")
-    yield from _thruster_lines(given)
-    if given.tunnel_thruster:
-        yield from _block_lines("thruster.bow", tunnel_values(given), kind="tunnel")
+    yield from block_lines("particulars", particulars)
+    water = "sea" if rho == RHO_SEA else "fresh water of a tank"
+    densities = {"rho": TemplateValue(rho, "kg m^-3", water), "rho_a": TemplateValue(RHO_AIR, "kg m^-3", "air")}
+    yield from block_lines("constants", densities)
 
 
 def _thruster_lines(given: Particulars) -> Iterator[str]:
@@ -593,20 +608,21 @@ def _thruster_lines(given: Particulars) -> Iterator[str]:
     for side, name in sides:
         if given.propulsor == "azimuth":
             words = {"kind": "azimuth", f"actuator.{steered}.kind": "first_order"}
-            yield from _block_lines(f"thruster.{name or 'azimuth'}", azimuth_values(given, side), **words)
+            yield from block_lines(f"thruster.{name or 'azimuth'}", azimuth_values(given, side), **words)
             continue
         behind = name or "propeller"
-        yield from _block_lines(f"thruster.{behind}", propeller_values(given, side), kind="propeller")
+        yield from block_lines(f"thruster.{behind}", propeller_values(given, side), kind="propeller")
         if given.propulsor == "differential":
             continue
         words = {"kind": "rudder", "behind": behind, f"actuator.{steered}.kind": "first_order"}
-        yield from _block_lines(f"thruster.{name and f'{name}_'}rudder", rudder_values(given, side), **words)
+        yield from block_lines(f"thruster.{name and f'{name}_'}rudder", rudder_values(given, side), **words)
 
 
-def _block_lines(path: str, values: Values, **words: str) -> Iterator[str]:
+def block_lines(path: str, values: Values, **words: str | int) -> Iterator[str]:
+    """A block of a vessel document: words without a unit first, then each number with its note."""
     yield f"[{path}]"
     yield 'source = "the formula or guess beside each number"'
-    yield from (f"{key} = {_quote_toml(word)}" for key, word in words.items())
+    yield from (f"{key} = {word if isinstance(word, int) else _quote_toml(word)}" for key, word in words.items())
     for key, value in values.items():
         shown = _quote_toml(key) if "|" in key and '"' not in key else key
         yield f"{shown} = {float(f'{value.number:.6g}')!r}  # {value.unit}; {value.note}"
@@ -620,7 +636,10 @@ def _quote_toml(text: str) -> str:
 
 def _straight_orders(vessel: Vessel, n: float) -> dict[str, float]:
     """Commands [SI] with all shafts at n [rev/s] and the helm amidships."""
-    return {name: n if is_shaft(name) else neutral_value(name) for name in vessel_dynamics(vessel).commands}
+    return {
+        name: n * drive_scale(name) if drive_scale(name) else neutral_value(name)
+        for name in vessel_dynamics(vessel).commands
+    }
 
 
 def _service_shaft(vessel: Vessel, speed: float) -> float:

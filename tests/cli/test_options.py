@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 import shipid
 from shipid.cli import app
 from shipid.errors import DocumentError, ShipidError
+from shipid.vessel.usv import SmallCraft
 from tests.cli.running import BAD
 from tests.study.tiny import TINY
 
@@ -182,6 +183,12 @@ WORK: dict[str, tuple[str, str, Mapping[str, Any]]] = {
         "vessel new --propulsor propeller-rudder --ship-type tanker --tunnel-thruster --name Fram --out f.toml "
         + " ".join(f"--{name.replace('_', '-')} {value}" for name, value in SIZES.items()),
         {"given": are_sizes, "name": "Fram"},
+    ),
+    "vessel new usv": (
+        "shipid.vessel.usv:guess_craft",
+        "vessel new --kind usv --length 2 --beam 1 --mass 80 --speed 3 --thruster -1,0 --thrust 90 --swivel 30 "
+        "--hulls 2 --name Fram --out f.toml",
+        {"given": SmallCraft(2.0, 1.0, 80.0, 3.0, ((-1.0, 0.0),), 90.0, 30.0, 2), "name": "Fram"},
     ),
     "data import": (
         "shipid.logs.importing:import_log",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -41,6 +42,41 @@ def test_a_new_vessel_from_main_particulars(tmp_path: Path) -> None:
         f"error: {file}: --out: exists already and is not written over: name another file to write\n",
     )
     assert file.read_text() == written
+
+
+USV = ("vessel", "new", "--kind", "usv", "--length", 2, "--beam", 1.08)
+
+
+def test_a_new_craft_from_its_thrusters(tmp_path: Path) -> None:
+    places = ("--thruster", "-0.8,-0.4", "--thruster", "-0.8,0.4", "--out", tmp_path / "craft.toml")
+    text = output_of(*USV, "--mass", 80, "--speed", 3, *places, "--thrust", 100)
+    assert "49 N hold 2.1 m/s" in text  # each; 100 N at 3 m/s, and the square of 0.7 of it
+    assert "course-stable" in text
+    assert load_vessel(str(tmp_path / "craft.toml")).parameters["thruster.port.actuator.force.high"] == 100.0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--speed", 3, "--thruster", "-0.8,0.4"), "--mass: missing: a usv needs it"),
+        (("--mass", 80, "--speed", 3), "--thruster: missing: a usv needs it"),
+        (("--mass", 80, "--speed", 3, "--thruster", "aft"), "'aft': write the place as X,Y in m"),
+        (("--mass", 80, "--speed", 3, "--thruster", "-1,1", "--rpm", 90), "--rpm: is of a ship: leave it out"),
+        (("--kind", "ship", "--mass", 80, "--draught", 1, "--block", 0.5), "--mass: is of a usv: leave it out"),
+        (("--kind", "ship", "--block", 0.5), "--draught: missing: a ship needs it"),
+        (
+            (
+                "--kind",
+                "boat",
+            ),
+            "kind",
+        ),
+    ],
+)
+def test_options_of_another_kind_of_vessel_are_one_line(options: tuple[Any, ...], message: str, tmp_path: Path) -> None:
+    status, _, err = ended(*USV, *options, "--out", tmp_path / "x.toml")
+    assert (status, err.count("\n")) == (1, 1)
+    assert message in err
 
 
 def test_a_vessel_beyond_the_formulae_is_one_line(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from shipid.data.dataset import Dataset, flag_bit, stretches_of_runs
-from shipid.errors import DataError
+from shipid.errors import DataError, DocumentError
 from shipid.logs import readers
 from shipid.logs.importing import import_log, read_mapping
 from tests.logs.conftest import CLOCKS, DATES, SPEEDS, as_log, import_written, turning
@@ -299,3 +299,95 @@ def test_parts_that_cannot_be_are_named(change: dict[str, float], row: int, said
         log.loc[row - 1, name] = value
     with pytest.raises(DataError, match=re.escape(said)):
         import_written(PARTED, log, tmp_path)
+
+
+CURVE = "[[1000, -40], [1100, -40], [1480, 0], [1520, 0], [1900, 100]]"
+
+
+def craft_log(pulses: list[float], folder: Path, name: str = "log.csv") -> Path:
+    rows = {"t": range(len(pulses)), "north": 0.0, "east": 0.0, "psi": 0.0, "u": 0.0, "v": 0.0, "r": 0.0}
+    file = folder / name
+    pd.DataFrame({**rows, "pwm": pulses}).to_csv(file, index=False)
+    return file
+
+
+def craft_mapping(tmp_path: Path, more: str, head: str = "") -> Path:
+    columns = {"north": "m", "east": "m", "psi": "rad", "u": "m/s", "v": "m/s", "r": "rad/s"}
+    blocks = [f'[columns.{name}]\nfrom = "{name}"\nunit = "{unit}"\n' for name, unit in columns.items()]
+    file = tmp_path / "craft.toml"
+    file.write_text(f'name = "craft"\n{head}[clock]\nfrom = "t"\n{"".join(blocks)}{more}')
+    return file
+
+
+def test_a_curve_reads_pulses_with_a_dead_band_both_directions_and_stops(tmp_path: Path) -> None:
+    """Each value by hand from the pairs; between them a line."""
+    command = f'[columns."left.force"]\nfrom = "pwm"\nunit = "N"\ncurve = {CURVE}\n'
+    mapping = read_mapping(craft_mapping(tmp_path, command))
+    pulses = [1000.0, 1050.0, 1290.0, 1480.0, 1500.0, 1520.0, 1710.0, 1900.0]
+    force = import_log(mapping, craft_log(pulses, tmp_path)).frame["left.force"]
+    np.testing.assert_allclose(force, [-40, -40, -20, 0, 0, 0, 50, 100], atol=1e-12)
+    with pytest.raises(DataError, match=r"0 in row 2 is outside the curve, 1000 to 1900: give it another end"):
+        import_log(mapping, craft_log([1500.0, 0.0, 1500.0], tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("command", "path", "message"),
+    [
+        (
+            '[columns."left.n"]\nfrom = "pwm"\nunit = "rpm"\ncurve = [[2,0], [1,5]]\n',
+            "left.n.curve",
+            "numbers of the log rise",
+        ),
+        ('[columns.phi]\nfrom = "pwm"\nunit = "deg"\ncurve = [[1, 0], [2, 5]]\n', "phi.curve", "belongs to a command"),
+    ],
+)
+def test_a_curve_that_cannot_be_read_is_refused(command: str, path: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(DocumentError, match=message) as caught:
+        read_mapping(craft_mapping(tmp_path, command))
+    assert str(caught.value.path) == f"columns.{path}"
+
+
+SEGMENTS = """
+[[segment]]
+run = "drive 1"
+file = "a"
+start = 1.0
+end = 3.0
+manoeuvre = "mixed"
+[[segment]]
+run = "drive 2"
+file = "a"
+start = 4.0
+end = 8.0
+"""
+
+
+def test_segments_of_several_files_cut_those_that_they_name_and_leave_the_others_whole(tmp_path: Path) -> None:
+    head, logs = '[source]\nruns = "*.csv"\n', tmp_path / "logs"
+    logs.mkdir()
+    for name in "ab":
+        craft_log([1500.0] * 10, logs, f"{name}.csv")
+    data = import_log(read_mapping(craft_mapping(tmp_path, SEGMENTS, head)), logs)
+    times = {run: part["t"].tolist() for run, part in data.frame.groupby("run")}
+    assert times == {"drive 1": [1, 2, 3], "drive 2": [4, 5, 6, 7, 8], "b": [*range(10)]}
+    assert data.metadata["manoeuvres"] == {"drive 1": "mixed"}
+    assert [one["count"] for one in data.metadata["repairs"] if one["kind"] == "left out"] == [2]
+    for wrong, message in (('file = "c"', "no file 'c'"), ('run = "b"', "a run 'b' exists")):
+        written = SEGMENTS.replace('file = "a"' if "file" in wrong else 'run = "drive 2"', wrong)
+        with pytest.raises(DataError, match=message):
+            import_log(read_mapping(craft_mapping(tmp_path, written, head)), logs)
+
+
+@pytest.mark.parametrize(
+    ("segments", "head", "message"),
+    [
+        (SEGMENTS, "", "names the file of a segment where source.runs reads several, and only there"),
+        (SEGMENTS.replace('file = "a"\n', ""), '[source]\nruns = "*.csv"\n', "names the file of a segment"),
+        (SEGMENTS.replace("4.0", "2.0"), '[source]\nruns = "*.csv"\n', "begins before the last segment of 'a' ends"),
+    ],
+)
+def test_segments_say_their_file_and_do_not_overlap_in_it(
+    segments: str, head: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(DocumentError, match=message):
+        read_mapping(craft_mapping(tmp_path, segments, head))

@@ -6,7 +6,7 @@ from typing import get_args
 
 import pytest
 
-from shipid.logs.kinds import COASTING, LOW_SPEED, RANDOM, WORDS, kind_in_name
+from shipid.logs.kinds import COASTING, LOW_SPEED, MIXED, RANDOM, WORDS, kind_in_name
 from shipid.logs.mapping import Manoeuvre
 
 
@@ -33,6 +33,8 @@ def test_a_mapping_takes_every_kind() -> None:
         ("ZZ10-10", "zigzag"),
         ("TC35_2", "turning"),
         ("Drehkreis_35_1", "turning"),
+        ("mixed 3", MIXED),
+        ("freeDrive2", MIXED),
         ("run007", None),
         ("log", None),
         ("run 7", None),

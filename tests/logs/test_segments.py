@@ -85,3 +85,15 @@ def test_times_are_in_the_unit_of_the_clock() -> None:
 def test_the_kind_of_a_run_is_what_takes_most_of_it(parts: list[Part], kind: str) -> None:
     ((_, rows),) = stretches_of_runs(recording(*parts))
     assert run_kind(rows) == kind
+
+
+def test_a_run_without_a_kind_that_takes_half_of_it_is_mixed() -> None:
+    dataset = recording((150, 0, 0, 2.5), TURN, *ZIGZAG, TURN)
+    (_, rows), *_ = stretches_of_runs(dataset)
+    assert run_kind(rows) == "turning"  # 400 of 650 s
+    (_, rows), *_ = stretches_of_runs(recording((150, 0, 0, 2.5), TURN, *ZIGZAG, *ZIGZAG))
+    assert run_kind(rows) == "mixed"  # a third each
+
+
+def test_segments_of_several_files_name_theirs() -> None:
+    assert {one.file for one in find_manoeuvres(recording(STRAIGHT, TURN), files=True)} == {"a"}

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import tomllib
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from shipid.engine.rollout import Trajectories, rollout
 from shipid.physics import thruster
-from shipid.vessel.load import load_vessel
+from shipid.vessel.load import Vessel, check_document, load_vessel
 
 
 def numbers(expression: Any) -> np.ndarray:
@@ -130,3 +132,70 @@ def test_coefficients_by_hand(J: float, J_y: float, sense: int) -> None:
     wrench = numbers(azimuth()(water, n, 0.0))
     reduction = 1.0 if sense > 0 else -0.65
     np.testing.assert_allclose(wrench[:2], [reduction * scale * K_x, scale * K_y], rtol=1e-12)
+
+
+def craft_by_force(kind: str = "force", gear: str = "") -> Vessel:
+    """A craft of 5 m, two thrusters 2 m apart at the origin's length; the numbers are made up for round answers."""
+    text = f"""
+    name = "craft"
+    dof = 3
+    particulars.L_pp = 5.0
+    constants.rho = 1000.0
+    inertia = {{ m = 200.0, I_z = 400.0, x_G = 0.0 }}
+    added_mass = {{ X_udot = -10.0, Y_vdot = -50.0, N_rdot = -100.0, coriolis = "none" }}
+    [hull.derivatives]
+    X_u = -50.0
+    "X_u|u|" = -25.0
+    Y_v = -100.0
+    N_r = -300.0
+    "N_r|r|" = -100.0
+    [thruster.port]
+    kind = "{kind}"
+    x = 0.0
+    y = -1.0
+    {gear}
+    [thruster.starboard]
+    kind = "{kind}"
+    x = 0.0
+    y = 1.0
+    {gear}
+    """
+    return check_document(tomllib.loads(text), "craft.toml")
+
+
+def settle(vessel: Vessel, **orders: float) -> Trajectories:
+    """The motion after 100 s from rest."""
+    commands = {name.replace("__", "."): np.array([value]) for name, value in orders.items()}
+    start = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), np.zeros(1))
+    return rollout(vessel, start, commands, {}, step=0.02, num_steps=5000, every=5000)
+
+
+@pytest.mark.parametrize("kind", ["force", "swivel_force"])
+def test_a_force_gives_the_speed_and_the_yaw_rate_of_a_calculation_by_hand(kind: str) -> None:
+    """50 u + 25 u^2 = 2 x 100 N at u = 2 m/s; 300 r + 100 r^2 = 2 x 60.5 N x 1 m at r = 0.36015 rad/s, on the spot."""
+    craft, alpha = craft_by_force(kind), {"port__alpha": 0.0, "starboard__alpha": 0.0}
+    angles = alpha if kind == "swivel_force" else {}
+    ahead = settle(craft, port__force=100.0, starboard__force=100.0, **angles)
+    assert ahead["u"][-1].item() == pytest.approx(2.0, rel=1e-9)
+    turned = settle(craft, port__force=60.5, starboard__force=-60.5, **angles)
+    assert turned["r"][-1].item() == pytest.approx((-3 + np.sqrt(9 + 4 * 1.21)) / 2, rel=1e-9)  # to starboard
+    assert turned["u"][-1].item() == pytest.approx(0.0, abs=1e-12)
+
+
+def test_limits_of_a_force_differ_ahead_and_astern_and_its_lag_is_that_of_the_actuator() -> None:
+    gear = 'k_astern = 0.5\nactuator.force = { kind = "first_order", T = 0.5, low = -40.0, high = 100.0 }'
+    craft = craft_by_force(gear=gear)
+    assert settle(craft, port__force=500.0, starboard__force=500.0)["u"][-1].item() == pytest.approx(2.0, rel=1e-6)
+    astern = settle(craft, port__force=-500.0, starboard__force=-500.0)["u"][-1].item()
+    assert astern == pytest.approx(-(np.sqrt(50.0**2 + 4 * 25 * 40) - 50) / 50, rel=1e-6)  # 2 x 40 N x 0.5
+    start = dict.fromkeys(("north", "east", "psi", "u", "v", "r"), np.zeros(1))
+    orders = {"port.force": np.array([80.0]), "starboard.force": np.array([80.0])}
+    path = rollout(craft, start, orders, {}, step=0.1, num_steps=5, memory=dict.fromkeys(orders, np.zeros(1)))
+    assert path["actual.port.force"][-1].item() == pytest.approx(80 * (1 - np.exp(-1)), rel=1e-12)
+
+
+def test_a_swivelled_force_pushes_to_where_it_is_turned() -> None:
+    force, alpha = ca.SX.sym("force"), ca.SX.sym("alpha")
+    wrench = ca.Function("f", [force, alpha], [thruster.swivel_force_wrench(force, alpha, x=ca.SX(-2.0), k_T=0.5)])
+    force_and_moment = np.array(wrench(10.0, np.pi / 6)).ravel()[[0, 1, 5]].tolist()
+    assert force_and_moment == pytest.approx([5 * np.cos(np.pi / 6), 2.5, -5.0])  # aft, to starboard: turns to port

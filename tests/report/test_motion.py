@@ -35,6 +35,7 @@ def content(kind: str, name: str = "a ship") -> ManoeuvreContent:
         log=pd.DataFrame({**columns, "shaft": shaft}),
         measures=pd.DataFrame(measure_rows(measures, 120.0)),
         criteria=pd.DataFrame(criterion_rows(judge_criteria(kind, measures, 120.0))),
+        drive_unit="rpm",
         outline=np.array([[60.0, 0.0], [40.0, 10.0], [-60.0, 10.0], [-60.0, -10.0], [40.0, -10.0]]),
         levels=pd.DataFrame(
             {"helm": points.helm, "rate": points.rate} if kind == "spiral" else {"helm": [], "rate": []}

@@ -34,7 +34,7 @@ def test_shaft_speed_gives_the_speed(speed: float) -> None:
 
 
 def test_a_speed_that_no_shaft_speed_gives_is_refused() -> None:
-    with pytest.raises(ShipidError, match=r"--speed: no shaft speed drives .* at 100 m/s: give a lower speed"):
+    with pytest.raises(ShipidError, match=r"--speed: no shaft speed or force drives .* at 100 m/s: give a lower speed"):
         define_standard(SHIP.with_values({"hull.derivatives.X_uu": -1e9}), "turning", speed=100.0)
 
 

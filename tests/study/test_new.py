@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from shipid.answer.pages import write_pages
 from shipid.cli import app
 from shipid.data.dataset import Dataset, cumulative_integral, write_dataset
 from shipid.errors import DocumentError, ShipidError
@@ -35,6 +36,7 @@ from shipid.study.new import (
 )
 from shipid.study.plan import read_plan
 from shipid.study.prepare import obtain_runs, prepare
+from shipid.study.run import run_study
 from shipid.study.survey import survey_dataset
 from shipid.vessel.load import load_vessel
 from shipid.vessel.perturb import Family, draw_members, resolve_families
@@ -312,7 +314,7 @@ def test_a_service_speed_that_no_shaft_gives_is_a_fault_of_the_vessel(tmp_path: 
     lame = tmp_path / "lame.toml"
     stops = 'actuator.n.kind = "rate_limit"\nactuator.n.rate = 1.0\nactuator.n.high = 0.5\n'
     lame.write_text(f'extends = "gunnerus-28.9"\nname = "lame"\n[thruster.port]\n{stops}[thruster.starboard]\n{stops}')
-    with pytest.raises(DocumentError, match=r"lame.toml: particulars.U_0: no shaft speed drives"):
+    with pytest.raises(DocumentError, match=r"lame.toml: particulars.U_0: no shaft speed or force drives"):
         draft_study([str(lame)], None, tmp_path / "study.toml")
 
 
@@ -390,3 +392,37 @@ def test_recorded_sets(
     assert [start for start in tests if any(name.startswith(start) for name in tested)] == tests  # and other kinds
     runs = survey_dataset(dataset).runs["duration"]
     assert all(runs[name] < runs.max() for name in document["split"]["test"])
+
+
+def without_commands(folder: Path) -> Path:
+    """A log of a ship of which no order is known, as of AIS or a phone."""
+    dataset = trial(8, duration=200.0)
+    orders = [name for name in dataset.frame if "." in str(name)]
+    return write_dataset(Dataset(dataset.frame.drop(columns=orders), dataset.metadata), folder / "ais.parquet")
+
+
+@pytest.mark.slow
+def test_a_log_without_commands_is_studied_without_physics(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the command line, as it is drafted: data alone, a regression and constant u, v, r; a vessel needs orders."""
+    monkeypatch.chdir(tmp_path)
+    without_commands(tmp_path)
+    refused = CliRunner().invoke(app, ["study", "new", "--data", "ais.parquet", "--vessel", SHIP])
+    assert "the data have no commands: `shipid study new` without --vessel needs none" in str(refused.exception)
+    written = CliRunner().invoke(app, ["study", "new", "--data", "ais.parquet"])
+    assert written.exit_code == 0, written.output
+    assert "30 rows of the log: no vessel gives a length" in " ".join(written.output.split())
+    plan = read_plan("ais-study.toml", {"grid.N_D": [2], "method.0.trials": 4})
+    assert [one.name for one in plan.foundations] == ["none"]
+    folder = tmp_path / "results"
+    for _ in run_study(plan, folder, workers=1):
+        pass
+    write_pages(folder)
+    answer = (folder / "answer.txt").read_text()
+    assert re.search(r"^30 s ahead, data alone with 2 runs err by [\d.]+ m on average, nine in ten below", answer)
+    assert "regression without physics on 2 runs" in answer
+    assert "constant u, v, r" in answer
+
+
+def test_neither_a_vessel_nor_runs_is_refused() -> None:
+    refused = CliRunner().invoke(app, ["study", "new"])
+    assert "--vessel: missing: give a vessel, or recorded runs as --data, or both" in str(refused.exception)
