@@ -34,8 +34,8 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(kind: str) -> None
         folds = [(np.arange(30, 120), np.arange(30))]
     features = rng.normal(size=(len(ALL), 200))
     kernel, outputs = features @ features.T / 200 + 0.3 * np.eye(len(ALL)), rng.normal(size=(len(ALL), 3))
-    made, _ = FoldBlocks(folds, ALL, "cpu").errors_and_slope(torch.tensor(kernel), torch.tensor(outputs))
-    for (training, judged), errors in zip(folds, made.numpy(), strict=True):
+    made, _ = FoldBlocks(folds, ALL, "cpu").errors_and_slope(torch.tensor(kernel)[None], torch.tensor(outputs)[None])
+    for (training, judged), errors in zip(folds, made[0].numpy(), strict=True):
         weights = np.linalg.solve(kernel[np.ix_(training, training)], outputs[training])
         expected = outputs[judged] - kernel[np.ix_(judged, training)] @ weights
         np.testing.assert_allclose(errors[np.abs(errors).sum(axis=1) > 0], expected, atol=1e-10)
@@ -43,8 +43,8 @@ def test_errors_without_a_block_are_those_of_a_fit_without_it(kind: str) -> None
 
 def test_the_slope_is_the_difference() -> None:
     rng, blocks = np.random.default_rng(1), FoldBlocks(FOLDS, ALL, "cpu")
-    features, outputs = rng.normal(size=(len(ALL), 200)), torch.tensor(rng.normal(size=(len(ALL), 3)))
-    kernel, way = (torch.tensor(one @ one.T / 200) for one in (features, rng.normal(size=(len(ALL), 9))))
+    features, outputs = rng.normal(size=(len(ALL), 200)), torch.tensor(rng.normal(size=(1, len(ALL), 3)))
+    kernel, way = (torch.tensor(one @ one.T / 200)[None] for one in (features, rng.normal(size=(len(ALL), 9))))
     kernel += 0.3 * torch.eye(len(ALL))
     up, down = ((blocks.errors_and_slope(kernel + h * way, outputs)[0] ** 2).sum() for h in (1e-5, -1e-5))
     slope = (blocks.errors_and_slope(kernel, outputs)[1] * way).sum()
