@@ -22,14 +22,15 @@ from shipid.hybrid.search import PathProblem, Point, TrialWorth, windows_of_fold
 from shipid.hybrid.units import VaryingInputs
 
 PRIOR = 0.1  # weight of the squared distance from the start of a descent, in logarithms, where one run is seen
-FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, what they choose is for errors left out alone
+FOLDS_OF_PART = 3  # where fewer folds are left out by each trial, one more descent leaves none out
 
 
 class KernelProblem(PathProblem):
     """One foundation. Each trial leaves every `parts`-th fold out of its choice of scales.
 
     The errors of the runs of these folds are those of this trial alone, so that no run has a part in what predicts it.
-    With few folds the solution is by a descent on all of them. With one part there are no errors left out.
+    With few folds one more descent is on all of them: a third of three runs would choose by two. With one part there
+    are no errors left out.
     """
 
     def __init__(self, method: Any, task: Task, name: str) -> None:
@@ -126,15 +127,15 @@ class KernelProblem(PathProblem):
         tried = [(row["params"], self.folds_left_out(row["number"])) for row in best if row["number"] < self.parts]
         if self.few:
             tried.append((self.descend(next(iter(self.method.points())))[1], []))
-        errors, first = np.full_like(self.targets, np.nan), -1 if self.few else 0
+        errors = np.full_like(self.targets, np.nan)
         for settings, folds in tried:
             solved, scales = self.solve(settings), np.array([settings[name] for name in self.scales])
             weights = torch.cat([*solved[1]], dim=1).cpu().numpy()
             members.append(KernelMember(scales, settings["linear"], weights))
             self._leave_out(folds, settings, solved, errors)
-        self.left_out, members = errors if self.parts > 1 else None, members[first:]
+        self.left_out = errors if self.parts > 1 else None
         return KernelCompensator(
-            self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[first][0]
+            self.inputs, varying.normaliser, varying.reflection, self.basis, centres, tuple(members), tried[0][0]
         )
 
     def _leave_out(
